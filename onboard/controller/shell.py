@@ -1,0 +1,170 @@
+"""The asyncio shell around one holon: frames and timers in, effects out. Dull on purpose.
+
+Everything of one machine happens in one order: events wait in a bounded inbox while a journal write is under way, and
+effects are carried out one after the other, so nothing is said before what must be durable is durable.
+"""
+
+import asyncio
+from collections import Counter, deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from onboard.core.codes import Reason
+from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
+from onboard.core.frame import Frame
+from onboard.core.holon import Holon
+from onboard.ports.bus import Bus
+from onboard.ports.journal import Journal
+from onboard.ports.telemetry import Telemetry
+from onboard.ports.watchdog import Watchdog
+from onboard.wire.codec import Codec, Decoder
+
+#: Most frames that wait for one machine; beyond that the oldest bus in the world is too fast for it.
+INBOX_LIMIT = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """What the shell is plugged into."""
+
+    fleet_bus: Bus
+    device_bus: Bus
+    journal: Journal
+    telemetry: Telemetry
+    watchdog: Watchdog
+
+
+class Controller:
+    """Runs one holon on a running asyncio loop. ``start`` once, ``stop`` once."""
+
+    def __init__(self, holon: Holon, ports: Ports, fleet: Codec, device: Codec) -> None:
+        self.holon = holon
+        self.ports = ports
+        self.drops: Counter[Reason] = Counter()
+        self.stopped: asyncio.Future[str] | None = None
+        self._codecs = (fleet, device)
+        self._decoders = (Decoder(fleet), Decoder(device))
+        self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
+        self._outbox: deque[Effect] = deque()
+        self._writing: asyncio.Task[None] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_us: int | None = None
+
+    def start(self) -> None:
+        """Join both buses and let the holon begin. To be called on the running loop."""
+        self._loop = asyncio.get_running_loop()
+        self.stopped = self._loop.create_future()
+        self.ports.fleet_bus.subscribe(self._on_fleet_frame)
+        self.ports.device_bus.subscribe(self._on_device_frame)
+        self._outbox.extend(self.holon.start(self._now_us()))
+        self.ports.watchdog.ready()
+        self._carry_out()
+
+    async def stop(self) -> None:
+        """Leave both buses; pending journal writes are finished first."""
+        if self._timer is not None:
+            self._timer.cancel()
+        if self._writing is not None:
+            await asyncio.wait([self._writing])
+        await self.ports.fleet_bus.close()
+        if self.ports.device_bus is not self.ports.fleet_bus:
+            await self.ports.device_bus.close()
+        await self.ports.journal.close()
+
+    def _now_us(self) -> int:
+        return round(self._loop.time() * 1_000_000)
+
+    # --- events in ---------------------------------------------------------------------------------------------
+
+    def _on_fleet_frame(self, frame: Frame, time_us: int) -> None:
+        self._post(self._fleet_frame, frame, time_us)
+
+    def _on_device_frame(self, frame: Frame, time_us: int) -> None:
+        self._post(self._device_frame, frame, time_us)
+
+    def _post(self, handle: Callable[[Frame, int], list[Effect]], frame: Frame, time_us: int) -> None:
+        if self._writing is None and not self._inbox:
+            self._outbox.extend(handle(frame, time_us))
+            self._carry_out()
+        elif len(self._inbox) < INBOX_LIMIT:
+            self._inbox.append((handle, frame, time_us))
+        else:
+            self.drops[Reason.QUEUE_FULL] += 1
+
+    def _fleet_frame(self, frame: Frame, time_us: int) -> list[Effect]:
+        message = self._decoders[0].feed(frame, time_us)
+        return self.holon.receive(message, time_us) if message is not None else []
+
+    def _device_frame(self, frame: Frame, time_us: int) -> list[Effect]:
+        message = self._decoders[1].feed(frame, time_us)
+        if message is None or message.sender != self.holon.node_id:
+            return []
+        return self.holon.sense(message, time_us)
+
+    def _on_timer(self) -> None:
+        self._timer = None
+        self._timer_us = None
+        if self._writing is not None:
+            return
+        self._outbox.extend(self.holon.wake(self._now_us()))
+        self.ports.watchdog.alive()
+        self._carry_out()
+
+    # --- effects out -------------------------------------------------------------------------------------------
+
+    def _carry_out(self) -> None:
+        """Carry out effects and waiting events in order, as far as no journal write stands in between."""
+        while self._writing is None:
+            if self._outbox:
+                self._perform(self._outbox.popleft())
+            elif self._inbox:
+                handle, frame, time_us = self._inbox.popleft()
+                self._outbox.extend(handle(frame, time_us))
+            else:
+                break
+        if self._writing is None:
+            self._set_timer()
+
+    def _perform(self, effect: Effect) -> None:
+        match effect:
+            case Send(message):
+                for frame in self._codecs[0].encode(message):
+                    self.ports.fleet_bus.send(frame)
+            case Actuate(message):
+                for frame in self._codecs[1].encode(message):
+                    self.ports.device_bus.send(frame)
+            case Record():
+                self._writing = self._loop.create_task(self._write(effect))
+            case Report(text):
+                self.ports.telemetry.event(self._now_us(), self.holon.machine.name, text)
+            case Halt(why):
+                self._halt(why)
+
+    async def _write(self, record: Record) -> None:
+        try:
+            await self.ports.journal.append(record.entry)
+        except OSError as error:
+            # What cannot be made durable must not be said: the machine stops where its authority still holds.
+            self._outbox.clear()
+            self._halt(f"the journal cannot be written: {error}")
+        self._writing = None
+        self._carry_out()
+
+    def _halt(self, why: str) -> None:
+        """Fall silent: the drives brake by themselves, and the tokens stay where they are."""
+        self.holon.halted = self.holon.halted or why
+        self._inbox.clear()
+        self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"halted: {why}")
+        self.ports.watchdog.status(f"halted: {why}")
+        if self.stopped is not None and not self.stopped.done():
+            self.stopped.set_result(why)
+
+    def _set_timer(self) -> None:
+        """One timer for the holon's next wish; a later wish leaves an earlier timer in place."""
+        due_us = self.holon.next_wake()
+        if due_us is None or (self._timer_us is not None and self._timer_us <= due_us):
+            return
+        if self._timer is not None:
+            self._timer.cancel()
+        self._timer_us = max(due_us, self._now_us())
+        self._timer = self._loop.call_at(self._timer_us / 1_000_000, self._on_timer)

@@ -1,0 +1,80 @@
+"""What a kind of machine adds to the core: a task-generation function and the machine's own steps.
+
+The core knows tasks, segments, windows, bids and tokens; a kind knows what its machine can do and what it costs
+(rows P21, P22). A new kind is a new ``Behaviour``; no protocol code changes for it.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.codes import KindCode, MachineState, Reason
+from onboard.core.effects import Effect
+from onboard.core.messages import Message
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent
+from onboard.core.site import Machine, Site
+
+
+@dataclass
+class Fleet:
+    """What the core lends to a behaviour: identity, tokens, mirror and negotiation of the same node."""
+
+    site: Site
+    machine: Machine
+    tokens: TokenBook
+    mirror: Mirror
+    negotiation: Negotiation
+
+    @property
+    def node_id(self) -> int:
+        """This machine's node-ID."""
+        return self.machine.node_id
+
+
+class Behaviour(Protocol):
+    """One kind of machine on one node. All times are bus time in us; every method returns effects in order."""
+
+    kind: KindCode
+
+    @property
+    def state(self) -> MachineState:
+        """What the heartbeat says."""
+
+    @property
+    def itinerary_version(self) -> int:
+        """Version of the firm itinerary, 0 for none."""
+
+    def start(self, now_us: int) -> list[Effect]:
+        """First effects after power-up: silence outputs, ask the sensors."""
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """A message of the machine's own device bus."""
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """A fleet message, after tokens, mirror and negotiation have seen it."""
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """Pre-assigned, outbid, awarded, or an own call closed."""
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """NONE where the held token may go to ``requester`` now; any other reason refuses."""
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Do what can be done next; called after every event, so it must change nothing where nothing is due."""
+
+    def next_wake(self) -> int | None:
+        """When ``advance`` should be called next if nothing else happens."""
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Say again what this node vouches for: its itinerary and the cars in its custody."""
+
+
+class BehaviourFactory(Protocol):
+    """Makes the behaviour of one kind; ``estimator`` is what the negotiation asks for bids."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
+        """The task-generation function of a machine of this kind."""
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
+        """The machine's steps."""

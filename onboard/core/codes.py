@@ -1,0 +1,235 @@
+"""Value tables shared by every message. The numbers are the ones of the DBC's VAL_ tables: a test compares them."""
+
+from enum import IntEnum
+
+#: What is spoken on the fleet bus; a machine with another number joins as an obstacle and never bids.
+CONTRACT_VERSION = 1
+#: Nobody: no node carries this node-ID.
+NOBODY = 0
+#: Highest node-ID; 251 to 255 are kept for gateways and tools.
+MAX_NODE_ID = 250
+#: "The bidder chooses": a station field that names none.
+ANY_STATION = 0xFFFF
+#: Where a car is that has left the park.
+OUTSIDE = 0xFFFE
+
+
+class KindCode(IntEnum):
+    """Kinds of machine, as a call addresses them and a heartbeat announces them."""
+
+    ANY = 0
+    ROBOT = 1
+    LIFT = 2
+    COMPARTMENT = 3
+    OBSERVER = 4
+
+
+class Operation(IntEnum):
+    """What a call asks for."""
+
+    PARK = 0
+    RETRIEVE = 1
+    RIDE = 2
+    GIVE_WAY = 3
+    RECEIVE = 4
+
+
+class Criterion(IntEnum):
+    """What the number in a bid means; the same for all participants of a call."""
+
+    FINISH_TIME = 0
+    MONEY = 1
+    LENGTH = 2
+
+
+class CallResult(IntEnum):
+    """How the initiator closed a call."""
+
+    AWARDED = 0
+    REOPENED = 1
+    REFUSED = 2
+    WITHDRAWN = 3
+    REJECTED = 4
+
+
+class Grade(IntEnum):
+    """Strength of an itinerary's reservations."""
+
+    RELEASED = 0
+    TENTATIVE = 1
+    FIRM = 2
+
+
+class LegAction(IntEnum):
+    """What a machine does during one leg of an itinerary."""
+
+    STAND = 0
+    TRAVEL = 1
+    WORK = 2
+    RIDE = 3
+
+
+class TokenKind(IntEnum):
+    """What a token authorises; its 24-bit number means a segment, a station, a car or a task accordingly."""
+
+    SEGMENT = 0
+    STATION = 1
+    CAR = 2
+    TASK = 3
+
+
+class TaskPhase(IntEnum):
+    """Life of a task, as its present owner announces it."""
+
+    OPEN = 0
+    AWARDED = 1
+    STARTED = 2
+    LOADED = 3
+    DONE = 4
+    REFUSED = 5
+    FORFEITED = 6
+
+
+class MachineState(IntEnum):
+    """State of a machine, as its heartbeat announces it."""
+
+    STARTING = 0
+    IDLE = 1
+    WORKING = 2
+    WAITING = 3
+    OBSTACLE = 4
+    STOPPED = 5
+
+
+class Reason(IntEnum):
+    """Why something was held, refused or dropped; the one table for all messages."""
+
+    NONE = 0
+    NO_BID = 1
+    PARK_FULL = 2
+    CAR_TOO_LARGE = 3
+    UNKNOWN_TICKET = 4
+    TOKEN_HELD_BY_OTHER = 5
+    TOKEN_NOT_GRANTABLE_YET = 6
+    TOKEN_STALE_VERSION = 7
+    NOT_AUTHORISED = 8
+    MIRROR_BEHIND = 9
+    OTHER_CONTRACT = 10
+    OTHER_SITE = 11
+    BUS_TIME_LOST = 12
+    POSITION_UNKNOWN = 13
+    JOURNAL_LOST = 14
+    ACTUATOR_FAULT = 15
+    SENSOR_FAULT = 16
+    INVARIANT_BROKEN = 17
+    INCOMPLETE_SET = 18
+    UNKNOWN_IDENTIFIER = 19
+    SHORT_FRAME = 20
+    VALUE_OUT_OF_RANGE = 21
+    DUPLICATE_NODE_ID = 22
+    LATE = 23
+    QUEUE_FULL = 24
+    CANCELLED = 25
+    OPERATOR = 26
+    DOOR_NOT_READY = 27
+    BEATEN = 28
+    IMPOSSIBLE = 29
+    PERSON_INSIDE = 30
+
+
+class OperatorAction(IntEnum):
+    """What an operator does by hand at a compartment (row P52), the same path as a customer's press."""
+
+    PRESS_KEY = 0
+    INSERT_TICKET = 1
+    CANCEL = 2
+
+
+class DriveMode(IntEnum):
+    """State of an axis drive."""
+
+    STANDING = 0
+    MOVING = 1
+    BRAKING = 2
+    FAULT = 3
+
+
+class ShuttleAction(IntEnum):
+    """Orders to the telescopic shuttle."""
+
+    RETRACT = 0
+    REACH = 1
+    GRIP = 2
+    RELEASE = 3
+
+
+class ShuttleMode(IntEnum):
+    """Where the shuttle is and what it does."""
+
+    HOME = 0
+    MOVING = 1
+    REACHED = 2
+    GRIPPING = 3
+    RELEASING = 4
+    FAULT = 5
+
+
+class Side(IntEnum):
+    """Side of an alley, seen with the index growing to the right: the street or front side, and the far side."""
+
+    NEAR = 0
+    FAR = 1
+
+
+class DoorName(IntEnum):
+    """The two doors of a compartment: towards the street and towards the alley."""
+
+    INPUT = 0
+    OUTPUT = 1
+
+
+class DoorAction(IntEnum):
+    """Orders to a door; a door that is not ordered otherwise stays as it is."""
+
+    OPEN = 0
+    CLOSE = 1
+
+
+class DoorPosition(IntEnum):
+    """Position of a door as its sensors see it; LOCKED is closed and bolted."""
+
+    OPEN = 0
+    OPENING = 1
+    CLOSING = 2
+    CLOSED = 3
+    LOCKED = 4
+    FORCED = 5
+
+
+class LightColour(IntEnum):
+    """The traffic light before a compartment's input door."""
+
+    GREEN = 0
+    RED = 1
+
+
+class DeskInput(IntEnum):
+    """What a customer does at the desk."""
+
+    KEY = 0
+    TICKET = 1
+    CANCEL = 2
+
+
+class DeskText(IntEnum):
+    """What the desk shows."""
+
+    WELCOME = 0
+    TAKE_TICKET = 1
+    PLEASE_WAIT = 2
+    CAR_READY = 3
+    FULL = 4
+    CAR_TOO_LARGE = 5
+    UNKNOWN_TICKET = 6
+    LEAVE_COMPARTMENT = 7
+    OUT_OF_ORDER = 8

@@ -1,0 +1,44 @@
+"""What the core asks of its shell. Effects are carried out in order; a ``Record`` must be durable before the next."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from onboard.core.messages import Message
+
+
+@dataclass(frozen=True, slots=True)
+class Send:
+    """Say this on the fleet bus."""
+
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class Actuate:
+    """Say this on the machine's device bus."""
+
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """Write this journal entry durably before anything that follows."""
+
+    entry: Mapping[str, str | int]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Tell people: one line of text, never needed by a machine."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Halt:
+    """A broken invariant: stop the machine safely and say why."""
+
+    why: str
+
+
+Effect = Send | Actuate | Record | Report | Halt

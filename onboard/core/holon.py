@@ -1,0 +1,288 @@
+"""The holon: a value that eats messages and timers and returns effects. It owns no task, socket or clock.
+
+``receive`` (fleet bus), ``sense`` (device bus) and ``wake`` take the machine's loop time in us; ``next_wake`` tells when
+to call ``wake`` again. Inside, all times are bus time. You can drive one from a Python prompt.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
+from onboard.core.bus_time import BusClock
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, KindCode, MachineState, Reason
+from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.messages import (
+    Award,
+    Bid,
+    BusTime,
+    CallForProposals,
+    CarAt,
+    Diagnostic,
+    EmergencyStop,
+    Heartbeat,
+    Itinerary,
+    Message,
+    Progress,
+    SyncRequest,
+    TokenGrant,
+    TokenHeld,
+    TokenRefusal,
+    TokenRequest,
+)
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent
+from onboard.core.serial import successor
+from onboard.core.site import Machine, Site
+
+#: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
+DIGEST_PATIENCE = 2
+#: Most effects that one event may cause before the holon counts as running away.
+MAX_ROUNDS = 100
+
+
+class Holon:
+    """One machine's controller, of any kind. ``boot`` is the boot counter, 1 to 255; ``entries`` the journal's."""
+
+    def __init__(
+        self,
+        site: Site,
+        machine: Machine,
+        factory: BehaviourFactory,
+        *,
+        boot: int = 1,
+        entries: Iterable[Mapping[str, str | int]] = (),
+    ) -> None:
+        self.site = site
+        self.machine = machine
+        self.node_id = machine.node_id
+        self.boot = boot
+        self.halted: str | None = None
+        self.drops: Counter[Reason] = Counter()
+        self.clock = BusClock(site.timing.bus_time_us)
+        self.tokens = TokenBook(site, machine.node_id)
+        self.tokens.replay(entries)
+        self.mirror = Mirror(site, machine.node_id)
+        estimator = factory.estimator(site, machine, self.mirror)
+        self.negotiation = Negotiation(machine.node_id, machine.kind, site.timing, estimator)
+        self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation)
+        self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self._heartbeat_due_us: int | None = None
+        self._bus_time_due_us: int | None = None
+        self._mismatches: Counter[int] = Counter()
+        # Each handler takes exactly the message class that it is listed under; Any is what a dispatch table costs.
+        self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
+            TokenRequest: self._on_token_request,
+            TokenGrant: self.tokens.on_grant,
+            TokenHeld: lambda message, now_us: self.tokens.on_held(message),
+            TokenRefusal: self._on_token_refusal,
+            CallForProposals: self._negotiate,
+            Bid: self._negotiate,
+            Award: self._negotiate,
+            Itinerary: self._on_itinerary,
+            Progress: self._on_progress,
+            CarAt: self._on_car,
+            Heartbeat: self._on_heartbeat,
+            SyncRequest: self._on_sync_request,
+            EmergencyStop: self._on_emergency_stop,
+        }
+
+    # --- events in ---------------------------------------------------------------------------------------------
+
+    def start(self, local_us: int) -> list[Effect]:
+        """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
+        # Bus time starts somewhere; the lowest fixed node's start is as good as any.
+        self._elect_time_source(local_us)
+        now_us = self.clock.bus_us(local_us)
+        self._heartbeat_due_us = now_us
+        effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
+        effects += self.behaviour.start(now_us)
+        effects += self._beat(now_us)
+        effects.append(Send(SyncRequest(self.node_id, NOBODY)))
+        return self._settle(effects, now_us)
+
+    def receive(self, message: Message, local_us: int) -> list[Effect]:
+        """A message of the fleet bus, received at ``local_us``."""
+        if isinstance(message, BusTime):
+            self.clock.heard(message.bus_time_us, local_us)
+            return []
+        now_us = self.clock.bus_us(local_us)
+        if message.sender == self.node_id:
+            self.drops[Reason.DUPLICATE_NODE_ID] += 1
+            return self._halt("another node sends under this node-ID")
+        handler = self._handlers.get(type(message))
+        effects = handler(message, now_us) if handler is not None else []
+        effects = effects + self.behaviour.hear(message, now_us)
+        return self._settle(effects, now_us)
+
+    def sense(self, message: Message, local_us: int) -> list[Effect]:
+        """A message of the machine's own device bus."""
+        now_us = self.clock.bus_us(local_us)
+        return self._settle(self.behaviour.sense(message, now_us), now_us)
+
+    def wake(self, local_us: int) -> list[Effect]:
+        """Do what has fallen due."""
+        self._elect_time_source(local_us)
+        now_us = self.clock.bus_us(local_us)
+        effects = self.tokens.wake(now_us, self.behaviour.itinerary_version)
+        if not self.clock.is_lost(local_us):
+            effects += self._carry_out(self.negotiation.wake(now_us), now_us)
+        effects += self._beat(now_us)
+        return self._settle(effects, now_us)
+
+    def next_wake(self) -> int | None:
+        """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
+        times = [
+            self._heartbeat_due_us,
+            self._bus_time_due_us,
+            self.tokens.next_wake(),
+            self.negotiation.next_wake(),
+            self.behaviour.next_wake(),
+        ]
+        due = [time for time in times if time is not None]
+        return self.clock.local_us(min(due)) if due and self.halted is None else None
+
+    def drop(self, reason: Reason) -> None:
+        """Count wire input that the layer below dropped."""
+        self.drops[reason] += 1
+
+    # --- handlers ----------------------------------------------------------------------------------------------
+
+    def _on_token_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
+        key = TokenKey(request.token_kind, request.token)
+        if self.tokens.holds(key):
+            verdict = self.behaviour.may_grant(key, request.sender, now_us)
+        else:
+            verdict = Reason.TOKEN_HELD_BY_OTHER
+        return self.tokens.on_request(request, verdict, now_us)
+
+    def _on_token_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
+        self.tokens.on_refusal(refusal)
+        return []
+
+    def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
+        if isinstance(message, CallForProposals) and self._may_not_bid(now_us) is not Reason.NONE:
+            self.drops[self._may_not_bid(now_us)] += 1
+            return []
+        return self._carry_out(self.negotiation.receive(message, now_us), now_us)
+
+    def _may_not_bid(self, now_us: int) -> Reason:
+        if self.clock.is_lost(self.clock.local_us(now_us)):
+            return Reason.BUS_TIME_LOST
+        if self.behaviour.state in (MachineState.OBSTACLE, MachineState.STOPPED, MachineState.STARTING):
+            return Reason.POSITION_UNKNOWN
+        return Reason.NONE
+
+    def _on_itinerary(self, itinerary: Itinerary, now_us: int) -> list[Effect]:
+        self.mirror.on_itinerary(itinerary, now_us)
+        return self._carry_out(self.negotiation.receive(itinerary, now_us), now_us)
+
+    def _on_progress(self, progress: Progress, now_us: int) -> list[Effect]:
+        self.mirror.on_progress(progress)
+        return []
+
+    def _on_car(self, statement: CarAt, now_us: int) -> list[Effect]:
+        self.mirror.on_car(statement)
+        return []
+
+    def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
+        if beat.contract != CONTRACT_VERSION or beat.site_digest != self.site.digest:
+            self.drops[Reason.OTHER_CONTRACT if beat.contract != CONTRACT_VERSION else Reason.OTHER_SITE] += 1
+            return []
+        if self.mirror.on_heartbeat(beat, now_us):
+            return [Send(SyncRequest(self.node_id, beat.sender))]
+        if beat.mirror_digest == self.mirror.digest():
+            del self._mismatches[beat.sender]
+            return []
+        self._mismatches[beat.sender] += 1
+        if self._mismatches[beat.sender] < DIGEST_PATIENCE:
+            return []
+        del self._mismatches[beat.sender]
+        return [Send(SyncRequest(self.node_id, beat.sender))]
+
+    def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
+        if request.whom not in (NOBODY, self.node_id):
+            return []
+        return self.behaviour.statements(now_us)
+
+    def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
+        return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
+        """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
+        if self.halted is not None:
+            return [effect for effect in effects if isinstance(effect, Report | Halt)]
+        for _ in range(MAX_ROUNDS):
+            more = self.behaviour.advance(now_us)
+            if not more:
+                return effects
+            effects = effects + more
+        return effects + self._halt("the machine's steps do not come to rest")
+
+    def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        for item in outcome:
+            if isinstance(item, EVENT_TYPES):
+                effects += self.behaviour.negotiated(item, now_us)
+            else:
+                effects.append(item)
+        return effects
+
+    def _beat(self, now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
+            self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+            effects.append(Send(self._heartbeat()))
+        if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
+            self._bus_time_due_us = now_us + self.site.timing.bus_time_us
+            effects.append(Send(BusTime(self.node_id, now_us)))
+        return effects
+
+    def _heartbeat(self) -> Heartbeat:
+        return Heartbeat(
+            self.node_id,
+            CONTRACT_VERSION,
+            self.site.digest,
+            self.mirror.digest(),
+            self.boot,
+            self.machine.kind,
+            self.behaviour.state,
+        )
+
+    def _elect_time_source(self, local_us: int) -> None:
+        """The lowest live fixed node sends bus time (design, section 5)."""
+        if self.machine.kind is KindCode.ROBOT:
+            return
+        now_us = self.clock.bus_us(local_us)
+        lower = [
+            node
+            for node in self.mirror.alive(now_us)
+            if node < self.node_id and self.mirror.peers[node].kind in (KindCode.LIFT, KindCode.COMPARTMENT)
+        ]
+        self.clock.is_source = not lower
+        if lower:
+            self._bus_time_due_us = None
+        elif self._bus_time_due_us is None:
+            self._bus_time_due_us = now_us
+
+    def _halt(self, why: str) -> list[Effect]:
+        if self.halted is not None:
+            return []
+        self.halted = why
+        return [Halt(why)]
+
+    def diagnostics(self) -> list[Effect]:
+        """One message per reason for which wire input was dropped, for a bus that shows why (design, section 7)."""
+        return [Send(Diagnostic(self.node_id, reason, count)) for reason, count in sorted(self.drops.items())]
+
+
+def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
+    """The boot counter after the last one journalled, 1 to 255, going round."""
+    last = 0
+    for entry in entries:
+        if entry.get("record") == "boot":
+            last = int(entry["boot"])
+    return successor(last, 8)

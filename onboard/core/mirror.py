@@ -1,0 +1,149 @@
+"""The mirror: what this machine believes of the others, built from bus traffic alone (row P35).
+
+A wrong mirror costs time, never safety: what moves is guarded by tokens.
+"""
+
+from dataclasses import dataclass, field
+
+from onboard.core.codes import ANY_STATION, OUTSIDE, Grade, KindCode, MachineState
+from onboard.core.messages import CarAt, Heartbeat, Itinerary, Progress, Reference
+from onboard.core.occupancy import itinerary_windows
+from onboard.core.reservations import Reservations
+from onboard.core.serial import is_newer
+from onboard.core.site import Site, Station
+
+#: Heartbeats missed before a node counts as silent.
+MISSED_HEARTBEATS = 3
+#: Cars that have left and are still remembered; bounds the memory of a machine that runs for years.
+MAX_GONE_CARS = 64
+
+
+@dataclass
+class Peer:
+    """Last word of one other machine; times in bus us."""
+
+    kind: KindCode
+    state: MachineState
+    boot: int
+    mirror_digest: int
+    heard_at_us: int
+    contract: int
+    site_digest: int
+
+
+@dataclass(frozen=True, slots=True)
+class CarRecord:
+    """Where a car stands, who vouches for it, and under which version of its token."""
+
+    station: int
+    custodian: int
+    version: int
+
+
+def _crc16(values: list[int]) -> int:
+    """CRC-16/CCITT-FALSE over the values as 32-bit big-endian words: short, and the same in any language."""
+    crc = 0xFFFF
+    for value in values:
+        for byte in (value & 0xFFFFFFFF).to_bytes(4, "big"):
+            crc ^= byte << 8
+            for _ in range(8):
+                crc = (crc << 1 ^ 0x1021 if crc & 0x8000 else crc << 1) & 0xFFFF
+    return crc
+
+
+@dataclass
+class Mirror:
+    """Everybody's itineraries by version, cars by custodian, and who is alive."""
+
+    site: Site
+    node_id: int
+    peers: dict[int, Peer] = field(default_factory=dict)
+    itineraries: dict[int, Itinerary] = field(default_factory=dict)
+    cars: dict[Reference, CarRecord] = field(default_factory=dict)
+    progress: dict[int, Progress] = field(default_factory=dict)
+    reservations: Reservations = field(default_factory=Reservations)
+    _digest: int | None = None
+
+    def on_heartbeat(self, beat: Heartbeat, now_us: int) -> bool:
+        """Note a sign of life; True where the sender is new or was restarted, so that its statements are wanted."""
+        known = self.peers.get(beat.sender)
+        fresh = known is None or known.boot != beat.boot
+        if fresh:
+            self._drop_itinerary(beat.sender)
+        self.peers[beat.sender] = Peer(
+            beat.kind, beat.state, beat.boot, beat.mirror_digest, now_us, beat.contract, beat.site_digest
+        )
+        return fresh
+
+    def on_itinerary(self, itinerary: Itinerary, now_us: int) -> bool:
+        """Take up a firm itinerary by version; True where it was news. Tentative ones are hints and not kept here."""
+        if itinerary.grade is Grade.TENTATIVE:
+            return False
+        known = self.itineraries.get(itinerary.sender)
+        if known is not None and not is_newer(itinerary.version, known.version, 8):
+            return False
+        self.itineraries[itinerary.sender] = itinerary
+        self.reservations.release(itinerary.sender)
+        self.reservations.reserve(itinerary.sender, itinerary_windows(self.site, itinerary, now_us))
+        self._digest = None
+        return True
+
+    def on_progress(self, progress: Progress) -> None:
+        """Last known position of another machine."""
+        self.progress[progress.sender] = progress
+
+    def on_car(self, statement: CarAt) -> bool:
+        """Take up a custodian's statement; True where it changed anything."""
+        known = self.cars.get(statement.car)
+        record = CarRecord(statement.station, statement.sender, statement.version)
+        if known == record:
+            return False
+        if known is not None and statement.version != known.version and not is_newer(
+            statement.version, known.version, 16
+        ):
+            return False
+        self.cars[statement.car] = record
+        self._digest = None
+        self._prune_gone()
+        return True
+
+    def _prune_gone(self) -> None:
+        """Keep the last cars that left, so that a late statement about them is still known to be old."""
+        if len(self.cars) <= MAX_GONE_CARS:
+            return
+        gone = [car for car, record in self.cars.items() if record.station == OUTSIDE]
+        for car in gone[: len(gone) - MAX_GONE_CARS]:
+            del self.cars[car]
+
+    def free_places(self) -> list[Station]:
+        """Places at which no car is known to stand, in the site's order."""
+        taken = {record.station for record in self.cars.values()}
+        return [place for place in self.site.places if place.number not in taken]
+
+    def car_station(self, car: Reference) -> Station | None:
+        """Where a car stands, or None where it is unknown or aboard a machine."""
+        record = self.cars.get(car)
+        if record is None or record.station in (ANY_STATION, OUTSIDE):
+            return None
+        return Station.from_number(record.station)
+
+    def alive(self, now_us: int) -> set[int]:
+        """Nodes heard within ``MISSED_HEARTBEATS`` heartbeat periods."""
+        limit_us = now_us - MISSED_HEARTBEATS * self.site.timing.heartbeat_us
+        return {node for node, peer in self.peers.items() if peer.heard_at_us >= limit_us}
+
+    def digest(self) -> int:
+        """16 bits over firm itineraries (node, version) and cars (number, station): equal on nodes that agree."""
+        if self._digest is None:
+            words = [node << 8 | it.version for node, it in sorted(self.itineraries.items())]
+            for car, record in sorted(self.cars.items()):
+                if record.station == OUTSIDE:
+                    continue
+                words += [car.origin << 16 | car.number, record.station]
+            self._digest = _crc16(words)
+        return self._digest
+
+    def _drop_itinerary(self, node: int) -> None:
+        # Its body is still somewhere: the reservation stays until its first new itinerary replaces it.
+        if self.itineraries.pop(node, None) is not None:
+            self._digest = None

@@ -1,0 +1,167 @@
+"""The site: what all machines of a fleet agree on, as plain values.
+
+Read from a TOML file by ``onboard.config``. Words: a *track* is a line of *segments* (an alley, a lift shaft, a spur);
+``Segment(track, index)`` is one body slot of it, written p(k,i) on the alley of floor k (row P31). A *station* is where
+a car can stand: a place or a compartment, on one side of a segment.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+from onboard.core.codes import KindCode, Side
+
+
+class Segment(NamedTuple):
+    """One body slot: index 1 to n on a track; the number on the wire is ``track << 8 | index``."""
+
+    track: int
+    index: int
+
+    @property
+    def number(self) -> int:
+        """16-bit number on the wire."""
+        return self.track << 8 | self.index
+
+    def __str__(self) -> str:
+        return f"p({self.track},{self.index})"
+
+
+class Station(NamedTuple):
+    """A place or compartment beside a segment: 16-bit number ``track << 8 | side << 7 | index``, index 1 to 127."""
+
+    track: int
+    index: int
+    side: Side
+
+    @property
+    def number(self) -> int:
+        """16-bit number on the wire."""
+        return self.track << 8 | self.side << 7 | self.index
+
+    @property
+    def segment(self) -> Segment:
+        """The segment in front of it."""
+        return Segment(self.track, self.index)
+
+    @classmethod
+    def from_number(cls, number: int) -> "Station":
+        """Inverse of ``number``, for 0 to 0xFFFE."""
+        return cls(number >> 8, number & 0x7F, Side(number >> 7 & 1))
+
+    def __str__(self) -> str:
+        return f"p({self.track},{self.index}){'NF'[self.side]}"
+
+
+class TrackKind(Enum):
+    """What a track is."""
+
+    ALLEY = "alley"
+    LIFT = "lift"
+    SPUR = "spur"
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A line of ``length`` segments, indices 1 to ``length``, centres ``pitch_mm`` apart; index 1 at 0 mm.
+
+    Alleys are tracks 1 to 127 and their number is the floor; lifts 128 to 191 with one segment per floor served;
+    spurs 192 to 254, joined to ``joins`` on an alley.
+    """
+
+    number: int
+    kind: TrackKind
+    length: int
+    pitch_mm: int
+    joins: tuple[Segment, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Limits of one moving axis: top speed in mm/s, acceleration and braking in mm/s^2, both above 0."""
+
+    speed_mm_s: int
+    acceleration_mm_s2: int
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """One machine of the site. ``home`` is where a robot or lift stands at first, or the compartment's segment."""
+
+    node_id: int
+    name: str
+    kind: KindCode
+    home: Segment
+    station: Station | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class CarLimits:
+    """What cars the park takes (row P33); all in mm and kg."""
+
+    min_wheelbase_mm: int
+    max_wheelbase_mm: int
+    max_length_mm: int
+    max_height_mm: int
+    max_load_kg: int
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Protocol and device times of a site, in microseconds unless named otherwise."""
+
+    call_window_us: int
+    bid_delay_us: int
+    bid_half_us: int
+    deadline_guard_us: int
+    max_attempts: int
+    award_repeat_us: int
+    token_repeat_us: int
+    heartbeat_us: int
+    bus_time_us: int
+    door_us: int
+    grip_us: int
+    drive_refresh_us: int
+
+
+@dataclass(frozen=True)
+class Site:
+    """Everything a machine knows beforehand. Built and checked by ``onboard.config.site``; frozen thereafter.
+
+    ``places`` in the order of the file's floors, sides and indices. ``stewards`` maps each track number to the node-ID
+    of the fixed machine that holds its segments', places' and stored cars' tokens at first. ``digest`` is 16 bits over
+    the canonical content: two files that mean the same have the same.
+    """
+
+    name: str
+    digest: int
+    bitrate: int
+    tracks: dict[int, Track]
+    places: tuple[Station, ...]
+    machines: dict[int, Machine]
+    stewards: dict[int, int]
+    carrier: Axis
+    carrier_length_mm: int
+    carrier_clearance_mm: int
+    shuttle: Axis
+    shuttle_reach_mm: int
+    lift: Axis
+    floor_height_mm: int
+    cars: CarLimits
+    timing: Timing
+
+    @property
+    def compartments(self) -> dict[int, Station]:
+        """Station of each compartment by node-ID."""
+        return {m.node_id: m.station for m in self.machines.values() if m.station is not None}
+
+    def machine(self, name: str) -> Machine:
+        """The machine so named. Raises ``KeyError`` where there is none."""
+        for machine in self.machines.values():
+            if machine.name == name:
+                return machine
+        raise KeyError(name)
+
+    def position_mm(self, segment: Segment) -> int:
+        """Centre of a segment along its track, in mm from that of index 1."""
+        return (segment.index - 1) * self.tracks[segment.track].pitch_mm

@@ -1,0 +1,429 @@
+"""The input/output compartment (IOC): bay, two doors, light, desk; custodian of cars, steward of tokens, initiator.
+
+The order of the 21 steps (Pujo et al. 2006, Fig. 9) is kept but for one hazard in it: the output door opens only when
+the input door is locked and the robot stands before it (docs/decisions.md, flag 5).
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from onboard.core.authority import TokenKey, car_token, station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import (
+    ANY_STATION,
+    OUTSIDE,
+    CallResult,
+    Criterion,
+    DeskInput,
+    DeskText,
+    DoorAction,
+    DoorName,
+    DoorPosition,
+    KindCode,
+    LightColour,
+    MachineState,
+    Operation,
+    OperatorAction,
+    Reason,
+    TaskPhase,
+    TokenKind,
+)
+from onboard.core.effects import Actuate, Effect, Record, Report, Send
+from onboard.core.messages import (
+    BayState,
+    CarAt,
+    DeskEvent,
+    DeskOrder,
+    DoorOrder,
+    DoorState,
+    LightOrder,
+    Message,
+    OperatorOrder,
+    Reference,
+    TaskReport,
+)
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import CallTerms, Closed, Estimator, NegotiationEvent
+from onboard.core.serial import successor
+from onboard.core.site import Machine, Site, Station
+from onboard.kinds.car_park.bay_generation import BayGeneration
+from onboard.kinds.car_park.stewardship import Stewardship
+
+#: A call that nobody could serve is made again after this, us. Ours.
+RETRY_US = 30_000_000
+
+
+class BayPhase(Enum):
+    """What the compartment is doing."""
+
+    STARTING = "starting"
+    FREE = "free"
+    LOCKING = "locking"
+    AWAITING = "awaiting"
+    OPENING = "opening"
+    SERVING = "serving"
+    CLOSING = "closing"
+    HANDOVER = "handover"
+    RESERVING = "reserving"
+
+
+@dataclass
+class BayTask:
+    """The one task that uses the bay now."""
+
+    task: Reference
+    operation: Operation
+    car: Reference
+    wheelbase_mm: int
+    winner: int = 0
+    was_granted: bool = False
+    retry_at_us: int | None = None
+
+
+class CompartmentFactory:
+    """Makes compartments."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
+        """The compartment's task-generation function."""
+        return BayGeneration(site, machine)
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Compartment":
+        """The compartment's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, BayGeneration):
+            raise TypeError("a compartment needs its own task-generation function")
+        return Compartment(fleet, estimator)
+
+
+@dataclass
+class Compartment:
+    """One compartment. At most one task uses its bay; tickets wait in the order in which they came."""
+
+    fleet: Fleet
+    generation: BayGeneration
+    kind: KindCode = KindCode.COMPARTMENT
+    phase: BayPhase = BayPhase.STARTING
+    job: BayTask | None = None
+    doors: DoorState | None = None
+    bay: BayState | None = None
+    tickets: deque[Reference] = field(default_factory=deque)
+    wheelbases_mm: dict[Reference, int] = field(default_factory=dict)
+    stewardship: Stewardship = field(init=False)
+    _number: int = 0
+    _sequence: int = 0
+    _desk_sequence: int | None = None
+    _key_pressed: bool = False
+    _robot_waits: bool = False
+    _ordered: dict[DoorName, DoorAction] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.stewardship = Stewardship(self.fleet)
+        self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
+            BayPhase.STARTING: self._when_starting,
+            BayPhase.FREE: self._when_free,
+            BayPhase.LOCKING: self._when_locking,
+            BayPhase.AWAITING: self._when_awaiting,
+            BayPhase.OPENING: self._when_opening,
+            BayPhase.SERVING: self._when_serving,
+            BayPhase.CLOSING: self._when_closing,
+            BayPhase.HANDOVER: self._when_handover,
+            BayPhase.RESERVING: self._when_reserving,
+        }
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def station(self) -> Station:
+        """The bay."""
+        assert self.fleet.machine.station is not None
+        return self.fleet.machine.station
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        if self.phase is BayPhase.STARTING:
+            return MachineState.STARTING
+        return MachineState.IDLE if self.phase is BayPhase.FREE else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """A compartment does not move."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Nothing is ordered before doors and bay are sensed."""
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Doors, bay and desk."""
+        if isinstance(message, DoorState):
+            self.doors = message
+        elif isinstance(message, BayState):
+            self.bay = message
+        elif isinstance(message, DeskEvent) and message.sequence != self._desk_sequence:
+            self._desk_sequence = message.sequence
+            return self._at_desk(message.event, message.car, now_us)
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
+        if isinstance(message, OperatorOrder) and message.compartment == self.fleet.node_id:
+            return self._at_desk(_DESK_INPUT[message.action], message.car, now_us)
+        return self.stewardship.hear(message)
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """An own call closed: note the winner, or tell the customer why not."""
+        if not isinstance(event, Closed) or self.job is None or event.call.task != self.job.task:
+            return []
+        if event.result is CallResult.AWARDED:
+            self.job.winner = event.winner
+            self.stewardship.winners[event.call.car] = event.winner
+            return []
+        return self._refused(self.job, event.reason, now_us)
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Bay and the car in it: to the winner while the output door is open. All else by the steward's rules."""
+        if self.job is not None and key in (station_token(self.station), car_token(*self.job.car)):
+            if key.kind is TokenKind.CAR and self.fleet.mirror.car_station(self.job.car) != self.station:
+                return self.stewardship.may_grant(key, requester, now_us)
+            if requester != self.job.winner:
+                return Reason.TOKEN_NOT_GRANTABLE_YET
+            self._robot_waits = True
+            if self.phase is not BayPhase.SERVING:
+                return Reason.DOOR_NOT_READY
+            self.job.was_granted |= key.kind is TokenKind.STATION
+            return Reason.NONE
+        if key == station_token(self.station):
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        return self.stewardship.may_grant(key, requester, now_us)
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """One step of the phase table, where its condition is met."""
+        if self.doors is None or self.bay is None:
+            return []
+        return self._table[self.phase](now_us)
+
+    def next_wake(self) -> int | None:
+        """When a refused call is made again."""
+        return self.job.retry_at_us if self.job is not None else None
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """The cars in my custody and the tokens that I hold."""
+        return self.stewardship.car_statements() + self.fleet.tokens.statements()
+
+    # --- the desk ----------------------------------------------------------------------------------------------
+
+    def _at_desk(self, event: DeskInput, car: Reference, now_us: int) -> list[Effect]:
+        if event is DeskInput.KEY:
+            self._key_pressed = True
+            return []
+        if event is DeskInput.TICKET:
+            return self._take_ticket(car)
+        return []
+
+    def _take_ticket(self, car: Reference) -> list[Effect]:
+        record = self.fleet.mirror.cars.get(car)
+        if record is None or record.station == OUTSIDE or car in self.tickets:
+            return [self._desk(DeskText.UNKNOWN_TICKET, car)]
+        if self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE:
+            return [self._desk(DeskText.PLEASE_WAIT, car)]
+        self.tickets.append(car)
+        return [self._desk(DeskText.PLEASE_WAIT, car)]
+
+    def _desk(self, text: DeskText, car: Reference) -> Effect:
+        self._sequence = successor(self._sequence, 8)
+        return Actuate(DeskOrder(self.fleet.node_id, self._sequence, text, car))
+
+    # --- the phases --------------------------------------------------------------------------------------------
+
+    def _when_starting(self, now_us: int) -> list[Effect]:
+        effects = self._door(DoorName.OUTPUT, DoorAction.CLOSE)
+        if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
+            return effects
+        return effects + self._to_free()
+
+    def _to_free(self) -> list[Effect]:
+        self.job = None
+        self._robot_waits = False
+        self._key_pressed = False
+        self._go(BayPhase.FREE)
+        return self._door(DoorName.INPUT, DoorAction.OPEN)
+
+    def _when_free(self, now_us: int) -> list[Effect]:
+        assert self.bay is not None and self.doors is not None
+        if not self._is(DoorName.INPUT, DoorPosition.OPEN):
+            return []
+        if self._key_pressed:
+            self._key_pressed = False
+            return self._admit(now_us)
+        if self.tickets and not self.bay.load_kg and not self.bay.person_inside and self._is_stored(self.tickets[0]):
+            self._go(BayPhase.RESERVING)
+            return [self._light(LightColour.RED), *self._door(DoorName.INPUT, DoorAction.CLOSE)]
+        if self.doors.light is not LightColour.GREEN and not self.bay.load_kg:
+            return self._once(self._light(LightColour.GREEN))
+        return []
+
+    def _is_stored(self, car: Reference) -> bool:
+        return self.fleet.mirror.car_station(car) is not None
+
+    def _admit(self, now_us: int) -> list[Effect]:
+        """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
+        assert self.bay is not None
+        bay, limits = self.bay, self.fleet.site.cars
+        if not bay.load_kg:
+            return []
+        too_large = bay.length_mm > limits.max_length_mm or bay.height_mm > limits.max_height_mm
+        odd = not limits.min_wheelbase_mm <= bay.wheelbase_mm <= limits.max_wheelbase_mm
+        if too_large or odd or bay.load_kg > limits.max_load_kg:
+            return [self._desk(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
+        if not self.fleet.mirror.free_places():
+            return [self._desk(DeskText.FULL, Reference(0, 0))]
+        self._number = successor(self._number, 16)
+        car = Reference(self.fleet.node_id, self._number)
+        self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
+        self.wheelbases_mm[car] = bay.wheelbase_mm
+        effects = self.fleet.tokens.create(car_token(*car))
+        effects.append(Record({"record": "number", "number": self._number, "wheelbase_mm": bay.wheelbase_mm}))
+        effects += [self._state_car(car, self.station.number), self._desk(DeskText.TAKE_TICKET, car)]
+        effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
+        self._go(BayPhase.LOCKING)
+        return [*effects, self._light(LightColour.RED)]
+
+    def _when_locking(self, now_us: int) -> list[Effect]:
+        assert self.bay is not None
+        if self._is(DoorName.INPUT, DoorPosition.LOCKED):
+            self._go(BayPhase.AWAITING)
+            return self._when_awaiting(now_us)
+        if self.bay.person_inside:
+            return []
+        return self._door(DoorName.INPUT, DoorAction.CLOSE)
+
+    def _when_reserving(self, now_us: int) -> list[Effect]:
+        """Light red, input closing for a car that is to come out; a car that still came in goes first."""
+        assert self.bay is not None
+        if self.bay.load_kg or self.bay.person_inside:
+            return self._to_free()
+        if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
+            return []
+        car = self.tickets.popleft()
+        self._number = successor(self._number, 16)
+        task = Reference(self.fleet.node_id, self._number)
+        self.job = BayTask(task, Operation.RETRIEVE, car, self.wheelbases_mm.get(car, 0))
+        self._go(BayPhase.AWAITING)
+        return [Record({"record": "number", "number": self._number, "wheelbase_mm": 0}), *self._fetch(self.job, now_us)]
+
+    def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
+        where = self.fleet.mirror.car_station(job.car)
+        if where is None:
+            job.retry_at_us = now_us + RETRY_US
+            return [Report(f"car {job.car.number} is nowhere to be fetched from")]
+        job.retry_at_us = None
+        return self._call(job, where.number, self.station.number, now_us)
+
+    def _when_awaiting(self, now_us: int) -> list[Effect]:
+        assert self.job is not None
+        if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
+            return self._fetch(self.job, now_us)
+        if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
+            return []
+        self._go(BayPhase.OPENING)
+        return self._door(DoorName.OUTPUT, DoorAction.OPEN)
+
+    def _when_opening(self, now_us: int) -> list[Effect]:
+        if self._is(DoorName.OUTPUT, DoorPosition.OPEN):
+            self._go(BayPhase.SERVING)
+        return []
+
+    def _when_serving(self, now_us: int) -> list[Effect]:
+        """The robot has had the bay and gave it back: steps 13 and 14."""
+        assert self.job is not None
+        if not self.job.was_granted or not self.fleet.tokens.holds(station_token(self.station)):
+            return []
+        self._go(BayPhase.CLOSING)
+        return self._door(DoorName.OUTPUT, DoorAction.CLOSE)
+
+    def _when_closing(self, now_us: int) -> list[Effect]:
+        assert self.job is not None
+        if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
+            return []
+        if self.job.operation is Operation.PARK:
+            return self._to_free()
+        self._go(BayPhase.HANDOVER)
+        return [*self._door(DoorName.INPUT, DoorAction.OPEN), self._desk(DeskText.CAR_READY, self.job.car)]
+
+    def _when_handover(self, now_us: int) -> list[Effect]:
+        assert self.bay is not None and self.job is not None
+        is_open = self._is(DoorName.INPUT, DoorPosition.OPEN)
+        if not is_open or self.bay.load_kg or self.bay.person_inside:
+            return []
+        car = self.job.car
+        self.wheelbases_mm.pop(car, None)
+        effects = [self._state_car(car, OUTSIDE), self._desk(DeskText.WELCOME, Reference(0, 0))]
+        return effects + self._to_free()
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _refused(self, job: BayTask, reason: Reason, now_us: int) -> list[Effect]:
+        """Nobody could: a car to be parked is given back with a word, a car to be fetched is called for again."""
+        if job.operation is Operation.RETRIEVE:
+            job.retry_at_us = now_us + RETRY_US
+            return [Report(f"nobody can fetch car {job.car.number}: {reason.name}; called again in 30 s")]
+        effects: list[Effect] = [
+            Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
+            self._state_car(job.car, OUTSIDE),
+            self._desk(DeskText.FULL, job.car),
+        ]
+        return effects + self._to_free()
+
+    def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
+        terms = CallTerms(
+            task=job.task,
+            operation=job.operation,
+            kind=KindCode.ROBOT,
+            criterion=Criterion.FINISH_TIME,
+            from_station=source,
+            to_station=sink,
+            car=job.car,
+            wheelbase_mm=job.wheelbase_mm,
+        )
+        return list(self.fleet.negotiation.open(terms, now_us))
+
+    def _state_car(self, car: Reference, station: int) -> Effect:
+        statement = CarAt(self.fleet.node_id, car, station, self.fleet.tokens.seen[car_token(*car)])
+        self.fleet.mirror.on_car(statement)
+        return Send(statement)
+
+    def _door(self, door: DoorName, action: DoorAction) -> list[Effect]:
+        """Order a door once; the plant's interlock refuses what must not be, and the phase then waits."""
+        if self._ordered.get(door) is action:
+            return []
+        self._ordered[door] = action
+        self._sequence = successor(self._sequence, 8)
+        order = Actuate(DoorOrder(self.fleet.node_id, self._sequence, door, action))
+        return [Record({"record": "door", "door": int(door), "action": int(action)}), order]
+
+    def _is(self, door: DoorName, position: DoorPosition) -> bool:
+        assert self.doors is not None
+        return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
+
+    def _light(self, colour: LightColour) -> Effect:
+        self._light_ordered = colour
+        return Actuate(LightOrder(self.fleet.node_id, colour))
+
+    _light_ordered: LightColour | None = None
+
+    def _once(self, effect: Effect) -> list[Effect]:
+        return [effect]
+
+    def _go(self, phase: BayPhase) -> None:
+        self.phase = phase
+        self.generation.is_free = phase is BayPhase.FREE
+        self.generation.queue = len(self.tickets)
+
+
+_DESK_INPUT = {
+    OperatorAction.PRESS_KEY: DeskInput.KEY,
+    OperatorAction.INSERT_TICKET: DeskInput.TICKET,
+    OperatorAction.CANCEL: DeskInput.CANCEL,
+}

@@ -1,0 +1,212 @@
+"""The mobile robot's task-generation function: what would this task cost *me*, around everybody's plans?
+
+It is asked twice (row P20): for an estimate when a call is heard, and for the operating sequence once awarded. Its cost
+is the finishing time (row P41): when the car stands where it shall stand and the shuttle is home. It depends on the
+others' present and foreseen tasks (rows P21, P28), unlike that of a lathe. Where the destination is open, the robot
+chooses the place itself and evaluates all its solutions (row P46).
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from onboard.core.codes import ANY_STATION, Criterion, Grade, LegAction, Operation
+from onboard.core.kinematics import run_duration_us
+from onboard.core.messages import CallForProposals, Stamp
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Proposal
+from onboard.core.refuges import refuges
+from onboard.core.serial import from_bus_ms, to_bus_ms
+from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
+from onboard.core.site import Machine, Segment, Site, Station
+from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work, to_itinerary
+
+#: From the deadline to the first motion: award frame, journal writes and the first tokens. Ours, measured in tests.
+AWARD_LATENCY_US = 150_000
+#: Tokens, orders and sensor frames around one handling of a car, beside the motions themselves. Ours, measured.
+HANDLING_OVERHEAD_US = 400_000
+#: How long past its planned end another robot's work still keeps its place promised: it may be late. Ours.
+PROMISE_GRACE_US = 60_000_000
+#: Bound of one route search, in expansions (a wall-time bound would not replay).
+MAX_EXPANSIONS = 4_000
+
+
+class Alternative(NamedTuple):
+    """One evaluated solution: the place chosen and when it would be finished (bus us), None where impossible."""
+
+    station: Station
+    finish_us: int | None
+
+
+class Solution(NamedTuple):
+    """The operating sequence for one call: new steps after the ``kept`` ones, from ``origin`` at ``start_us``."""
+
+    kept: int
+    origin: Segment
+    start_us: int
+    steps: tuple[Step, ...]
+    finish_us: int
+    place: Station
+
+
+@dataclass
+class CarParkGeneration:
+    """Estimates and operating sequences for one robot. Implements the negotiation's ``Estimator``."""
+
+    site: Site
+    machine: Machine
+    mirror: Mirror
+    program: Program
+    tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
+
+    # --- the Estimator -----------------------------------------------------------------------------------------
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """Least finishing time (bus ms) that any robot could name, from call and site alone: it stands at the start."""
+        start_us = self._deadline_us(call, now_us) + AWARD_LATENCY_US
+        ends = self._all_candidates(call)
+        return min(to_bus_ms(self._lower_us(call, place, self._front(call, place), start_us)) for place in ends)
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
+        if call.criterion is not Criterion.FINISH_TIME or call.operation not in (Operation.PARK, Operation.RETRIEVE):
+            return None
+        if self.program.standing is None or len(self.program.remaining) + 4 > MAX_STEPS:
+            return None
+        limits = self.site.cars
+        if not limits.min_wheelbase_mm <= call.wheelbase_mm <= limits.max_wheelbase_mm:
+            return None
+        _, segment, start_us = self._start(call, now_us)
+        ends = [self._lower_us(call, place, segment, start_us) for place in self._candidates(call, now_us)]
+        return to_bus_ms(min(ends)) if ends else None
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        """First request: the best solution as a bid with a tentative itinerary, or None: silence (row P45)."""
+        solution, alternatives = self.solve(call, now_us)
+        if solution is None:
+            return None
+        deadline_ms = call.deadline_ms
+        stamp = Stamp(deadline_ms, call.sender, call.call & 0xFF)
+        version = self.program.version + 1 & 0xFF or 1
+        steps = [*self.program.remaining[: solution.kept], *solution.steps]
+        itinerary = to_itinerary(self.machine.node_id, version, Grade.TENTATIVE, stamp, steps)
+        return Proposal(to_bus_ms(solution.finish_us), itinerary, (solution,), tuple(alternatives))
+
+    # --- the search --------------------------------------------------------------------------------------------
+
+    def solve(self, call: CallForProposals, now_us: int) -> tuple[Solution | None, list[Alternative]]:
+        """All solutions evaluated, the earliest finish first; ties by the site's order of places.
+
+        Candidates whose free-flow bound is no better than the best found are not searched.
+        """
+        kept, segment, start_us = self._start(call, now_us)
+        bounds = sorted(
+            (self._lower_us(call, place, segment, start_us), number, place)
+            for number, place in enumerate(self._candidates(call, now_us))
+        )
+        best: Solution | None = None
+        alternatives: list[Alternative] = []
+        for bound_us, _, place in bounds:
+            if best is not None and bound_us >= best.finish_us:
+                break
+            route = self._route(call, place, segment, start_us)
+            if route is None:
+                alternatives.append(Alternative(place, None))
+                continue
+            alternatives.append(Alternative(place, route.finish_us))
+            if best is None or route.finish_us < best.finish_us:
+                steps = self._steps(call, place, route)
+                best = Solution(kept, segment, start_us, steps, route.finish_us, place)
+        return best, alternatives
+
+    def _start(self, call: CallForProposals, now_us: int) -> tuple[int, Segment, int]:
+        kept, segment, start_us = self.program.branch(now_us)
+        for solution in self.tentative.values():
+            # What I may win before counts as won: one robot does one thing after the other.
+            if solution.finish_us > start_us:
+                segment, start_us = solution.place.segment, solution.finish_us
+        earliest_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US
+        return kept, segment, max(start_us, earliest_us)
+
+    def _route(self, call: CallForProposals, place: Station, origin: Segment, start_us: int) -> Route | None:
+        route = plan_route(
+            self.site,
+            self.mirror.reservations,
+            self.machine.node_id,
+            origin,
+            start_us,
+            self._visits(call, place),
+            refuges(self.site),
+            MAX_EXPANSIONS,
+        )
+        return None if isinstance(route, NoRoute) else route
+
+    def _lower_us(self, call: CallForProposals, place: Station, origin: Segment, start_us: int) -> int:
+        return free_flow_us(self.site, origin, start_us, self._visits(call, place))
+
+    def _visits(self, call: CallForProposals, place: Station) -> tuple[Visit, ...]:
+        source, sink = self.ends(call, place)
+        return tuple(Visit(station.segment, self._handling_us(station)) for station in (source, sink))
+
+    def _handling_us(self, station: Station) -> int:
+        """Reach, grip or release, retract; at a compartment its output door opens first."""
+        stroke_us = run_duration_us(self.site.shuttle_reach_mm, self.site.shuttle)
+        door_us = self.site.timing.door_us if station in self.site.compartments.values() else 0
+        return door_us + 2 * stroke_us + self.site.timing.grip_us + HANDLING_OVERHEAD_US
+
+    def ends(self, call: CallForProposals, place: Station) -> tuple[Station, Station]:
+        """Where the car is taken and where it is left; ``place`` stands for the end that the call leaves open."""
+        source = place if call.from_station == ANY_STATION else Station.from_number(call.from_station)
+        sink = place if call.to_station == ANY_STATION else Station.from_number(call.to_station)
+        return source, sink
+
+    def _front(self, call: CallForProposals, place: Station) -> Segment:
+        return self.ends(call, place)[0].segment
+
+    def _all_candidates(self, call: CallForProposals) -> list[Station]:
+        if ANY_STATION not in (call.from_station, call.to_station):
+            return [Station.from_number(call.to_station)]
+        return list(self.site.places)
+
+    def _candidates(self, call: CallForProposals, now_us: int) -> list[Station]:
+        """Stations that the bidder may choose: free places nobody is on the way to, or the one that the call names."""
+        if ANY_STATION not in (call.from_station, call.to_station):
+            return self._all_candidates(call)
+        promised = self._promised(now_us)
+        return [place for place in self.mirror.free_places() if place.number not in promised]
+
+    def _promised(self, now_us: int) -> set[int]:
+        """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""
+        promised = {
+            Station(leg.track, leg.to_index, leg.side).number
+            for node, itinerary in self.mirror.itineraries.items()
+            if node != self.machine.node_id
+            for leg in itinerary.legs
+            if leg.action is LegAction.WORK and from_bus_ms(leg.end_ms, now_us) > now_us - PROMISE_GRACE_US
+        }
+        promised |= {work.station.number for work in self.program.works()}
+        promised |= {solution.place.number for solution in self.tentative.values()}
+        return promised
+
+    def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[Step, ...]:
+        source, sink = self.ends(call, place)
+        works = iter(
+            (
+                Work(Handling.TAKE, source, call.car, call.wheelbase_mm, call),
+                Work(Handling.LEAVE, sink, call.car, call.wheelbase_mm, call),
+            )
+        )
+        return tuple(
+            Step(
+                leg.action,
+                leg.track,
+                leg.from_index,
+                leg.to_index,
+                leg.begin_us,
+                leg.end_us,
+                next(works) if leg.action is LegAction.WORK else None,
+            )
+            for leg in route.legs
+        )
+
+    def _deadline_us(self, call: CallForProposals, now_us: int) -> int:
+        return from_bus_ms(call.deadline_ms, now_us)

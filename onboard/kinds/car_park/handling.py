@@ -1,0 +1,137 @@
+"""Taking a car from a station and leaving it there: the shuttle's steps as one table.
+
+A station's token is the right to send the shuttle in; the car's token is its custody. Both are asked for in front of
+the station; a compartment grants its bay only with the output door open. The journal notes each step before the order
+to the actuator.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from onboard.core.authority import TokenKey, car_token, station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.messages import CarAt, ShuttleOrder, ShuttleState
+from onboard.core.serial import successor
+from onboard.core.site import Station
+from onboard.kinds.car_park.program import Handling, Work
+
+
+class Phase(Enum):
+    """Where one handling stands."""
+
+    ACQUIRE = "acquire"
+    REACH = "reach"
+    CLAMP = "clamp"
+    RETRACT = "retract"
+    DONE = "done"
+
+
+#: (phase, handling) -> (shuttle's order on leaving the phase, or None, and the next phase).
+#: CLAMP grips when a car is taken and releases when it is left.
+TABLE: dict[tuple[Phase, Handling], tuple[ShuttleAction | None, Phase]] = {
+    (Phase.ACQUIRE, Handling.TAKE): (ShuttleAction.REACH, Phase.REACH),
+    (Phase.REACH, Handling.TAKE): (ShuttleAction.GRIP, Phase.CLAMP),
+    (Phase.CLAMP, Handling.TAKE): (ShuttleAction.RETRACT, Phase.RETRACT),
+    (Phase.RETRACT, Handling.TAKE): (None, Phase.DONE),
+    (Phase.ACQUIRE, Handling.LEAVE): (ShuttleAction.REACH, Phase.REACH),
+    (Phase.REACH, Handling.LEAVE): (ShuttleAction.RELEASE, Phase.CLAMP),
+    (Phase.CLAMP, Handling.LEAVE): (ShuttleAction.RETRACT, Phase.RETRACT),
+    (Phase.RETRACT, Handling.LEAVE): (None, Phase.DONE),
+}
+
+#: The shuttle's mode that ends each phase, for the order given on entering it.
+ENDS = {Phase.REACH: ShuttleMode.REACHED, Phase.CLAMP: ShuttleMode.REACHED, Phase.RETRACT: ShuttleMode.HOME}
+
+
+@dataclass
+class ShuttleWork:
+    """One robot's shuttle and the handling in hand."""
+
+    fleet: Fleet
+    work: Work | None = None
+    phase: Phase = Phase.DONE
+    sequence: int = 0
+    sensed: ShuttleState | None = None
+    fault: bool = False
+
+    def begin(self, work: Work) -> list[Effect]:
+        """Start one handling in front of its station."""
+        self.work = work
+        self.phase = Phase.ACQUIRE
+        return []
+
+    @property
+    def is_out(self) -> bool:
+        """Whether the shuttle may be outside the carrier: then the carrier must not move (row P32)."""
+        return self.phase in (Phase.REACH, Phase.CLAMP, Phase.RETRACT)
+
+    def sense(self, state: ShuttleState) -> None:
+        """Take up the shuttle's state."""
+        self.sensed = state
+        self.fault = state.mode is ShuttleMode.FAULT
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Take the next step of the table where its condition is met."""
+        if self.work is None or self.phase is Phase.DONE:
+            return []
+        if self.phase is Phase.ACQUIRE:
+            effects = self._acquire(now_us)
+            if not self._has_rights():
+                return effects
+            return effects + self._next(now_us)
+        if self.sensed is None or self.sensed.sequence != self.sequence or self.sensed.mode is not ENDS[self.phase]:
+            return []
+        return self._next(now_us)
+
+    def _rights(self) -> list[TokenKey]:
+        assert self.work is not None
+        return [station_token(self.work.station), car_token(*self.work.car)]
+
+    def _has_rights(self) -> bool:
+        return all(self.fleet.tokens.holds(key) for key in self._rights())
+
+    def _acquire(self, now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        for key in self._rights():
+            effects += self.fleet.tokens.want(key, now_us)
+        return effects
+
+    def _next(self, now_us: int) -> list[Effect]:
+        assert self.work is not None
+        order, self.phase = TABLE[self.phase, self.work.handling]
+        if order is None:
+            return self._finish(self.work, now_us)
+        self.sequence = successor(self.sequence, 8)
+        entry = {"record": "step", "phase": self.phase.value, "handling": self.work.handling.value}
+        return [
+            Record({**entry, "station": self.work.station.number, "car": self.work.car.number}),
+            Actuate(
+                ShuttleOrder(
+                    self.fleet.node_id, self.sequence, order, self.work.station.side, self.work.wheelbase_mm
+                )
+            ),
+        ]
+
+    def _finish(self, work: Work, now_us: int) -> list[Effect]:
+        """The shuttle is home: state where the car is, pass custody on after leaving it, give the station back."""
+        key = car_token(*work.car)
+        taken = work.handling is Handling.TAKE
+        station = ANY_STATION if taken else work.station.number
+        statement = CarAt(self.fleet.node_id, work.car, station, self.fleet.tokens.seen[key])
+        self.fleet.mirror.on_car(statement)
+        effects: list[Effect] = [Send(statement)]
+        owner = keeper(self.fleet, work.station)
+        if not taken:
+            effects += self.fleet.tokens.give(key, owner, now_us)
+        effects += self.fleet.tokens.give(station_token(work.station), owner, now_us)
+        return effects
+
+
+def keeper(fleet: Fleet, station: Station) -> int:
+    """Node that keeps a station's token and its car: the compartment itself, else the track's steward."""
+    for node_id, bay in fleet.site.compartments.items():
+        if bay == station:
+            return node_id
+    return fleet.site.stewards[station.track]

@@ -1,0 +1,157 @@
+"""A robot's order program: chronological steps with their planned times, as data (rows P20, P23).
+
+A step is one leg of the itinerary together with what is done in it, so the program can be printed, compared with what
+happened, and sent as an itinerary, all from one value.
+"""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import NamedTuple
+
+from onboard.core.codes import Grade, LegAction, Side
+from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
+from onboard.core.serial import successor, to_bus_ms
+from onboard.core.site import Segment, Site, Station
+
+#: Most steps that fit in an itinerary: the leg number has 5 bits.
+MAX_STEPS = 31
+
+
+class Handling(Enum):
+    """What the shuttle does with a car at a station."""
+
+    TAKE = "take"
+    LEAVE = "leave"
+
+
+class Work(NamedTuple):
+    """One handling of ``car`` (wheelbase in mm) at ``station``, for the task of ``call``."""
+
+    handling: Handling
+    station: Station
+    car: Reference
+    wheelbase_mm: int
+    call: CallForProposals
+
+
+class Step(NamedTuple):
+    """One leg with its planned ``[begin_us, end_us)`` in bus time; ``work`` where the action is WORK."""
+
+    action: LegAction
+    track: int
+    from_index: int
+    to_index: int
+    begin_us: int
+    end_us: int
+    work: Work | None = None
+
+    @property
+    def destination(self) -> Segment:
+        """The segment in which the step ends."""
+        return Segment(self.track, self.to_index)
+
+    def shifted(self, by_us: int) -> "Step":
+        """The same step later (or earlier) by ``by_us``."""
+        return self._replace(begin_us=self.begin_us + by_us, end_us=self.end_us + by_us)
+
+    def __str__(self) -> str:
+        start, end = self.begin_us / 1e6, self.end_us / 1e6
+        if self.work is not None:
+            text = f"{self.work.handling.value} car {self.work.car.number} at {self.work.station}"
+        elif self.action is LegAction.TRAVEL:
+            text = f"travel {Segment(self.track, self.from_index)} to {self.destination}"
+        else:
+            text = f"stand at {self.destination}"
+        return f"[{start:.3f} {end:.3f}] {text}"
+
+
+@dataclass
+class Program:
+    """What a robot does now and next. ``current`` indexes the step in hand; ``standing`` is where it stands at the end.
+
+    ``version`` is the firm itinerary's 8-bit version, 0 before the first.
+    """
+
+    site: Site
+    standing: Segment | None = None
+    steps: list[Step] = field(default_factory=list)
+    current: int = 0
+    version: int = 0
+    stamp: Stamp = field(default_factory=lambda: Stamp(0, 0, 0))
+
+    @property
+    def step(self) -> Step | None:
+        """The step in hand, or None where all is done."""
+        return self.steps[self.current] if self.current < len(self.steps) else None
+
+    @property
+    def remaining(self) -> list[Step]:
+        """The step in hand and all later ones."""
+        return self.steps[self.current :]
+
+    def works(self) -> list[Work]:
+        """All handlings not yet done, in order."""
+        return [step.work for step in self.remaining if step.work is not None]
+
+    def branch(self, now_us: int) -> tuple[int, Segment, int]:
+        """From where a further task can be planned: the number of remaining steps kept, the segment and the time.
+
+        All work in hand is kept and the way to the refuge behind it is given up, but for a run already begun. Raises
+        ``ValueError`` where the robot's position is not known yet.
+        """
+        if self.standing is None:
+            raise ValueError("no position is known yet")
+        remaining = self.remaining
+        kept = 0
+        for number, step in enumerate(remaining, start=1):
+            if step.work is not None:
+                kept = number
+        if kept == 0 and remaining and remaining[0].action is LegAction.TRAVEL:
+            kept = 1
+        if kept == 0:
+            where = Segment(remaining[0].track, remaining[0].from_index) if remaining else self.standing
+            return 0, where, now_us
+        last = remaining[kept - 1]
+        return kept, last.destination, max(last.end_us, now_us)
+
+    def replace(self, steps: list[Step], stamp: Stamp) -> None:
+        """Take up a new programme of remaining ``steps`` under the next version."""
+        self.steps = steps
+        self.current = 0
+        self.stamp = stamp
+        self.version = successor(self.version, 8)
+        if steps:
+            self.standing = steps[-1].destination
+
+    def shift(self, by_us: int) -> None:
+        """Delay (or advance) all remaining steps; stamp and order stay, the version grows."""
+        self.steps = [step.shifted(by_us) for step in self.remaining]
+        self.current = 0
+        self.version = successor(self.version, 8)
+
+    def itinerary(self, sender: int, now_us: int) -> Itinerary:
+        """The firm itinerary as it goes on the bus; one STAND leg where nothing is left to do."""
+        steps = self.remaining
+        if not steps:
+            if self.standing is None:
+                raise ValueError("no position is known yet")
+            place = self.standing
+            steps = [Step(LegAction.STAND, place.track, place.index, place.index, now_us, now_us + 1000)]
+        return to_itinerary(sender, self.version, Grade.FIRM, self.stamp, steps)
+
+
+def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: list[Step]) -> Itinerary:
+    """Steps as legs on the wire; ends are rounded up to the millisecond."""
+    legs = tuple(
+        Leg(
+            step.action,
+            step.track,
+            step.from_index,
+            step.to_index,
+            step.work.station.side if step.work is not None else Side.NEAR,
+            to_bus_ms(step.end_us),
+        )
+        for step in steps
+    )
+    return Itinerary(sender, version, grade, stamp, legs)
+

@@ -1,0 +1,74 @@
+"""What a fixed machine does as steward of a track: grant segments in passing order, keep stored cars and their places."""
+
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey, car_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import OUTSIDE, CallResult, Reason, TokenKind
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TokenGrant
+from onboard.core.site import Segment
+
+#: Calls remembered to know which car an award is about; older ones are long closed.
+MAX_CALLS = 64
+
+
+@dataclass
+class Stewardship:
+    """Grant rules and custody of one steward. ``winners`` names the machine that may fetch a car."""
+
+    fleet: Fleet
+    winners: dict[Reference, int] = field(default_factory=dict)
+    _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
+
+    def hear(self, message: Message) -> list[Effect]:
+        """Learn from calls and awards; state a car anew when its token has come to me."""
+        match message:
+            case CallForProposals():
+                self._cars_of_calls[message.sender, message.call] = message.car
+                while len(self._cars_of_calls) > MAX_CALLS:
+                    del self._cars_of_calls[next(iter(self._cars_of_calls))]
+            case Award() if message.result is CallResult.AWARDED:
+                car = self._cars_of_calls.get((message.sender, message.call))
+                if car is not None:
+                    self.winners[car] = message.winner
+            case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
+                return self._take_custody(Reference(message.token >> 16, message.token & 0xFFFF), message.version)
+        return []
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """NONE where the token may go to ``requester`` now."""
+        if key.kind is TokenKind.SEGMENT:
+            return self._passing_order(Segment(key.number >> 8, key.number & 0xFF), requester, now_us)
+        if key.kind is TokenKind.CAR:
+            car = Reference(key.number >> 16, key.number & 0xFFFF)
+            return Reason.NONE if self.winners.get(car) == requester else Reason.TOKEN_NOT_GRANTABLE_YET
+        return Reason.NONE
+
+    def car_statements(self) -> list[Effect]:
+        """Where each car in my custody stands."""
+        return [
+            Send(CarAt(self.fleet.node_id, car, record.station, record.version))
+            for car, record in self.fleet.mirror.cars.items()
+            if record.custodian == self.fleet.node_id and record.station != OUTSIDE
+        ]
+
+    def _take_custody(self, car: Reference, version: int) -> list[Effect]:
+        record = self.fleet.mirror.cars.get(car)
+        if record is None or not self.fleet.tokens.holds(car_token(*car)):
+            return []
+        self.winners.pop(car, None)
+        statement = CarAt(self.fleet.node_id, car, record.station, version)
+        return [Send(statement)] if self.fleet.mirror.on_car(statement) else []
+
+    def _passing_order(self, segment: Segment, requester: int, now_us: int) -> Reason:
+        """Tokens go in the plan's order: nobody else's firm window on the segment begins before the requester's."""
+        reservations = self.fleet.mirror.reservations
+        mine_us = reservations.first_start(requester, segment, now_us)
+        if mine_us is None:
+            # Standing there after power-up, or a plan not heard yet: only where nobody plans to be.
+            return Reason.NONE if reservations.is_free(segment, now_us, excluding=requester) else Reason.MIRROR_BEHIND
+        other_us = reservations.earliest_other_start(requester, segment, now_us)
+        if other_us is not None and other_us < mine_us:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        return Reason.NONE

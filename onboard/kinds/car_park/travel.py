@@ -1,0 +1,205 @@
+"""Driving along a track under authority: ask for segments ahead, order the drive as far as they are held, give back.
+
+The drive's target is always the centre of the last segment of an unbroken line of held ones, so the machine can stop
+inside its authority at any moment; orders are repeated only while ``authorised`` still agrees, and a drive that hears
+nothing brakes by itself.
+"""
+
+from dataclasses import dataclass
+
+from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import DriveMode, Reason, TokenKind
+from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
+from onboard.core.serial import successor
+from onboard.core.site import Segment
+
+#: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
+#: journal writes and frames. Ours.
+LOOKAHEAD_US = 3_000_000
+#: A machine stands at a segment's centre within this, mm (fine sensor, dbc/device.dbc).
+MARK_TOLERANCE_MM = 5
+
+
+@dataclass
+class Carriage:
+    """The carrier of one robot: its sensed position, its drive orders and the segments around it."""
+
+    fleet: Fleet
+    track: int
+    sensed: DriveState | None = None
+    goal: Segment | None = None
+    sequence: int = 0
+    target: Segment | None = None
+    refresh_at_us: int | None = None
+    blocked: Segment | None = None
+    stopped: bool = False
+    _reported: Segment | None = None
+
+    @property
+    def standing_at(self) -> Segment | None:
+        """The segment at whose mark the carrier stands still, or None while it moves or stands between marks."""
+        state = self.sensed
+        if state is None or state.mode is not DriveMode.STANDING:
+            return None
+        segment = self.segment_at(state.position_mm)
+        off_mm = abs(state.position_mm - self.fleet.site.position_mm(segment))
+        return segment if off_mm <= MARK_TOLERANCE_MM else None
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the carrier stands at its goal."""
+        return self.goal is not None and self.standing_at == self.goal
+
+    def segment_at(self, position_mm: int) -> Segment:
+        """The segment whose span holds a position along the track."""
+        track = self.fleet.site.tracks[self.track]
+        index = (position_mm + track.pitch_mm // 2) // track.pitch_mm + 1
+        return Segment(self.track, max(1, min(track.length, index)))
+
+    def occupied(self) -> list[Segment]:
+        """Segments that the body overlaps now, by the sensed position; empty where it is unknown."""
+        if self.sensed is None:
+            return []
+        half_mm = self.fleet.site.carrier_length_mm // 2
+        first = self.segment_at(self.sensed.position_mm - half_mm)
+        last = self.segment_at(self.sensed.position_mm + half_mm)
+        return [Segment(self.track, index) for index in range(first.index, last.index + 1)]
+
+    def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
+        """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
+        before = self.sensed
+        self.sensed = state
+        here = self.segment_at(state.position_mm)
+        started_or_stopped = before is None or before.mode is not state.mode
+        if here == self._reported and not started_or_stopped:
+            return []
+        self._reported = here
+        offset_mm = state.position_mm - self.fleet.site.position_mm(here)
+        progress = Progress(
+            self.fleet.node_id, itinerary_version, leg, here.track, here.index, offset_mm, state.speed_mm_s
+        )
+        return [Send(progress)]
+
+    def go(self, goal: Segment) -> None:
+        """Set the goal; ``advance`` does the rest."""
+        if goal != self.goal:
+            self.goal = goal
+            self.target = None
+            self.blocked = None
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Ask for the segments ahead, extend the drive's target as far as they are held, and repeat its order."""
+        if self.goal is None or self.sensed is None or self.arrived:
+            return self._rest(now_us)
+        ahead = self._ahead()
+        effects: list[Effect] = []
+        for segment in ahead[: self._lookahead_segments()]:
+            effects += self.fleet.tokens.want(segment_token(segment), now_us)
+        reach, reason = self._reach(ahead)
+        if reach is None:
+            return effects + self._hold(ahead, reason)
+        if reach != self.target:
+            self.target = reach
+            self.sequence = successor(self.sequence, 8)
+            return effects + [self._order(now_us)]
+        if self.refresh_at_us is not None and self.refresh_at_us <= now_us:
+            effects.append(self._order(now_us))
+        return effects + self._give_back(now_us)
+
+    def next_wake(self) -> int | None:
+        """When the drive's order is to be repeated."""
+        return self.refresh_at_us
+
+    def _rest(self, now_us: int) -> list[Effect]:
+        self.refresh_at_us = None
+        if self.sensed is None or self.sensed.mode is not DriveMode.STANDING:
+            return []
+        self.target = None
+        self.blocked = None
+        effects: list[Effect] = []
+        for segment in self.occupied():
+            effects += self.fleet.tokens.want(segment_token(segment), now_us)
+        return effects + self._give_back(now_us)
+
+    def _ahead(self) -> list[Segment]:
+        """Segments from where the body is to the goal, the goal included, in the order of travel."""
+        assert self.goal is not None and self.sensed is not None
+        here = self.segment_at(self.sensed.position_mm)
+        step = 1 if self.goal.index >= here.index else -1
+        return [Segment(self.track, index) for index in range(here.index, self.goal.index + step, step)]
+
+    def _lookahead_segments(self) -> int:
+        axis = self.fleet.site.carrier
+        braking_mm = axis.speed_mm_s**2 // (2 * axis.acceleration_mm_s2)
+        ahead_mm = braking_mm + axis.speed_mm_s * LOOKAHEAD_US // 1_000_000
+        return 2 + -(-ahead_mm // self.fleet.site.tracks[self.track].pitch_mm)
+
+    def _reach(self, ahead: list[Segment]) -> tuple[Segment | None, Reason]:
+        """The last segment of the unbroken authorised line, or None and why not even the first step is allowed."""
+        state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped)
+        for segment in self.occupied():
+            allowed, reason = authorised(state, segment)
+            if not allowed:
+                return None, reason
+        reach = None
+        reason = Reason.NONE
+        for segment in ahead:
+            allowed, reason = authorised(state, segment)
+            if not allowed:
+                break
+            reach = segment
+        if reach == self.standing_at and reach != self.goal:
+            return None, reason
+        return reach, reason
+
+    def _hold(self, ahead: list[Segment], reason: Reason) -> list[Effect]:
+        """Say once for what the machine waits, for whom and why; no order is repeated, so the drive brakes."""
+        self.refresh_at_us = None
+        self.target = None
+        tokens = self.fleet.tokens
+        waits_for = next((s for s in ahead if not tokens.holds(segment_token(s))), ahead[0])
+        refused = segment_token(waits_for) in tokens.refused
+        if self.blocked == waits_for or not refused:
+            return []
+        self.blocked = waits_for
+        blocker = tokens.holder_of(segment_token(waits_for))
+        return [Send(Waiting(self.fleet.node_id, waits_for.track, waits_for.index, blocker, reason))]
+
+    def _order(self, now_us: int) -> Effect:
+        assert self.target is not None
+        self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
+        position_mm = self.fleet.site.position_mm(self.target)
+        return Actuate(
+            DriveOrder(self.fleet.node_id, self.sequence, position_mm, self.fleet.site.carrier.speed_mm_s)
+        )
+
+    def _give_back(self, now_us: int) -> list[Effect]:
+        """Return segments that the body has left and does not need again before its goal."""
+        needed = set(self.occupied())
+        if self.goal is not None and not self.arrived:
+            needed.update(self._ahead())
+        effects: list[Effect] = []
+        tokens = self.fleet.tokens
+        for key in [key for key in tokens.wanted if key.kind is TokenKind.SEGMENT]:
+            if _segment(key) not in needed:
+                tokens.forget(key)
+        for key in self._held_segments():
+            segment = _segment(key)
+            steward = self.fleet.site.stewards[segment.track]
+            if segment not in needed and steward != self.fleet.node_id:
+                effects += tokens.give(key, steward, now_us)
+        return effects
+
+    def _held_segments(self) -> list[TokenKey]:
+        tokens = self.fleet.tokens
+        keys = [key for key in tokens.held if key.kind is TokenKind.SEGMENT]
+        home = segment_token(self.fleet.machine.home)
+        if home not in tokens.held and tokens.holds(home):
+            keys.append(home)
+        return keys
+
+
+def _segment(key: TokenKey) -> Segment:
+    return Segment(key.number >> 8, key.number & 0xFF)
