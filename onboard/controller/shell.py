@@ -17,7 +17,8 @@ from onboard.ports.bus import Bus
 from onboard.ports.journal import Journal
 from onboard.ports.telemetry import Telemetry
 from onboard.ports.watchdog import Watchdog
-from onboard.wire.codec import Codec, Decoder
+from onboard.wire.codec import Codec
+from onboard.wire.decoder import Decoder
 
 #: Most frames that wait for one machine; beyond that the oldest bus in the world is too fast for it.
 INBOX_LIMIT = 4096

@@ -86,7 +86,8 @@ class CarParkGeneration:
             return None
         deadline_ms = call.deadline_ms
         stamp = Stamp(deadline_ms, call.sender, call.call & 0xFF)
-        version = self.program.version + 1 & 0xFF or 1
+        # Legs name only the version: a tentative set must never complete a firm one.
+        version = (self.program.version + 128) & 0xFF or 1
         steps = [*self.program.remaining[: solution.kept], *solution.steps]
         itinerary = to_itinerary(self.machine.node_id, version, Grade.TENTATIVE, stamp, steps)
         return Proposal(to_bus_ms(solution.finish_us), itinerary, (solution,), tuple(alternatives))

@@ -1,0 +1,69 @@
+"""How a device reaches its machine's device bus: as messages; the adapter below turns them into frames and back."""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from onboard.core.frame import Frame
+from onboard.core.messages import Message
+from onboard.ports.bus import Bus
+
+#: Called with a message and the loop time of its reception, us.
+MessageHandler = Callable[[Message, int], None]
+
+
+class DeviceLink(Protocol):
+    """A device's connection to its machine's device bus."""
+
+    def send(self, message: Message) -> None:
+        """Say a message; never blocks, never raises for a full queue (the next state tells the same)."""
+
+    def subscribe(self, on_message: MessageHandler) -> None:
+        """Hand every message of other nodes of that bus to ``on_message``; several subscribers are served in order."""
+
+
+class Encoder(Protocol):
+    """What the adapter needs of a codec."""
+
+    def encode(self, message: Message) -> tuple[Frame, ...]:
+        """The frames of a message."""
+
+
+class Feed(Protocol):
+    """What the adapter needs of a decoder."""
+
+    def feed(self, frame: Frame, now_us: int) -> Message | None:
+        """The message that this frame completes, or None."""
+
+
+class BusDeviceLink:
+    """A ``DeviceLink`` over any CAN bus.
+
+    A bus that carries several machines' devices hands every device every order; messages of node-IDs other than
+    ``node_id`` are passed over, as an acceptance filter on the identifier's low byte would.
+    """
+
+    def __init__(self, bus: Bus, encoder: Encoder, decoder: Feed, node_id: int) -> None:
+        self.send_refused = 0
+        self._bus = bus
+        self._encoder = encoder
+        self._decoder = decoder
+        self._node_id = node_id
+        self._handlers: list[MessageHandler] = []
+        bus.subscribe(self._on_frame)
+
+    def send(self, message: Message) -> None:
+        """Encode and queue; frames that the full transmit queue refused are counted in ``send_refused``."""
+        for frame in self._encoder.encode(message):
+            if not self._bus.send(frame):
+                self.send_refused += 1
+
+    def subscribe(self, on_message: MessageHandler) -> None:
+        """Add a subscriber."""
+        self._handlers.append(on_message)
+
+    def _on_frame(self, frame: Frame, time_us: int) -> None:
+        message = self._decoder.feed(frame, time_us)
+        if message is None or message.sender != self._node_id:
+            return
+        for handler in self._handlers:
+            handler(message, time_us)

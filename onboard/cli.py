@@ -1,0 +1,105 @@
+"""``onboard``: run one machine's controller on a CAN interface."""
+
+import argparse
+import asyncio
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from onboard import __version__
+from onboard.config.machine import MachineConfig, load_machine
+from onboard.config.problems import ConfigError
+from onboard.controller.shell import Controller, Ports
+from onboard.core.holon import Holon, next_boot
+from onboard.io.console import ConsoleTelemetry
+from onboard.io.journal import FileJournal
+from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.io.watchdog import SystemdWatchdog
+from onboard.kinds.registry import factory_for
+from onboard.ports.bus import Bus
+from onboard.wire.codec import device_codec, fleet_codec
+
+EXIT_STATUS = """\
+exit status:
+  0  the controller was stopped by a person or the supervisor
+  1  the controller stopped itself: a broken invariant, an emergency stop, the journal or the bus failed
+  2  a mistake in the command line, the machine file or the site file; one line for each says where and what to do
+
+examples:
+  onboard --machine mr1.toml
+      the interfaces named in the machine file
+  onboard --machine mr1.toml -i socketcan -c can0 -b 500000
+      the fleet bus on a real interface; the command line overrides the file
+  onboard --machine mr1.toml -i socketcand -c fleet --bus-kwargs host=127.0.0.1 port=29536
+      join a site served by: bus-sim run level1 --serve --without MR1
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The command line of ``onboard``."""
+    parser = argparse.ArgumentParser(
+        prog="onboard",
+        description="Run the controller of one machine. Every machine of a site runs this same program; only its "
+        "machine file differs.",
+        epilog=EXIT_STATUS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"onboard {__version__}")
+    parser.add_argument("--machine", type=Path, required=True, metavar="FILE", help="machine file (docs/machine-file.md)")
+    parser.add_argument("--check", action="store_true", help="check the machine and site file, say so, and stop")
+    parser.add_argument("--journal", type=Path, metavar="DIR", help="journal directory instead of the file's")
+    add_bus_arguments(parser)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    args = build_parser().parse_args(argv)
+    try:
+        config = load_machine(args.machine)
+        fleet_settings = bus_settings(args, config.fleet_bus)
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return 2
+    if args.check:
+        print(f"{args.machine}: {config.machine.name} of site {config.site.name} (digest {config.site.digest:04X}): in order")
+        return 0
+    try:
+        return asyncio.run(run(config, fleet_settings, args.journal or config.journal))
+    except BusOpenError as error:
+        print(f"onboard: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"onboard: journal {args.journal or config.journal}: {error.strerror or error}", file=sys.stderr)
+        return 2
+
+
+async def run(config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path) -> int:
+    """Run until stopped: 0 where a signal ended it, 1 where the controller ended itself."""
+    journal = FileJournal(journal_directory)
+    entries = journal.replay()
+    holon = Holon(config.site, config.machine, factory_for(config.machine.kind), boot=next_boot(entries), entries=entries)
+    fleet_bus = await open_bus(fleet_settings)
+    device_bus: Bus = fleet_bus
+    if config.device_bus != fleet_settings:
+        device_bus = await open_bus(config.device_bus)
+    watchdog = SystemdWatchdog()
+    ports = Ports(fleet_bus, device_bus, journal, ConsoleTelemetry(), watchdog)
+    controller = Controller(holon, ports, fleet_codec(), device_codec())
+    controller.start()
+    assert controller.stopped is not None
+    loop = asyncio.get_running_loop()
+    asked = asyncio.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, asked.set)
+    waiting = asyncio.ensure_future(asked.wait())
+    await asyncio.wait([waiting, controller.stopped], return_when=asyncio.FIRST_COMPLETED)
+    ended_itself = controller.stopped.done()
+    waiting.cancel()
+    await controller.stop()
+    return 1 if ended_itself else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,40 @@
+"""The Mechatronics Interaction Protocol (MIP) of Pujo, Ounnar and Zanni: a contract net without a manager."""
+
+from onboard.core.negotiation.bidding import beats, cost_difference, delay_us
+from onboard.core.negotiation.events import (
+    EVENT_TYPES,
+    Awarded,
+    CallKey,
+    CallTerms,
+    Closed,
+    Estimator,
+    NegotiationEvent,
+    PreAssigned,
+    Proposal,
+    Released,
+)
+from onboard.core.negotiation.initiator import Initiator, RestartPolicy, RestartStep
+from onboard.core.negotiation.negotiation import Negotiation
+from onboard.core.negotiation.participant import Counters, Participant
+
+__all__ = [
+    "EVENT_TYPES",
+    "Awarded",
+    "CallKey",
+    "CallTerms",
+    "Closed",
+    "Counters",
+    "Estimator",
+    "Initiator",
+    "Negotiation",
+    "NegotiationEvent",
+    "Participant",
+    "PreAssigned",
+    "Proposal",
+    "Released",
+    "RestartPolicy",
+    "RestartStep",
+    "beats",
+    "cost_difference",
+    "delay_us",
+]

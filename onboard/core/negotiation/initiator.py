@@ -1,0 +1,200 @@
+"""The initiator's side of one call, as one transition table (rows P05, P11, P12, P14).
+
+Nobody answers: the call is opened again, changed as the restart policy says, a bounded number of times, then reported
+as refused. Somebody wins: one award closes the call and is said again until the winner is heard acting on it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from onboard.core.codes import NOBODY, CallResult, Grade, Reason
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, TaskReport
+from onboard.core.negotiation.bidding import beats
+from onboard.core.negotiation.events import CallTerms, Closed, NegotiationEvent
+from onboard.core.serial import from_bus_ms, to_bus_ms
+from onboard.core.site import Timing
+
+Outcome = list[Effect | NegotiationEvent]
+
+
+class State(Enum):
+    """Where an initiator stands with one task."""
+
+    OPEN = "bids may come"
+    AWARDING = "the winner has not been heard yet"
+    CLOSED = "over"
+
+
+class Event(Enum):
+    """What can happen to an initiator."""
+
+    DEADLINE_WITH_BID = "the deadline has passed and there is a best bid"
+    DEADLINE_EMPTY = "the deadline has passed without a bid, and attempts are left"
+    EXHAUSTED = "the deadline has passed without a bid for the last time"
+    REPEAT = "the award is to be said again"
+    HEARD = "the winner was heard acting on the award"
+    WITHDRAW = "the machine no longer wants the task done"
+
+
+@dataclass(frozen=True, slots=True)
+class RestartStep:
+    """How one further attempt differs: its window is the site's times ``window_percent`` / 100."""
+
+    window_percent: int
+
+
+@dataclass(frozen=True, slots=True)
+class RestartPolicy:
+    """What happens when nobody answers, as data; the last step serves all further attempts up to the site's bound."""
+
+    steps: tuple[RestartStep, ...] = (RestartStep(100), RestartStep(150), RestartStep(200), RestartStep(300))
+
+    def window_us(self, attempt: int, timing: Timing) -> int:
+        """Length of attempt 1, 2, ... in us."""
+        step = self.steps[min(attempt, len(self.steps)) - 1]
+        return timing.call_window_us * step.window_percent // 100
+
+
+@dataclass
+class Initiator:
+    """One task that this machine wants done. ``number`` hands out call numbers. All times are bus time in us."""
+
+    node_id: int
+    terms: CallTerms
+    timing: Timing
+    policy: RestartPolicy
+    number: Callable[[], int]
+    silent: bool = False
+    state: State = State.OPEN
+    call: CallForProposals | None = None
+    attempt: int = 0
+    best: tuple[int, int] | None = None
+    due_us: int | None = None
+    late_bids_ignored: int = 0
+    awards_sent: int = 0
+    _table: dict[tuple[State, Event], tuple[State, Callable[[int], Outcome]]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self._table = {
+            (State.OPEN, Event.DEADLINE_WITH_BID): (State.AWARDING, self._award_first),
+            (State.OPEN, Event.DEADLINE_EMPTY): (State.OPEN, self._reopen),
+            (State.OPEN, Event.EXHAUSTED): (State.CLOSED, self._refuse),
+            (State.OPEN, Event.WITHDRAW): (State.CLOSED, self._withdraw),
+            (State.AWARDING, Event.REPEAT): (State.AWARDING, self._award),
+            (State.AWARDING, Event.HEARD): (State.CLOSED, self._end),
+        }
+
+    def open(self, now_us: int) -> Outcome:
+        """Send the call for the next attempt."""
+        self.attempt += 1
+        self.best = None
+        terms = self.terms
+        deadline_us = now_us + self.policy.window_us(self.attempt, self.timing)
+        self.call = CallForProposals(
+            self.node_id,
+            self.number(),
+            terms.task,
+            terms.operation,
+            terms.kind,
+            terms.criterion,
+            self.attempt,
+            terms.depth,
+            to_bus_ms(deadline_us),
+            terms.from_station,
+            terms.to_station,
+            terms.car,
+            terms.wheelbase_mm,
+        )
+        self.due_us = from_bus_ms(self.call.deadline_ms, now_us)
+        return [Send(self.call)]
+
+    def on_bid(self, bid: Bid, now_us: int) -> Outcome:
+        """A bid counts if received before the deadline minus the guard, by my own bus time (decision on flag 11)."""
+        assert self.call is not None and self.due_us is not None
+        if self.state is not State.OPEN or now_us > self.due_us - self.timing.deadline_guard_us:
+            self.late_bids_ignored += 1
+            return []
+        if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):
+            self.best = (bid.cost, bid.sender)
+        return []
+
+    def on_itinerary(self, itinerary: Itinerary, now_us: int) -> Outcome:
+        """The winner's firm itinerary whose stamp names this call ends the award."""
+        assert self.call is not None
+        stamp = itinerary.stamp
+        named = stamp.initiator == self.node_id and stamp.call == self.call.call & 0xFF
+        if itinerary.grade is not Grade.FIRM or not named or self.best is None or itinerary.sender != self.best[1]:
+            return []
+        return self._fire(Event.HEARD, now_us)
+
+    def on_report(self, report: TaskReport, now_us: int) -> Outcome:
+        """A report on the task by its winner ends the award as well."""
+        if self.best is None or report.sender != self.best[1] or report.task != self.terms.task:
+            return []
+        return self._fire(Event.HEARD, now_us)
+
+    def withdraw(self, now_us: int) -> Outcome:
+        """Close the call for nobody while it is open; an award under way is not taken back."""
+        return self._fire(Event.WITHDRAW, now_us)
+
+    def wake(self, now_us: int) -> Outcome:
+        """Let the deadline pass, or say the award again."""
+        if self.due_us is None or self.due_us > now_us:
+            return []
+        if self.state is State.AWARDING:
+            return self._fire(Event.REPEAT, now_us)
+        if self.best is not None:
+            return self._fire(Event.DEADLINE_WITH_BID, now_us)
+        last = self.attempt >= self.timing.max_attempts
+        return self._fire(Event.EXHAUSTED if last else Event.DEADLINE_EMPTY, now_us)
+
+    def _fire(self, event: Event, now_us: int) -> Outcome:
+        entry = self._table.get((self.state, event))
+        if entry is None:
+            return []
+        self.state, action = entry
+        return action(now_us)
+
+    # --- actions -----------------------------------------------------------------------------------------------
+
+    def _award_first(self, now_us: int) -> Outcome:
+        if self.silent:
+            self.state = State.CLOSED
+            return self._end(now_us)
+        return self._award(now_us)
+
+    def _award(self, now_us: int) -> Outcome:
+        """Never given up: a winner that is never heard keeps its award, as only custody rules may re-award."""
+        assert self.best is not None
+        self.awards_sent += 1
+        repeat_us = self.timing.award_repeat_us
+        # Ten quick repeats bridge lost frames; after that the winner is down and a slow reminder is enough.
+        self.due_us = now_us + (repeat_us if self.awards_sent <= 10 else 10 * repeat_us)
+        return [Send(self._closing(self.best[1], CallResult.AWARDED, Reason.NONE))]
+
+    def _end(self, now_us: int) -> Outcome:
+        assert self.best is not None and self.call is not None
+        self.due_us = None
+        return [Closed(self.call, self.best[1], CallResult.AWARDED, Reason.NONE, self.attempt)]
+
+    def _reopen(self, now_us: int) -> Outcome:
+        closing = self._closing(NOBODY, CallResult.REOPENED, Reason.NO_BID)
+        return [Send(closing), *self.open(now_us)]
+
+    def _refuse(self, now_us: int) -> Outcome:
+        assert self.call is not None
+        self.due_us = None
+        closing = self._closing(NOBODY, CallResult.REFUSED, Reason.NO_BID)
+        return [Send(closing), Closed(self.call, NOBODY, CallResult.REFUSED, Reason.NO_BID, self.attempt)]
+
+    def _withdraw(self, now_us: int) -> Outcome:
+        assert self.call is not None
+        self.due_us = None
+        closing = self._closing(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)
+        return [Send(closing), Closed(self.call, NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED, self.attempt)]
+
+    def _closing(self, winner: int, result: CallResult, reason: Reason) -> Award:
+        assert self.call is not None
+        return Award(self.node_id, self.call.call, winner, self.terms.task, self.terms.task_version, result, reason)

@@ -1,0 +1,98 @@
+"""The one file that knows cantools: a DBC text becomes plain layouts.
+
+cantools changes its internals with every release (it is pinned); nothing but this file would have to follow.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+
+from cantools.database import Message as DbcMessage
+from cantools.database import Signal as DbcSignal
+from cantools.database import load_string
+from cantools.database.can.database import Database
+
+from dbc import device_dbc_text, fleet_dbc_text
+
+
+@dataclass(frozen=True, slots=True)
+class SignalLayout:
+    """One signal: value = raw * scale + offset; raw has ``bits`` bits at ``shift`` of the little-endian word."""
+
+    name: str
+    shift: int
+    bits: int
+    signed: bool
+    scale: int
+    offset: int
+    minimum: int
+    maximum: int
+    unit: str
+    comment: str
+    choices: tuple[tuple[int, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MessageLayout:
+    """One message; ``frame_id`` has 0 in its lowest byte, where the sender's node-ID goes."""
+
+    name: str
+    frame_id: int
+    length: int
+    cycle_ms: int
+    comment: str
+    senders: tuple[str, ...]
+    receivers: tuple[str, ...]
+    signals: tuple[SignalLayout, ...]
+
+
+def _signal(signal: DbcSignal) -> SignalLayout:
+    if signal.byte_order != "little_endian" or signal.minimum is None or signal.maximum is None:
+        raise ValueError(f"signal {signal.name} must be little-endian and have a range")
+    choices = tuple(sorted((value, str(name)) for value, name in (signal.choices or {}).items()))
+    return SignalLayout(
+        signal.name,
+        signal.start,
+        signal.length,
+        signal.is_signed,
+        int(signal.scale),
+        int(signal.offset),
+        int(signal.minimum),
+        int(signal.maximum),
+        signal.unit or "",
+        signal.comment or "",
+        choices,
+    )
+
+
+def _message(message: DbcMessage) -> MessageLayout:
+    signals = tuple(_signal(signal) for signal in sorted(message.signals, key=lambda one: one.start))
+    receivers = tuple(dict.fromkeys(node for signal in message.signals for node in signal.receivers))
+    return MessageLayout(
+        message.name,
+        message.frame_id,
+        message.length,
+        message.cycle_time or 0,
+        message.comment or "",
+        tuple(message.senders),
+        receivers,
+        signals,
+    )
+
+
+def read_layouts(text: str) -> tuple[MessageLayout, ...]:
+    """All messages of a DBC text, in the file's order of identifiers. Raises cantools' errors for a bad text."""
+    database = load_string(text, database_format="dbc", strict=True, sort_signals=None)
+    assert isinstance(database, Database)
+    return tuple(_message(message) for message in sorted(database.messages, key=lambda one: one.frame_id))
+
+
+@cache
+def fleet_layouts() -> tuple[MessageLayout, ...]:
+    """Layouts of ``dbc/fleet.dbc``."""
+    return read_layouts(fleet_dbc_text())
+
+
+@cache
+def device_layouts() -> tuple[MessageLayout, ...]:
+    """Layouts of ``dbc/device.dbc``."""
+    return read_layouts(device_dbc_text())
