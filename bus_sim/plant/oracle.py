@@ -1,0 +1,234 @@
+"""The oracle: invariants judged on the ground truth alone, never on anybody's tables, messages or sensors.
+
+It looks after every change of the world, and at whole motions afterwards, so that nothing between two events escapes.
+A run with any violation has failed.
+"""
+
+from collections.abc import Iterator
+from enum import Enum
+from typing import NamedTuple
+
+from bus_sim.plant.bodies import Aboard
+from bus_sim.plant.motion import Motion
+from bus_sim.plant.world import BayBody, Change, RobotBody, World
+from onboard.core.codes import DoorName, DoorPosition
+from onboard.core.site import Station
+
+#: Overlap below this, mm, is rounding.
+OVERLAP_TOLERANCE_MM = 1e-3
+
+
+class Rule(Enum):
+    """The invariants."""
+
+    BODIES_APART = "two bodies overlap on a track"
+    ON_TRACK = "a carrier leaves its track"
+    SHUTTLE_HOME_TO_MOVE = "a carrier moves while its shuttle is out"
+    ONE_DOOR = "both doors of a compartment are not locked"
+    NO_PERSON_TO_MACHINES = "a person is inside while the output door is not locked"
+    PERSON_BY_OPEN_DOOR = "a person passes a door that is not open"
+    BAY_BY_OPEN_DOOR = "a shuttle is in a bay whose output door is not open"
+    NO_WALL = "a shuttle reaches where there is no station"
+    ONE_CAR = "two cars are in one place"
+    CARS_CONSERVED = "a car is lost or doubled"
+    OWN_CAR = "a customer is given another's car"
+
+
+class Violation(NamedTuple):
+    """One broken invariant: when (us of loop time), which, and what exactly."""
+
+    time_us: int
+    rule: Rule
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.time_us / 1e6:.6f} s: {self.rule.value}: {self.text}"
+
+
+class Span(NamedTuple):
+    """A carrier's motion and from when on it holds."""
+
+    track: int
+    motion: Motion
+    from_us: int
+
+
+class Oracle:
+    """Watches one world; ``violations`` is what it found, each kind at each machine once until it ended."""
+
+    def __init__(self, world: World) -> None:
+        self.world = world
+        self.violations: list[Violation] = []
+        self._spans: dict[int, Span] = {}
+        self._persons: dict[int, int] = {node: bay.persons for node, bay in world.bays.items()}
+        self._present: set[tuple[Rule, str]] = set()
+        now_us = world.timers.now_us()
+        for node_id, robot in world.robots.items():
+            self._spans[node_id] = Span(robot.track, robot.motion, now_us)
+        self._judge_pairs(now_us)
+        world.watch(self._on_change)
+
+    def report(self, rule: Rule, text: str) -> None:
+        """Note a violation seen by someone else in the world (a customer before another's car)."""
+        self.violations.append(Violation(self.world.timers.now_us(), rule, text))
+
+    def finish(self) -> list[Violation]:
+        """Judge the motions up to now and the stock of cars; answers all violations of the run, in order of time."""
+        now_us = self.world.timers.now_us()
+        self._judge_pairs(now_us)
+        for node_id in self._spans:
+            self._judge_track(node_id, now_us)
+        self._judge_cars()
+        self.violations.sort(key=lambda violation: violation.time_us)
+        return self.violations
+
+    # --- after every change ------------------------------------------------------------------------------------
+
+    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
+        if change is Change.CARRIER:
+            self._judge_track(node_id, now_us)
+            self._judge_pairs(now_us, node_id)
+            robot = self.world.robots[node_id]
+            self._spans[node_id] = Span(robot.track, robot.motion, now_us)
+        if change is Change.PERSON:
+            self._judge_passage(node_id)
+        if change is Change.CAR:
+            self._judge_cars()
+        found = list(self._standing_violations(now_us))
+        for rule, text in found:
+            if (rule, text) not in self._present:
+                self.violations.append(Violation(now_us, rule, text))
+        self._present = set(found)
+
+    def _standing_violations(self, now_us: int) -> Iterator[tuple[Rule, str]]:
+        for node_id, robot in self.world.robots.items():
+            yield from self._judge_robot(node_id, robot, now_us)
+        for node_id, bay in self.world.bays.items():
+            yield from self._judge_bay(node_id, bay)
+
+    def _judge_robot(self, node_id: int, robot: RobotBody, now_us: int) -> Iterator[tuple[Rule, str]]:
+        if not robot.is_out(now_us):
+            return
+        if now_us < robot.motion.end_us:
+            yield Rule.SHUTTLE_HOME_TO_MOVE, f"robot {node_id}"
+            return
+        station = self.world.station_beside(node_id, robot.side)
+        if station is None:
+            position_mm = robot.motion.at(now_us)[0]
+            yield Rule.NO_WALL, f"robot {node_id} at {position_mm:.0f} mm, side {robot.side.name}"
+            return
+        compartment = self.world.bay_at(station)
+        if compartment is not None:
+            output = self.world.bays[compartment].doors[DoorName.OUTPUT]
+            if output is not DoorPosition.OPEN:
+                yield Rule.BAY_BY_OPEN_DOOR, f"robot {node_id}, compartment {compartment}: {output.name}"
+        if self.world.car_aboard(node_id) is not None and self.world.cars_at(station):
+            yield Rule.ONE_CAR, f"robot {node_id} brings a car into {station}"
+
+    def _judge_bay(self, node_id: int, bay: BayBody) -> Iterator[tuple[Rule, str]]:
+        inner, outer = bay.doors[DoorName.OUTPUT], bay.doors[DoorName.INPUT]
+        if inner is not DoorPosition.LOCKED and outer is not DoorPosition.LOCKED:
+            yield Rule.ONE_DOOR, f"compartment {node_id}: input {outer.name}, output {inner.name}"
+        if bay.persons and inner is not DoorPosition.LOCKED:
+            yield Rule.NO_PERSON_TO_MACHINES, f"compartment {node_id}"
+
+    def _judge_passage(self, node_id: int) -> None:
+        bay = self.world.bays[node_id]
+        if bay.doors[DoorName.INPUT] is not DoorPosition.OPEN:
+            direction = "enters" if bay.persons > self._persons[node_id] else "leaves"
+            position = bay.doors[DoorName.INPUT].name
+            self.report(Rule.PERSON_BY_OPEN_DOOR, f"{direction} compartment {node_id}: input {position}")
+        self._persons[node_id] = bay.persons
+
+    def _judge_cars(self) -> None:
+        """Every car that was ever seen is somewhere, and no place, bay or shuttle has two."""
+        holders: dict[Station | Aboard, str] = {}
+        for name in self.world.cars:
+            if name not in self.world.where:
+                self._once(Rule.CARS_CONSERVED, f"{name} is nowhere")
+                continue
+            where = self.world.where[name]
+            if where is None:
+                continue
+            if where in holders:
+                self._once(Rule.ONE_CAR, f"{name} and {holders[where]} at {where}")
+            holders[where] = name
+        for name in self.world.where:
+            if name not in self.world.cars:
+                self._once(Rule.CARS_CONSERVED, f"{name} came from nowhere")
+
+    def _once(self, rule: Rule, text: str) -> None:
+        if not any(v.rule is rule and v.text == text for v in self.violations):
+            self.report(rule, text)
+
+    # --- whole motions, afterwards -----------------------------------------------------------------------------
+
+    def _judge_track(self, node_id: int, now_us: int) -> None:
+        span = self._spans[node_id]
+        track = self.world.site.tracks[span.track]
+        low, high = span.motion.extremes_mm(span.from_us, now_us)
+        margin = track.pitch_mm / 2
+        if low < -margin or high > (track.length - 1) * track.pitch_mm + margin:
+            self._once(Rule.ON_TRACK, f"robot {node_id} on track {span.track}")
+
+    def _judge_pairs(self, now_us: int, node_id: int | None = None) -> None:
+        """Least distance of every pair (with ``node_id``) since the last time one of them changed its motion."""
+        nodes = sorted(self._spans)
+        for first in nodes:
+            for second in nodes:
+                if first < second and node_id in (None, first, second):
+                    self._judge_pair(first, second, now_us)
+
+    def _judge_pair(self, first: int, second: int, now_us: int) -> None:
+        one, two = self._spans[first], self._spans[second]
+        if one.track != two.track:
+            return
+        from_us = max(one.from_us, two.from_us)
+        gap_mm, at_us = least_distance(one.motion, two.motion, from_us, now_us)
+        if gap_mm < self.world.site.carrier_length_mm - OVERLAP_TOLERANCE_MM:
+            text = f"robots {first} and {second} on track {one.track}, centres {gap_mm:.1f} mm apart"
+            self.violations.append(Violation(at_us, Rule.BODIES_APART, text))
+
+
+def least_distance(one: Motion, two: Motion, from_us: int, to_us: int) -> tuple[float, int]:
+    """Least distance (mm) of two motions within a closed span of time, and when (us) it is reached.
+
+    Exact: between the points at which either changes its acceleration the difference is a parabola.
+    """
+    lo, hi = from_us / 1e6, max(from_us, to_us) / 1e6
+    times = {lo, hi}
+    for motion in (one, two):
+        times.update(t + motion.start_us / 1e6 for t in motion.turning_points())
+    inside = sorted(t for t in times if lo <= t <= hi)
+    candidates = list(inside)
+    for begin, end in zip(inside, inside[1:], strict=False):
+        candidates.extend(_stationary_points(one, two, begin, end))
+    best = min(candidates, key=lambda t: (abs(_difference(one, two, t)[0]), t))
+    return abs(_difference(one, two, best)[0]), round(best * 1e6)
+
+
+def _difference(one: Motion, two: Motion, t: float) -> tuple[float, float, float]:
+    x1, v1, a1 = one.state(t - one.start_us / 1e6)
+    x2, v2, a2 = two.state(t - two.start_us / 1e6)
+    return x1 - x2, v1 - v2, a1 - a2
+
+
+def _stationary_points(one: Motion, two: Motion, begin: float, end: float) -> Iterator[float]:
+    """Times inside a smooth stretch at which the distance is least: relative standstill, or the bodies' centres meet."""
+    # Taken just inside, where the accelerations are those of the stretch whatever the rounding of its ends.
+    middle = (begin + end) / 2
+    x, v, a = _difference(one, two, middle)
+    if a:
+        vertex = middle - v / a
+        if begin < vertex < end:
+            yield vertex
+    low, high = _difference(one, two, begin)[0], _difference(one, two, end)[0]
+    if low * high < 0:
+        # The centres pass each other: the distance is zero somewhere inside; bisection finds where.
+        for _ in range(60):
+            middle = (begin + end) / 2
+            if _difference(one, two, middle)[0] * low > 0:
+                begin = middle
+            else:
+                end = middle
+        yield begin
