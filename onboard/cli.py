@@ -46,7 +46,9 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"onboard {__version__}")
-    parser.add_argument("--machine", type=Path, required=True, metavar="FILE", help="machine file (docs/machine-file.md)")
+    parser.add_argument(
+        "--machine", type=Path, required=True, metavar="FILE", help="machine file (docs/machine-file.md)"
+    )
     parser.add_argument("--check", action="store_true", help="check the machine and site file, say so, and stop")
     parser.add_argument("--journal", type=Path, metavar="DIR", help="journal directory instead of the file's")
     add_bus_arguments(parser)
@@ -63,7 +65,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     if args.check:
-        print(f"{args.machine}: {config.machine.name} of site {config.site.name} (digest {config.site.digest:04X}): in order")
+        print(
+            f"{args.machine}: {config.machine.name} of site {config.site.name} (digest {config.site.digest:04X}): in order"
+        )
         return 0
     try:
         return asyncio.run(run(config, fleet_settings, args.journal or config.journal))
@@ -79,7 +83,9 @@ async def run(config: MachineConfig, fleet_settings: BusSettings, journal_direct
     """Run until stopped: 0 where a signal ended it, 1 where the controller ended itself."""
     journal = FileJournal(journal_directory)
     entries = journal.replay()
-    holon = Holon(config.site, config.machine, factory_for(config.machine.kind), boot=next_boot(entries), entries=entries)
+    holon = Holon(
+        config.site, config.machine, factory_for(config.machine.kind), boot=next_boot(entries), entries=entries
+    )
     fleet_bus = await open_bus(fleet_settings)
     device_bus: Bus = fleet_bus
     if config.device_bus != fleet_settings:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
-from bus_sim.plant.bodies import Aboard
+from bus_sim.plant.bodies import Aboard, Location
 from bus_sim.plant.motion import Motion
 from bus_sim.plant.world import BayBody, Change, RobotBody, World
 from onboard.core.codes import DoorName, DoorPosition
@@ -61,6 +61,7 @@ class Oracle:
         self.violations: list[Violation] = []
         self._spans: dict[int, Span] = {}
         self._persons: dict[int, int] = {node: bay.persons for node, bay in world.bays.items()}
+        self._where: dict[str, Location] = dict(world.where)
         self._present: set[tuple[Rule, str]] = set()
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
@@ -141,21 +142,32 @@ class Oracle:
         self._persons[node_id] = bay.persons
 
     def _judge_cars(self) -> None:
-        """Every car that was ever seen is somewhere, and no place, bay or shuttle has two."""
+        """Cars move only by a step that exists, and no place, bay or shuttle has two."""
         holders: dict[Station | Aboard, str] = {}
-        for name in self.world.cars:
-            if name not in self.world.where:
-                self._once(Rule.CARS_CONSERVED, f"{name} is nowhere")
-                continue
-            where = self.world.where[name]
+        for name, where in self.world.where.items():
+            before = self._where.get(name)
+            if where != before and not self._is_a_step(before, where):
+                self.report(Rule.CARS_CONSERVED, f"{name} from {before or 'outside'} to {where or 'outside'}")
             if where is None:
                 continue
             if where in holders:
                 self._once(Rule.ONE_CAR, f"{name} and {holders[where]} at {where}")
             holders[where] = name
-        for name in self.world.where:
-            if name not in self.world.cars:
-                self._once(Rule.CARS_CONSERVED, f"{name} came from nowhere")
+        for name in self._where:
+            if name not in self.world.where:
+                self._once(Rule.CARS_CONSERVED, f"{name} is nowhere")
+        self._where = dict(self.world.where)
+
+    def _is_a_step(self, before: Location, after: Location) -> bool:
+        """In from the street into a bay, out of a bay to the street, onto or off the shuttle that stands opposite."""
+        if before is None or after is None:
+            inside = after if before is None else before
+            return isinstance(inside, Station) and self.world.bay_at(inside) is not None
+        if isinstance(before, Station) and isinstance(after, Aboard):
+            return self.world.shuttle_in(before) == after.node_id
+        if isinstance(before, Aboard) and isinstance(after, Station):
+            return self.world.shuttle_in(after) == before.node_id
+        return False
 
     def _once(self, rule: Rule, text: str) -> None:
         if not any(v.rule is rule and v.text == text for v in self.violations):
@@ -217,18 +229,23 @@ def _stationary_points(one: Motion, two: Motion, begin: float, end: float) -> It
     """Times inside a smooth stretch at which the distance is least: relative standstill, or the bodies' centres meet."""
     # Taken just inside, where the accelerations are those of the stretch whatever the rounding of its ends.
     middle = (begin + end) / 2
-    x, v, a = _difference(one, two, middle)
-    if a:
-        vertex = middle - v / a
-        if begin < vertex < end:
-            yield vertex
-    low, high = _difference(one, two, begin)[0], _difference(one, two, end)[0]
-    if low * high < 0:
-        # The centres pass each other: the distance is zero somewhere inside; bisection finds where.
-        for _ in range(60):
-            middle = (begin + end) / 2
-            if _difference(one, two, middle)[0] * low > 0:
-                begin = middle
-            else:
-                end = middle
-        yield begin
+    _, v, a = _difference(one, two, middle)
+    points = [begin, end]
+    if a and begin < middle - v / a < end:
+        points.insert(1, middle - v / a)
+        yield points[1]
+    for low, high in zip(points, points[1:], strict=False):
+        if _difference(one, two, low)[0] * _difference(one, two, high)[0] < 0:
+            yield _meeting(one, two, low, high)
+
+
+def _meeting(one: Motion, two: Motion, low: float, high: float) -> float:
+    """When two centres pass each other, by bisection of a stretch in which they do it once."""
+    sign = _difference(one, two, low)[0]
+    for _ in range(60):
+        middle = (low + high) / 2
+        if _difference(one, two, middle)[0] * sign > 0:
+            low = middle
+        else:
+            high = middle
+    return low

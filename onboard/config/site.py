@@ -134,7 +134,7 @@ def _read_alleys(draft: _Draft, floors: Table) -> None:
     count = floors.integer("count", 1, 127)
     positions = floors.integer("positions", 2, 127)
     pitch_mm = floors.integer("pitch_mm", 1000, 10_000, 2_400)
-    lengths = {number: positions for number in range(1, count + 1)}
+    lengths = dict.fromkeys(range(1, count + 1), positions)
     for override in floors.tables("floor"):
         number = override.integer("number", 1, 127)
         if number not in lengths:
@@ -179,7 +179,9 @@ def _read_compartments(draft: _Draft, root: Table) -> list[Table]:
         side = _SIDES[table.choice("side", list(_SIDES), "near")]
         station = Station(*front, side) if front is not None else Station(0, 0, side)
         if station in draft.taken:
-            table.bad("at", str(station), f"{draft.taken[station]} stands there already", "choose another side or position")
+            table.bad(
+                "at", str(station), f"{draft.taken[station]} stands there already", "choose another side or position"
+            )
         draft.taken[station] = table.text("name")
         draft.add_machine(table, KindCode.COMPARTMENT, station.segment, station)
     return tables
@@ -215,7 +217,9 @@ def _read_places(draft: _Draft, floors: Table) -> list[Station]:
                 if side.name.lower() in sides:
                     stations = [Station(track.number, index, side) for index in range(1, track.length + 1)]
                     places += [one for one in stations if one not in draft.taken and one not in gaps]
-    unknown = [gap for gap in gaps if gap.track not in draft.tracks or not 1 <= gap.index <= draft.tracks[gap.track].length]
+    unknown = [
+        gap for gap in gaps if gap.track not in draft.tracks or not 1 <= gap.index <= draft.tracks[gap.track].length
+    ]
     for gap in sorted(unknown):
         floors.bad("without", str(gap), "no such place", "name a place of this site")
     return places
@@ -311,7 +315,9 @@ def _read_timing(table: Table, robots: int, bitrate: int) -> Timing:
         "deadline_guard": table.integer("deadline_guard_ms", 0, 10_000, 20),
     }
     if values["bid_delay"] + values["deadline_guard"] >= values["call_window"]:
-        table.bad("bid_delay_ms", values["bid_delay"], "bids would come after the deadline", "make call_window_ms longer")
+        table.bad(
+            "bid_delay_ms", values["bid_delay"], "bids would come after the deadline", "make call_window_ms longer"
+        )
     return Timing(
         values["call_window"] * 1000,
         values["bid_delay"] * 1000,
@@ -345,7 +351,9 @@ def _canonical(value: Any) -> Iterator[Any]:
     elif isinstance(value, tuple | list):
         yield [list(_canonical(item)) for item in value]
     elif hasattr(value, "__dataclass_fields__"):
-        yield [[name, list(_canonical(getattr(value, name)))] for name in value.__dataclass_fields__ if name != "digest"]
+        yield [
+            [name, list(_canonical(getattr(value, name)))] for name in value.__dataclass_fields__ if name != "digest"
+        ]
     else:
         yield str(value)
 

@@ -98,8 +98,10 @@ class Mirror:
         record = CarRecord(statement.station, statement.sender, statement.version)
         if known == record:
             return False
-        if known is not None and statement.version != known.version and not is_newer(
-            statement.version, known.version, 16
+        if (
+            known is not None
+            and statement.version != known.version
+            and not is_newer(statement.version, known.version, 16)
         ):
             return False
         self.cars[statement.car] = record

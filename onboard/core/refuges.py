@@ -6,8 +6,10 @@ from onboard.core.site import Segment, Site, TrackKind
 
 
 @lru_cache(maxsize=16)
-def _refuges(tracks: tuple[tuple[int, TrackKind, int, tuple[Segment, ...]], ...], kept: frozenset[Segment]) -> frozenset[Segment]:
-    found = set()
+def _refuges(
+    tracks: tuple[tuple[int, TrackKind, int, tuple[Segment, ...]], ...], kept: frozenset[Segment]
+) -> frozenset[Segment]:
+    found: set[Segment] = set()
     for number, kind, length, _ in tracks:
         if kind is not TrackKind.LIFT:
             found.update(Segment(number, index) for index in range(1, length + 1))

@@ -95,8 +95,9 @@ def _direct_us(site: Site, origin: Segment, goal: Segment) -> int:
     if site.tracks[origin.track].kind is TrackKind.SPUR:
         for mouth in site.tracks[origin.track].joins:
             hop_us = run_duration_us(site.tracks[origin.track].pitch_mm, site.carrier)
-            best_us = min(best_us, _direct_us(site, Segment(origin.track, 1), origin) + hop_us
-                          + _direct_us(site, mouth, goal))
+            best_us = min(
+                best_us, _direct_us(site, Segment(origin.track, 1), origin) + hop_us + _direct_us(site, mouth, goal)
+            )
     return best_us
 
 
@@ -173,9 +174,7 @@ class _Search:
                 elif here == inside:
                     yield mouth, hop_us, [(inside, both), (mouth, both)]
 
-    def departure_us(
-        self, not_before_us: int, latest_us: int, swept: list[tuple[Segment, Sweep]]
-    ) -> int | None:
+    def departure_us(self, not_before_us: int, latest_us: int, swept: list[tuple[Segment, Sweep]]) -> int | None:
         """Earliest whole millisecond from which every swept window lies in one safe interval, or None.
 
         Each correction moves the departure to the start of a later gap, so the loop ends.
@@ -282,7 +281,9 @@ def _legs(node: _Node) -> list[RouteLeg]:
         here, there = before.state.segment, node.state.segment
         hop = here.track != there.track
         legs.append(
-            RouteLeg(node.action, there.track, there.index if hop else here.index, there.index, node.begin_us, node.time_us)
+            RouteLeg(
+                node.action, there.track, there.index if hop else here.index, there.index, node.begin_us, node.time_us
+            )
         )
         if node.begin_us > before.time_us:
             legs.append(RouteLeg(LegAction.STAND, here.track, here.index, here.index, before.time_us, node.begin_us))

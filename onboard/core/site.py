@@ -16,7 +16,7 @@ class Segment(NamedTuple):
     """One body slot: index 1 to n on a track; the number on the wire is ``track << 8 | index``."""
 
     track: int
-    index: int
+    index: int  # type: ignore[assignment]  # the position number hides tuple.index on purpose
 
     @property
     def number(self) -> int:
@@ -31,7 +31,7 @@ class Station(NamedTuple):
     """A place or compartment beside a segment: 16-bit number ``track << 8 | side << 7 | index``, index 1 to 127."""
 
     track: int
-    index: int
+    index: int  # type: ignore[assignment]  # the position number hides tuple.index on purpose
     side: Side
 
     @property

@@ -32,7 +32,7 @@ class Part(NamedTuple):
 
 
 class _Field(NamedTuple):
-    """Where a signal is and what it may hold; ``convert`` maps a raw value to the message's, None for a plain number."""
+    """Where a signal is and what it may hold; ``enum`` maps a value to the message's own, None for a plain number."""
 
     name: str
     shift: int

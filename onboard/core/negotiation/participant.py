@@ -13,7 +13,15 @@ from onboard.core.codes import CallResult, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Bid, CallForProposals
 from onboard.core.negotiation.bidding import beats, delay_us
-from onboard.core.negotiation.events import Awarded, CallKey, Estimator, NegotiationEvent, PreAssigned, Proposal, Released
+from onboard.core.negotiation.events import (
+    Awarded,
+    CallKey,
+    Estimator,
+    NegotiationEvent,
+    PreAssigned,
+    Proposal,
+    Released,
+)
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Timing
 

@@ -108,9 +108,7 @@ class ShuttleWork:
         return [
             Record({**entry, "station": self.work.station.number, "car": self.work.car.number}),
             Actuate(
-                ShuttleOrder(
-                    self.fleet.node_id, self.sequence, order, self.work.station.side, self.work.wheelbase_mm
-                )
+                ShuttleOrder(self.fleet.node_id, self.sequence, order, self.work.station.side, self.work.wheelbase_mm)
             ),
         ]
 

@@ -154,4 +154,3 @@ def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: l
         for step in steps
     )
     return Itinerary(sender, version, grade, stamp, legs)
-

@@ -11,7 +11,6 @@ from onboard.core.codes import (
     MachineState,
     Reason,
     TaskPhase,
-    TokenKind,
 )
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
@@ -162,7 +161,7 @@ class Robot:
     # --- steps -------------------------------------------------------------------------------------------------
 
     def _admit(self, here: Segment, now_us: int) -> list[Effect]:
-        """First position after power-up: stand here, tell everybody, ask for the segment's token where it is not mine."""
+        """First position after power-up: stand here and tell everybody."""
         self.program.standing = here
         self.program.replace([], Stamp(to_bus_ms(now_us), self.fleet.node_id, 0))
         self.carriage.go(here)
@@ -243,4 +242,3 @@ class Robot:
         if work is not None:
             effects.append(Send(TaskReport(self.fleet.node_id, work.call.task, TaskPhase.FORFEITED, 0, reason)))
         return effects
-

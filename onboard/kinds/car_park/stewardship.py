@@ -1,4 +1,4 @@
-"""What a fixed machine does as steward of a track: grant segments in passing order, keep stored cars and their places."""
+"""A fixed machine as steward of a track: grants segments in passing order, keeps stored cars and their places."""
 
 from dataclasses import dataclass, field
 

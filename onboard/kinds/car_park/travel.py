@@ -103,7 +103,7 @@ class Carriage:
         if reach != self.target:
             self.target = reach
             self.sequence = successor(self.sequence, 8)
-            return effects + [self._order(now_us)]
+            return [*effects, self._order(now_us)]
         if self.refresh_at_us is not None and self.refresh_at_us <= now_us:
             effects.append(self._order(now_us))
         return effects + self._give_back(now_us)
@@ -171,9 +171,7 @@ class Carriage:
         assert self.target is not None
         self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
         position_mm = self.fleet.site.position_mm(self.target)
-        return Actuate(
-            DriveOrder(self.fleet.node_id, self.sequence, position_mm, self.fleet.site.carrier.speed_mm_s)
-        )
+        return Actuate(DriveOrder(self.fleet.node_id, self.sequence, position_mm, self.fleet.site.carrier.speed_mm_s))
 
     def _give_back(self, now_us: int) -> list[Effect]:
         """Return segments that the body has left and does not need again before its goal."""

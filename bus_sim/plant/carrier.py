@@ -1,0 +1,209 @@
+"""The carrier's drive: moves along its track only while fresh orders arrive, and brakes by itself otherwise."""
+
+from collections.abc import Callable
+
+from bus_sim.plant.link import DeviceLink
+from bus_sim.plant.motion import braking, driving, standing
+from bus_sim.plant.timers import Timer, Timers
+from bus_sim.plant.world import Change, RobotBody, World
+from onboard.core.codes import DriveMode
+from onboard.core.messages import DriveOrder, DriveState, Message
+from onboard.core.serial import is_newer
+from onboard.core.site import Site
+
+#: A moving drive that has heard no order for this long brakes to a stand (dbc/device.dbc).
+DRIVE_TIMEOUT_US = 500_000
+#: DriveState is repeated this often while the carrier moves (dbc/device.dbc).
+MOVING_REPEAT_US = 1_000_000
+#: DriveState is repeated this often while it stands (dbc/device.dbc).
+IDLE_REPEAT_US = 10_000_000
+#: A target nearer than this is where the carrier stands, mm.
+AT_TARGET_MM = 0.5
+
+
+class Carrier:
+    """Drive, position sensor and mark sensor of one robot's carrier.
+
+    ``shuttle_home`` is the home switch wired to the drive (row P32): while it is open the drive refuses to move, and
+    brakes where it moves, in mode FAULT until the switch closes. ``fault`` says why in words. An order is taken up if
+    its sequence is the last one's or newer; any sequence counts after ``DRIVE_TIMEOUT_US`` without orders, as that of
+    a controller that started again. Repeating an order keeps it fresh. A DriveState follows on every change of mode, on
+    passing the centre of a segment, and slowly otherwise.
+    """
+
+    def __init__(
+        self,
+        node_id: int,
+        site: Site,
+        world: World,
+        timers: Timers,
+        link: DeviceLink,
+        shuttle_home: Callable[[], bool],
+    ) -> None:
+        self.node_id = node_id
+        self.fault = ""
+        self.stale_orders = 0
+        self._site = site
+        self._world = world
+        self._timers = timers
+        self._link = link
+        self._shuttle_home = shuttle_home
+        self._order: DriveOrder | None = None
+        self._is_braking = False
+        self._fresh_until_us = 0
+        self._watchdog: Timer | None = None
+        self._timer: Timer | None = None
+        self._moving = False
+        self._repeat_at_us = 0
+        link.subscribe(self._on_message)
+        world.watch(self._on_change)
+
+    def start(self) -> None:
+        """Power on: say where the carrier is, then again slowly."""
+        self._say(self._timers.now_us())
+
+    @property
+    def mode(self) -> DriveMode:
+        """As told in DriveState."""
+        if self.fault:
+            return DriveMode.FAULT
+        if not self._moving:
+            return DriveMode.STANDING
+        return DriveMode.BRAKING if self._is_braking else DriveMode.MOVING
+
+    def state(self, now_us: int) -> DriveState:
+        """What the sensors say now."""
+        position_mm, speed_mm_s = self._body.motion.at(now_us)
+        at_mark = self._world.standing_segment(self.node_id) is not None
+        sequence = self._order.sequence if self._order is not None else 0
+        return DriveState(self.node_id, sequence, round(position_mm), round(speed_mm_s), self.mode, at_mark)
+
+    @property
+    def _body(self) -> RobotBody:
+        return self._world.robots[self.node_id]
+
+    # --- orders ------------------------------------------------------------------------------------------------
+
+    def _on_message(self, message: Message, _: int) -> None:
+        if isinstance(message, DriveOrder):
+            self._on_order(message, self._timers.now_us())
+
+    def _on_order(self, order: DriveOrder, now_us: int) -> None:
+        if self._is_stale(order, now_us):
+            self.stale_orders += 1
+            return
+        self._fresh_until_us = now_us + DRIVE_TIMEOUT_US
+        is_repeat = order == self._order
+        self._order = order
+        refusal = self._refusal(order)
+        if refusal:
+            self._fail(refusal, now_us)
+        elif not (is_repeat and self.mode is DriveMode.MOVING):
+            self._carry_out(order, now_us)
+
+    def _is_stale(self, order: DriveOrder, now_us: int) -> bool:
+        if self._order is None or now_us >= self._fresh_until_us:
+            return False
+        return order.sequence != self._order.sequence and not is_newer(order.sequence, self._order.sequence, 8)
+
+    def _refusal(self, order: DriveOrder) -> str:
+        if not self._shuttle_home():
+            return "the shuttle is out"
+        track = self._site.tracks[self._body.track]
+        if not 0 <= order.target_mm <= (track.length - 1) * track.pitch_mm:
+            return f"target {order.target_mm} mm is beyond the end of the track"
+        return ""
+
+    def _carry_out(self, order: DriveOrder, now_us: int) -> None:
+        before = self.mode
+        self.fault = ""
+        position_mm, speed_mm_s = self._body.motion.at(now_us)
+        axis = self._site.carrier
+        limit_mm_s = min(order.speed_limit_mm_s, axis.speed_mm_s)
+        if limit_mm_s <= 0:
+            self._brake(now_us)
+        elif speed_mm_s or abs(order.target_mm - position_mm) > AT_TARGET_MM:
+            motion = driving(position_mm, speed_mm_s, order.target_mm, limit_mm_s, axis.acceleration_mm_s2, now_us)
+            self._moving, self._is_braking = True, False
+            self._world.move_carrier(self.node_id, motion)
+            self._watch(now_us)
+        if self.mode is not before:
+            self._say(now_us)
+        else:
+            self._schedule(now_us)
+
+    # --- stopping ----------------------------------------------------------------------------------------------
+
+    def _watch(self, now_us: int) -> None:
+        """One timer at a time, moved on while orders keep coming."""
+        if self._watchdog is None:
+            self._watchdog = self._timers.call_at(max(now_us, self._fresh_until_us), self._on_watchdog)
+
+    def _on_watchdog(self) -> None:
+        self._watchdog = None
+        now_us = self._timers.now_us()
+        if not self._moving or self._is_braking:
+            return
+        if now_us < self._fresh_until_us:
+            self._watch(now_us)
+            return
+        self._brake(now_us)
+        self._say(now_us)
+
+    def _brake(self, now_us: int) -> None:
+        if not self._moving or self._is_braking:
+            return
+        position_mm, speed_mm_s = self._body.motion.at(now_us)
+        self._is_braking = True
+        motion = braking(position_mm, speed_mm_s, self._site.carrier.acceleration_mm_s2, now_us)
+        self._world.move_carrier(self.node_id, motion)
+
+    def _fail(self, reason: str, now_us: int) -> None:
+        if self.fault == reason:
+            return
+        self.fault = reason
+        self._brake(now_us)
+        self._say(now_us)
+
+    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
+        """The home switch: opening stops a moving drive, closing ends the fault that it caused."""
+        if change is not Change.SHUTTLE or node_id != self.node_id:
+            return
+        if not self._shuttle_home():
+            if self._moving:
+                self._fail("the shuttle is out", now_us)
+        elif self.fault:
+            self.fault = ""
+            self._say(now_us)
+
+    # --- what is said ------------------------------------------------------------------------------------------
+
+    def _on_timer(self) -> None:
+        self._timer = None
+        now_us = self._timers.now_us()
+        motion = self._body.motion
+        if self._moving and now_us >= motion.end_us:
+            self._moving = self._is_braking = False
+            self._world.move_carrier(self.node_id, standing(motion.final_mm, now_us))
+        self._say(now_us)
+
+    def _say(self, now_us: int) -> None:
+        self._link.send(self.state(now_us))
+        self._repeat_at_us = now_us + (MOVING_REPEAT_US if self._moving else IDLE_REPEAT_US)
+        self._schedule(now_us)
+
+    def _schedule(self, now_us: int) -> None:
+        """Set the timer for the next thing to be seen: a mark, the end of the motion, or the slow repeat."""
+        if self._timer is not None:
+            self._timer.cancel()
+        when_us = self._repeat_at_us
+        if self._moving:
+            when_us = min(when_us, self._body.motion.end_us, self._next_mark_us(now_us))
+        self._timer = self._timers.call_at(when_us, self._on_timer)
+
+    def _next_mark_us(self, now_us: int) -> int:
+        motion = self._body.motion
+        pitch_mm = self._site.tracks[self._body.track].pitch_mm
+        nearest = round(motion.at(now_us)[0] / pitch_mm)
+        reached = [motion.next_reach_us(mark * pitch_mm, now_us) for mark in (nearest - 1, nearest, nearest + 1)]
+        return min((time for time in reached if time is not None), default=motion.end_us)

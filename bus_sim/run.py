@@ -1,0 +1,179 @@
+"""One run of a site in one process: bus, plant, customers and all controllers on one loop, in virtual time or paced.
+
+Same seed, same options: the same candump log, byte for byte.
+"""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from onboard.trace.candump import CandumpWriter
+
+from bus_sim.can.faults import Fault
+from bus_sim.can.medium import Medium
+from bus_sim.journal import SimulatedJournal
+from bus_sim.plant.plant import Plant
+from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.controller.shell import Controller, Ports
+from onboard.core.frame import Frame
+from onboard.core.holon import Holon
+from onboard.core.messages import Message
+from onboard.core.site import Machine, Site
+from onboard.kinds.registry import factory_for
+from onboard.ports.bus import Bus
+from onboard.trace.view import SiteView
+from onboard.wire.codec import device_codec, fleet_codec
+from onboard.wire.decoder import Decoder
+
+#: The fleet bus in a log and on the served socket.
+FLEET = "fleet"
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What a run is made of. ``epoch_us`` is the wall time (us since 1970) of loop time 0, for the log's stamps."""
+
+    seed: int = 1
+    epoch_us: int = 0
+    trace: Path | None = None
+    trace_devices: bool = False
+    pace: float | None = None
+    faults: tuple[Fault, ...] = ()
+    without: frozenset[str] = frozenset()
+    silent_log: bool = False
+
+
+class EventLog:
+    """Telemetry of all machines: kept for people, never read by a machine."""
+
+    def __init__(self, limit: int = 10_000) -> None:
+        self.lines: list[tuple[int, str, str]] = []
+        self._limit = limit
+
+    def event(self, time_us: int, source: str, text: str) -> None:
+        """Keep one line; the oldest goes when there are too many."""
+        self.lines.append((time_us, source, text))
+        if len(self.lines) > self._limit:
+            del self.lines[0]
+
+
+class NoWatchdog:
+    """A supervisor that looks away."""
+
+    def ready(self) -> None:
+        """Nothing to tell."""
+
+    def alive(self) -> None:
+        """Nothing to tell."""
+
+    def status(self, text: str) -> None:
+        """Nothing to tell."""
+
+
+@dataclass
+class Simulation:
+    """A site that can be run. Build it on its own loop with ``build``; then ``run_until``."""
+
+    site: Site
+    options: RunOptions
+    loop: VirtualTimeLoop
+    fleet: Medium
+    devices: dict[int, Medium]
+    plant: Plant
+    view: SiteView
+    log: EventLog = field(default_factory=EventLog)
+    controllers: dict[int, Controller] = field(default_factory=dict)
+    journals: dict[int, SimulatedJournal] = field(default_factory=dict)
+    writer: CandumpWriter | None = None
+
+    def start(self) -> None:
+        """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop."""
+        self._tap()
+        self.plant.start()
+        for machine in self.site.machines.values():
+            if machine.name not in self.options.without:
+                self.start_controller(machine)
+
+    def start_controller(self, machine: Machine) -> None:
+        """Power up one machine's controller; a second time means a restart, with the same journal."""
+        journal = self.journals.setdefault(machine.node_id, SimulatedJournal())
+        entries = journal.replay()
+        boots = sum(1 for entry in entries if entry.get("record") == "boot")
+        holon = Holon(self.site, machine, factory_for(machine.kind), boot=boots % 255 + 1, entries=entries)
+        ports = Ports(
+            self.fleet.attach(machine.name, machine.node_id),
+            self.devices[machine.node_id].attach(machine.name, machine.node_id),
+            journal,
+            self.log,
+            NoWatchdog(),
+        )
+        controller = Controller(holon, ports, fleet_codec(), device_codec())
+        self.controllers[machine.node_id] = controller
+        controller.start()
+
+    def join(self, channel: str, name: str) -> Bus | None:
+        """A further node on a bus, for a client from outside: the fleet bus, or a machine's device bus by its name."""
+        if channel == FLEET:
+            return self.fleet.attach(name, None)
+        for machine in self.site.machines.values():
+            if machine.name == channel:
+                return self.devices[machine.node_id].attach(name, None)
+        return None
+
+    def close(self) -> None:
+        """Finish the log."""
+        if self.writer is not None:
+            self.writer.close()
+
+    def _tap(self) -> None:
+        if self.options.trace is not None:
+            self.writer = CandumpWriter(self.options.trace)
+        decoder = Decoder(fleet_codec())
+
+        def on_fleet(frame: Frame, time_us: int) -> None:
+            if self.writer is not None:
+                self.writer.write(self.options.epoch_us + time_us, FLEET, frame)
+            message: Message | None = decoder.feed(frame, time_us)
+            if message is not None:
+                self.view.feed(message, time_us)
+
+        self.fleet.tap(on_fleet)
+        if self.writer is not None and self.options.trace_devices:
+            for node_id, medium in self.devices.items():
+                medium.tap(self._device_tap(self.site.machines[node_id].name))
+
+    def _device_tap(self, name: str) -> Callable[[Frame, int], None]:
+        def on_device(frame: Frame, time_us: int) -> None:
+            assert self.writer is not None
+            self.writer.write(self.options.epoch_us + time_us, name, frame)
+
+        return on_device
+
+
+def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
+    """All parts of a run, connected but not switched on."""
+    fleet = Medium(loop, site.bitrate, faults=options.faults)
+    devices = {node_id: Medium(loop, site.bitrate) for node_id in site.machines}
+    plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()})
+    return Simulation(site, options, loop, fleet, devices, plant, SiteView(site))
+
+
+async def run_until(
+    simulation: Simulation,
+    done: Callable[[], bool],
+    limit_us: int,
+    step_us: int,
+    show: Callable[[], None] | None = None,
+) -> bool:
+    """Let time pass in steps of ``step_us`` until ``done`` or ``limit_us``; True where it was done.
+
+    ``show`` is called after each step.
+    """
+    while not done():
+        if simulation.loop.now_us >= limit_us:
+            return False
+        await asyncio.sleep(step_us / 1_000_000)
+        if show is not None:
+            show()
+    return True
