@@ -155,7 +155,7 @@ def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
     """All parts of a run, connected but not switched on."""
     fleet = Medium(loop, site.bitrate, faults=options.faults)
     devices = {node_id: Medium(loop, site.bitrate) for node_id in site.machines}
-    plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()})
+    plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()}, options.seed)
     return Simulation(site, options, loop, fleet, devices, plant, SiteView(site))
 
 

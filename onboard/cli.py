@@ -65,9 +65,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     if args.check:
-        print(
-            f"{args.machine}: {config.machine.name} of site {config.site.name} (digest {config.site.digest:04X}): in order"
-        )
+        site = config.site
+        print(f"{args.machine}: {config.machine.name} of site {site.name} (digest {site.digest:04X}): in order")
         return 0
     try:
         return asyncio.run(run(config, fleet_settings, args.journal or config.journal))
@@ -88,8 +87,9 @@ async def run(config: MachineConfig, fleet_settings: BusSettings, journal_direct
     )
     fleet_bus = await open_bus(fleet_settings)
     device_bus: Bus = fleet_bus
-    if config.device_bus != fleet_settings:
-        device_bus = await open_bus(config.device_bus)
+    device_settings = BusSettings.of(config.device_bus)
+    if device_settings != fleet_settings:
+        device_bus = await open_bus(device_settings)
     watchdog = SystemdWatchdog()
     ports = Ports(fleet_bus, device_bus, journal, ConsoleTelemetry(), watchdog)
     controller = Controller(holon, ports, fleet_codec(), device_codec())

@@ -13,10 +13,8 @@ from onboard.core.site import Site
 
 #: A moving drive that has heard no order for this long brakes to a stand (dbc/device.dbc).
 DRIVE_TIMEOUT_US = 500_000
-#: DriveState is repeated this often while the carrier moves (dbc/device.dbc).
-MOVING_REPEAT_US = 1_000_000
-#: DriveState is repeated this often while it stands (dbc/device.dbc).
-IDLE_REPEAT_US = 10_000_000
+#: DriveState is repeated at least this often (dbc/device.dbc).
+REPEAT_US = 10_000_000
 #: A target nearer than this is where the carrier stands, mm.
 AT_TARGET_MM = 0.5
 
@@ -28,7 +26,7 @@ class Carrier:
     brakes where it moves, in mode FAULT until the switch closes. ``fault`` says why in words. An order is taken up if
     its sequence is the last one's or newer; any sequence counts after ``DRIVE_TIMEOUT_US`` without orders, as that of
     a controller that started again. Repeating an order keeps it fresh. A DriveState follows on every change of mode, on
-    passing the centre of a segment, and slowly otherwise.
+    passing the middle or the border of a segment, and slowly otherwise.
     """
 
     def __init__(
@@ -74,7 +72,7 @@ class Carrier:
     def state(self, now_us: int) -> DriveState:
         """What the sensors say now."""
         position_mm, speed_mm_s = self._body.motion.at(now_us)
-        at_mark = self._world.standing_segment(self.node_id) is not None
+        at_mark = self._world.at_mark(self.node_id)
         sequence = self._order.sequence if self._order is not None else 0
         return DriveState(self.node_id, sequence, round(position_mm), round(speed_mm_s), self.mode, at_mark)
 
@@ -189,11 +187,11 @@ class Carrier:
 
     def _say(self, now_us: int) -> None:
         self._link.send(self.state(now_us))
-        self._repeat_at_us = now_us + (MOVING_REPEAT_US if self._moving else IDLE_REPEAT_US)
+        self._repeat_at_us = now_us + REPEAT_US
         self._schedule(now_us)
 
     def _schedule(self, now_us: int) -> None:
-        """Set the timer for the next thing to be seen: a mark, the end of the motion, or the slow repeat."""
+        """Set the timer for the next thing to be seen: a middle or border, the end of the motion, the slow repeat."""
         if self._timer is not None:
             self._timer.cancel()
         when_us = self._repeat_at_us
@@ -203,7 +201,7 @@ class Carrier:
 
     def _next_mark_us(self, now_us: int) -> int:
         motion = self._body.motion
-        pitch_mm = self._site.tracks[self._body.track].pitch_mm
-        nearest = round(motion.at(now_us)[0] / pitch_mm)
-        reached = [motion.next_reach_us(mark * pitch_mm, now_us) for mark in (nearest - 1, nearest, nearest + 1)]
+        step_mm = self._site.tracks[self._body.track].pitch_mm / 2
+        nearest = round(motion.at(now_us)[0] / step_mm)
+        reached = [motion.next_reach_us(mark * step_mm, now_us) for mark in (nearest - 1, nearest, nearest + 1)]
         return min((time for time in reached if time is not None), default=motion.end_us)

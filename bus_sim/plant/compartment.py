@@ -9,7 +9,7 @@ from collections.abc import Callable
 from bus_sim.plant.bodies import CarBody
 from bus_sim.plant.door import Door
 from bus_sim.plant.link import DeviceLink
-from bus_sim.plant.timers import Timer, Timers
+from bus_sim.plant.timers import Timers
 from bus_sim.plant.world import BayBody, Change, World
 from onboard.core.codes import DeskInput, DeskText, DoorName, DoorPosition, LightColour
 from onboard.core.messages import (
@@ -26,7 +26,10 @@ from onboard.core.serial import successor
 from onboard.core.site import Site
 
 #: DoorState and BayState are repeated this often where nothing changes (dbc/device.dbc).
-IDLE_REPEAT_US = 10_000_000
+REPEAT_US = 10_000_000
+#: DeskEvent is said so many times, this far apart, us, as one lost frame must not lose a customer (dbc/device.dbc).
+DESK_TIMES = 3
+DESK_GAP_US = 50_000
 #: No car: the reference on the desk and in DeskEvent of the key.
 NO_CAR = Reference(0, 0)
 
@@ -50,7 +53,6 @@ class Compartment:
         self._desk_sequence = 0
         self._desk_order: DeskOrder | None = None
         self._told: BayState | None = None
-        self._repeat_timer: Timer | None = None
         self._watchers: list[Callable[[], None]] = []
         self._desk_watchers: list[Callable[[DeskText, Reference], None]] = []
         travel_us = site.timing.door_us
@@ -126,7 +128,10 @@ class Compartment:
 
     def _desk_event(self, event: DeskInput, car: Reference) -> None:
         self._desk_sequence = successor(self._desk_sequence, 8)
-        self._link.send(DeskEvent(self.node_id, self._desk_sequence, event, car))
+        said = DeskEvent(self.node_id, self._desk_sequence, event, car)
+        self._link.send(said)
+        for time in range(1, DESK_TIMES):
+            self._timers.call_at(self._timers.now_us() + time * DESK_GAP_US, lambda: self._link.send(said))
 
     # --- orders ------------------------------------------------------------------------------------------------
 
@@ -162,12 +167,10 @@ class Compartment:
         """What load cells, measuring curtain and presence sensors see now."""
         car = self.car
         in_front = self._world.carrier_in_front(self.body.station)
-        person = self.body.persons > 0
+        person = self.body.persons > 0 or self.body.crossing
         if car is None:
             return BayState(self.node_id, 0, 0, 0, 0, person, in_front)
-        return BayState(
-            self.node_id, car.mass_kg, car.length_mm, car.height_mm, car.wheelbase_mm, person, in_front
-        )
+        return BayState(self.node_id, car.mass_kg, car.length_mm, car.height_mm, car.wheelbase_mm, person, in_front)
 
     def _is_locked(self, door: DoorName) -> bool:
         return self.body.doors[door] is DoorPosition.LOCKED
@@ -203,4 +206,4 @@ class Compartment:
     def _say_all(self) -> None:
         self._say_doors()
         self._say_bay()
-        self._repeat_timer = self._timers.call_at(self._timers.now_us() + IDLE_REPEAT_US, self._say_all)
+        self._timers.call_at(self._timers.now_us() + REPEAT_US, self._say_all)

@@ -1,4 +1,4 @@
-"""One powered door with a bolt: travels at constant speed, re-opens for whatever stands in it, ends closing in LOCKED."""
+"""One powered door with a bolt: constant speed, opens again for whatever stands in it, ends closing in LOCKED."""
 
 from collections.abc import Callable
 
@@ -51,6 +51,7 @@ class Door:
         self._is_clear = is_clear
         self._on_position = on_position
         self._ordered = DoorAction.CLOSE
+        self._was_clear = True
         self._timer: Timer | None = None
         #: Width left open when the present movement began, as travel time, us, and when it began.
         self._width_us = 0
@@ -70,11 +71,11 @@ class Door:
 
     def way_changed(self) -> None:
         """Something came into the way or left it."""
-        if not self._is_clear():
+        was_clear, self._was_clear = self._was_clear, self._is_clear()
+        if not self._was_clear:
             if self.position is DoorPosition.CLOSING:
                 self._enter(DoorPosition.OPENING)
-            return
-        if self.position is DoorPosition.OPEN and self._ordered is DoorAction.CLOSE:
+        elif not was_clear and self.position is DoorPosition.OPEN and self._ordered is DoorAction.CLOSE:
             self._retry_later()
 
     def force(self) -> None:

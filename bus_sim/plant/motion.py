@@ -70,7 +70,8 @@ class Motion:
 
     def next_reach_us(self, position_mm: float, after_us: int) -> int | None:
         """First whole microsecond after ``after_us`` at which a position has been reached or passed, None if never."""
-        after = (after_us - self.start_us) / 1e6
+        # Half a microsecond later, lest rounding finds the passage that was just told once more.
+        after = (after_us - self.start_us + 0.5) / 1e6
         for phase in self.phases:
             for s in _roots(phase.a / 2, phase.v, phase.x - position_mm):
                 if 0 <= s <= phase.duration and phase.begin + s > after:

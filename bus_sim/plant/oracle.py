@@ -6,6 +6,7 @@ A run with any violation has failed.
 
 from collections.abc import Iterator
 from enum import Enum
+from itertools import pairwise
 from typing import NamedTuple
 
 from bus_sim.plant.bodies import Aboard, Location
@@ -61,13 +62,18 @@ class Oracle:
         self.violations: list[Violation] = []
         self._spans: dict[int, Span] = {}
         self._persons: dict[int, int] = {node: bay.persons for node, bay in world.bays.items()}
-        self._where: dict[str, Location] = dict(world.where)
+        self._where: dict[str, Location] = {}
+        self.take_stock()
         self._present: set[tuple[Rule, str]] = set()
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
             self._spans[node_id] = Span(robot.track, robot.motion, now_us)
         self._judge_pairs(now_us)
         world.watch(self._on_change)
+
+    def take_stock(self) -> None:
+        """Take the cars as they are now for the stock that the run began with."""
+        self._where = dict(self.world.where)
 
     def report(self, rule: Rule, text: str) -> None:
         """Note a violation seen by someone else in the world (a customer before another's car)."""
@@ -156,7 +162,7 @@ class Oracle:
         for name in self._where:
             if name not in self.world.where:
                 self._once(Rule.CARS_CONSERVED, f"{name} is nowhere")
-        self._where = dict(self.world.where)
+        self.take_stock()
 
     def _is_a_step(self, before: Location, after: Location) -> bool:
         """In from the street into a bay, out of a bay to the street, onto or off the shuttle that stands opposite."""
@@ -213,7 +219,7 @@ def least_distance(one: Motion, two: Motion, from_us: int, to_us: int) -> tuple[
         times.update(t + motion.start_us / 1e6 for t in motion.turning_points())
     inside = sorted(t for t in times if lo <= t <= hi)
     candidates = list(inside)
-    for begin, end in zip(inside, inside[1:], strict=False):
+    for begin, end in pairwise(inside):
         candidates.extend(_stationary_points(one, two, begin, end))
     best = min(candidates, key=lambda t: (abs(_difference(one, two, t)[0]), t))
     return abs(_difference(one, two, best)[0]), round(best * 1e6)
@@ -226,7 +232,7 @@ def _difference(one: Motion, two: Motion, t: float) -> tuple[float, float, float
 
 
 def _stationary_points(one: Motion, two: Motion, begin: float, end: float) -> Iterator[float]:
-    """Times inside a smooth stretch at which the distance is least: relative standstill, or the bodies' centres meet."""
+    """Times inside a smooth stretch at which the distance is least: relative standstill, or the centres meet."""
     # Taken just inside, where the accelerations are those of the stretch whatever the rounding of its ends.
     middle = (begin + end) / 2
     _, v, a = _difference(one, two, middle)
@@ -234,7 +240,7 @@ def _stationary_points(one: Motion, two: Motion, begin: float, end: float) -> It
     if a and begin < middle - v / a < end:
         points.insert(1, middle - v / a)
         yield points[1]
-    for low, high in zip(points, points[1:], strict=False):
+    for low, high in pairwise(points):
         if _difference(one, two, low)[0] * _difference(one, two, high)[0] < 0:
             yield _meeting(one, two, low, high)
 

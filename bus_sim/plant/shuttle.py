@@ -1,4 +1,4 @@
-"""The telescopic shuttle: goes under a car, grips it by its wheels, and brings it aboard or leaves it (rows P32, P33)."""
+"""The telescopic shuttle: goes under a car, grips it by its wheels, takes it aboard or leaves it (rows P32, P33)."""
 
 from bus_sim.plant.link import DeviceLink
 from bus_sim.plant.motion import driving
@@ -10,10 +10,8 @@ from onboard.core.site import Site, Station
 
 #: The grippers hold a car whose wheelbase differs from the shuttle's by at most this, mm (ours).
 WHEELBASE_TOLERANCE_MM = 50
-#: ShuttleState is repeated this often while the shuttle moves (dbc/device.dbc).
-MOVING_REPEAT_US = 1_000_000
-#: ShuttleState is repeated this often while it rests (dbc/device.dbc).
-IDLE_REPEAT_US = 10_000_000
+#: ShuttleState is repeated at least this often (dbc/device.dbc).
+REPEAT_US = 10_000_000
 
 #: In which modes each action is carried out; in MOVING, GRIPPING and RELEASING it is the present action that may not be
 #: cut short, and the order is passed over, otherwise the refusal is a fault. RETRACT always brings the shuttle home.
@@ -186,5 +184,4 @@ class Shuttle:
         self._link.send(self.state(now_us))
         if self._repeat_timer is not None:
             self._repeat_timer.cancel()
-        period_us = MOVING_REPEAT_US if self.mode in BUSY else IDLE_REPEAT_US
-        self._repeat_timer = self._timers.call_at(now_us + period_us, self._say)
+        self._repeat_timer = self._timers.call_at(now_us + REPEAT_US, self._say)

@@ -96,6 +96,13 @@ class World:
         """Node-ID of the compartment whose bay this station is."""
         return next((node for node, bay in self.bays.items() if bay.station == station), None)
 
+    def at_mark(self, node_id: int) -> bool:
+        """The fine sensor: whether a carrier's centre is opposite that of a segment, moving or not (row P34)."""
+        robot = self.robots[node_id]
+        pitch_mm = self.site.tracks[robot.track].pitch_mm
+        position_mm = robot.motion.at(self.timers.now_us())[0]
+        return abs(position_mm - round(position_mm / pitch_mm) * pitch_mm) <= MARK_TOLERANCE_MM
+
     def standing_segment(self, node_id: int) -> Segment | None:
         """The segment at whose centre a robot's carrier stands still, within the fine sensor's tolerance."""
         robot = self.robots[node_id]

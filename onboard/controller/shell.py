@@ -41,7 +41,7 @@ class Controller:
     def __init__(self, holon: Holon, ports: Ports, fleet: Codec, device: Codec) -> None:
         self.holon = holon
         self.ports = ports
-        self.drops: Counter[Reason] = Counter()
+        self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
         self._codecs = (fleet, device)
         self._decoders = (Decoder(fleet), Decoder(device))
@@ -72,6 +72,14 @@ class Controller:
             await self.ports.device_bus.close()
         await self.ports.journal.close()
 
+    def wire_drops(self) -> Counter[Reason]:
+        """Frames of both buses that came to nothing below the holon, by reason."""
+        return self._decoders[0].drops + self._decoders[1].drops + self._queue_drops
+
+    def all_drops(self) -> Counter[Reason]:
+        """All input that this machine dropped, by reason."""
+        return self.wire_drops() + self.holon.drops
+
     def _now_us(self) -> int:
         return round(self._loop.time() * 1_000_000)
 
@@ -90,7 +98,7 @@ class Controller:
         elif len(self._inbox) < INBOX_LIMIT:
             self._inbox.append((handle, frame, time_us))
         else:
-            self.drops[Reason.QUEUE_FULL] += 1
+            self._queue_drops[Reason.QUEUE_FULL] += 1
 
     def _fleet_frame(self, frame: Frame, time_us: int) -> list[Effect]:
         message = self._decoders[0].feed(frame, time_us)
@@ -107,6 +115,7 @@ class Controller:
         self._timer_us = None
         if self._writing is not None:
             return
+        self.holon.wire_drops = self.wire_drops()
         self._outbox.extend(self.holon.wake(self._now_us()))
         self.ports.watchdog.alive()
         self._carry_out()

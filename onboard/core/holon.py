@@ -1,7 +1,7 @@
 """The holon: a value that eats messages and timers and returns effects. It owns no task, socket or clock.
 
-``receive`` (fleet bus), ``sense`` (device bus) and ``wake`` take the machine's loop time in us; ``next_wake`` tells when
-to call ``wake`` again. Inside, all times are bus time. You can drive one from a Python prompt.
+``receive`` (fleet bus), ``sense`` (device bus) and ``wake`` take the machine's loop time in us; ``next_wake`` tells
+when to call ``wake`` again. Inside, all times are bus time. You can drive one from a Python prompt.
 """
 
 from collections import Counter
@@ -59,7 +59,10 @@ class Holon:
         self.node_id = machine.node_id
         self.boot = boot
         self.halted: str | None = None
+        #: Input dropped here, and below by the shell's decoders and queues, by reason.
         self.drops: Counter[Reason] = Counter()
+        self.wire_drops: Counter[Reason] = Counter()
+        self._told_drops: Counter[Reason] = Counter()
         self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
         self.tokens.replay(entries)
@@ -142,10 +145,6 @@ class Holon:
         ]
         due = [time for time in times if time is not None]
         return self.clock.local_us(min(due)) if due and self.halted is None else None
-
-    def drop(self, reason: Reason) -> None:
-        """Count wire input that the layer below dropped."""
-        self.drops[reason] += 1
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -236,6 +235,7 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             effects.append(Send(self._heartbeat()))
+            effects += self._diagnostics()
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
             effects.append(Send(BusTime(self.node_id, now_us)))
@@ -274,9 +274,12 @@ class Holon:
         self.halted = why
         return [Halt(why)]
 
-    def diagnostics(self) -> list[Effect]:
-        """One message per reason for which wire input was dropped, for a bus that shows why (design, section 7)."""
-        return [Send(Diagnostic(self.node_id, reason, count)) for reason, count in sorted(self.drops.items())]
+    def _diagnostics(self) -> list[Effect]:
+        """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""
+        totals = self.drops + self.wire_drops
+        grown = [reason for reason in sorted(totals) if totals[reason] != self._told_drops[reason]]
+        self._told_drops = totals
+        return [Send(Diagnostic(self.node_id, reason, totals[reason] & 0xFFFFFFFF)) for reason in grown]
 
 
 def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:

@@ -169,7 +169,7 @@ class Leg(NamedTuple):
 
 
 class Stamp(NamedTuple):
-    """Rank of a firm itinerary: lower keeps its windows. Order: award time (bus ms), initiator, low byte of the call."""
+    """Rank of a firm itinerary: lower keeps its windows. Order: award (bus ms), initiator, low byte of the call."""
 
     award_ms: int
     initiator: int

@@ -1,4 +1,4 @@
-"""Which segments a body occupies when, from an itinerary and the site alone: every machine computes the same windows."""
+"""Which segments a body occupies when, from itinerary and site alone: every machine computes the same windows."""
 
 from functools import lru_cache
 from typing import NamedTuple

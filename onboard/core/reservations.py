@@ -51,7 +51,7 @@ class Reservations:
                 del self._windows[segment]
 
     def safe_intervals(self, segment: Segment, owner: int, from_us: int) -> list[Interval]:
-        """Gaps that the windows of all nodes but ``owner`` leave from ``from_us`` on, in order; the last may be endless."""
+        """Gaps that the windows of all but ``owner`` leave from ``from_us`` on, in order; the last may be endless."""
         gaps: list[Interval] = []
         free_us = from_us
         for start_us, end_us, holder in self._windows.get(segment, ()):

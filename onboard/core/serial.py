@@ -5,7 +5,7 @@ BUS_MS_MODULUS = 1 << 32
 
 
 def is_newer(candidate: int, reference: int, bits: int) -> bool:
-    """Whether ``candidate`` comes after ``reference`` among counters of ``bits`` bits; False where equal or opposite."""
+    """Whether ``candidate`` comes after ``reference``, counters of ``bits`` bits; False where equal or opposite."""
     distance = (candidate - reference) & ((1 << bits) - 1)
     return 0 < distance < 1 << (bits - 1)
 

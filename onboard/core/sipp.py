@@ -71,7 +71,7 @@ class _Node(NamedTuple):
 
 
 def free_flow_us(site: Site, start: Segment, start_us: int, visits: tuple[Visit, ...]) -> int:
-    """When the last visit would end with nobody in the way: a lower bound of every route. FOREVER where out of reach."""
+    """When the last visit would end with nobody in the way: a bound of every route. FOREVER where out of reach."""
     time_us, here = ceil_ms(start_us), start
     for visit in visits:
         run_us = _direct_us(site, here, visit.segment)

@@ -61,6 +61,7 @@ class SiteView:
         self.positions: dict[int, tuple[Segment, int]] = {}
         self.states: dict[int, MachineState] = {}
         self.cars: dict[Reference, int] = {}
+        self.aboard: dict[int, Reference | None] = {}
         self.itineraries: dict[int, Itinerary] = {}
         self.calls: dict[tuple[int, int], CallRecord] = {}
         self.tasks: dict[Reference, TaskRecord] = {}
@@ -114,6 +115,10 @@ class SiteView:
         self.events.append((time_us, text))
 
     def _on_car(self, message: CarAt) -> None:
+        if message.station == ANY_STATION:
+            self.aboard[message.sender] = message.car
+        else:
+            self.aboard = {node: car for node, car in self.aboard.items() if car != message.car}
         if message.station == OUTSIDE:
             self.cars.pop(message.car, None)
         else:

@@ -116,6 +116,7 @@ class Compartment:
     _key_pressed: bool = False
     _robot_waits: bool = False
     _ordered: dict[DoorName, DoorAction] = field(default_factory=dict)
+    _light_ordered: LightColour | None = None
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
@@ -218,17 +219,16 @@ class Compartment:
         if event is DeskInput.KEY:
             self._key_pressed = True
             return []
-        if event is DeskInput.TICKET:
-            return self._take_ticket(car)
-        return []
+        # Whoever cancels wants the car back at once: the same as coming for it.
+        return self._take_ticket(car)
 
     def _take_ticket(self, car: Reference) -> list[Effect]:
         record = self.fleet.mirror.cars.get(car)
-        if record is None or record.station == OUTSIDE or car in self.tickets:
+        if record is None or record.station == OUTSIDE:
             return [self._desk(DeskText.UNKNOWN_TICKET, car)]
-        if self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE:
-            return [self._desk(DeskText.PLEASE_WAIT, car)]
-        self.tickets.append(car)
+        in_hand = self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE
+        if not in_hand and car not in self.tickets:
+            self.tickets.append(car)
         return [self._desk(DeskText.PLEASE_WAIT, car)]
 
     def _desk(self, text: DeskText, car: Reference) -> Effect:
@@ -260,8 +260,8 @@ class Compartment:
         if self.tickets and not self.bay.load_kg and not self.bay.person_inside and self._is_stored(self.tickets[0]):
             self._go(BayPhase.RESERVING)
             return [self._light(LightColour.RED), *self._door(DoorName.INPUT, DoorAction.CLOSE)]
-        if self.doors.light is not LightColour.GREEN and not self.bay.load_kg:
-            return self._once(self._light(LightColour.GREEN))
+        if self._light_ordered is not LightColour.GREEN and not self.bay.load_kg:
+            return [self._light(LightColour.GREEN)]
         return []
 
     def _is_stored(self, car: Reference) -> bool:
@@ -303,7 +303,8 @@ class Compartment:
         """Light red, input closing for a car that is to come out; a car that still came in goes first."""
         assert self.bay is not None
         if self.bay.load_kg or self.bay.person_inside:
-            return self._to_free()
+            self._go(BayPhase.FREE)
+            return self._door(DoorName.INPUT, DoorAction.OPEN)
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         car = self.tickets.popleft()
@@ -410,11 +411,6 @@ class Compartment:
     def _light(self, colour: LightColour) -> Effect:
         self._light_ordered = colour
         return Actuate(LightOrder(self.fleet.node_id, colour))
-
-    _light_ordered: LightColour | None = None
-
-    def _once(self, effect: Effect) -> list[Effect]:
-        return [effect]
 
     def _go(self, phase: BayPhase) -> None:
         self.phase = phase

@@ -1,0 +1,71 @@
+# Two commands do everything: `make run` and `make test`. Each sets itself up in .venv first; no root is needed.
+# `make help` lists the rest.
+
+VENV := .venv
+BIN := $(VENV)/bin
+PACKAGES := bus_sim dbc hil onboard
+# Interpreter for a new environment: the first of these that starts, is 3.11 or newer and can make one. A name on the
+# path is not enough: version managers leave names that do not start, Debian's Python comes without ensurepip.
+CANDIDATES := python3.13 python3.12 python3.11 python3
+USABLE := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
+
+ARGS ?=
+PYTEST_ARGS ?=
+export REQUIRE
+
+.PHONY: help run test lint format bench docs clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
+	@echo 'make run ARGS="..." hands options to bus-sim run; make PYTHON=/path/to/python ... chooses the interpreter'
+
+run: $(VENV)/.run ## set up, then run a real day on the one-floor car park
+	@$(BIN)/bus-sim run $(ARGS)
+
+test: lint ## set up, lint, then all tests with coverage; REQUIRE=all makes a skipped test a failure
+	$(BIN)/python -m pytest --cov --cov-report=term $(PYTEST_ARGS)
+
+lint: $(VENV)/.test ## set up, then ruff (rules and format) and mypy --strict
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy --strict
+
+format: $(VENV)/.test ## put the sources into ruff's format and mend what ruff can mend safely
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(VENV)/.test ## all figures of bench/, one table each
+	@set -e; for script in bench/[!_]*.py; do \
+		[ -e "$$script" ] || { echo "make bench: no script in bench/" >&2; exit 2; }; \
+		echo "== $$script"; $(BIN)/python "$$script"; \
+	done
+
+docs: $(VENV)/.test ## write docs/network.md anew from the DBC files
+	$(BIN)/python -m onboard.wire.network_doc
+
+clean: ## remove the environment and everything generated
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage htmlcov runs
+	find $(PACKAGES) tests bench -type d -name __pycache__ -prune -exec rm -rf {} +
+
+# A stamp is newer than the pyproject.toml that it was installed from.
+$(VENV)/.run: pyproject.toml | $(VENV)/.made
+	@echo "installing into $(VENV): the program and what make run needs"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim]'
+	@touch $@
+
+$(VENV)/.test: pyproject.toml | $(VENV)/.made
+	@echo "installing into $(VENV): the program and what make test needs"
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim,mqtt,test]'
+	@touch $@ $(VENV)/.run
+
+$(VENV)/.made:
+	@python='$(PYTHON)'; \
+	for candidate in $${python:-$(CANDIDATES)}; do \
+		if "$$candidate" -c '$(USABLE)' >/dev/null 2>&1; then found="$$candidate"; break; fi; \
+	done; \
+	if [ -z "$${found:-}" ]; then \
+		echo "make: no usable Python among: $${python:-$(CANDIDATES)} (3.11 or newer, with the modules venv and ensurepip);" \
+			"on Debian and Ubuntu: apt install python3-venv; elsewhere: make PYTHON=/path/to/python" >&2; \
+		exit 2; \
+	fi; \
+	rm -rf $(VENV) && "$$found" -m venv $(VENV) && touch $@

@@ -1,0 +1,141 @@
+"""``bus-sim``: run a whole site on a simulated CAN bus."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from bus_sim.can.faults import parse_fault
+from bus_sim.day import DayOptions, run_day
+from bus_sim.demand import DemandError
+from bus_sim.sites import SiteNotFoundError, find_site, site_names
+from onboard import __version__
+from onboard.config.problems import ConfigError
+from onboard.io.open_bus import BusOpenError
+from onboard.wire.site_dbc import site_dbc
+
+HELP = """\
+exit status:
+  0  everything that was asked for happened, and no invariant was broken
+  1  the run failed: an invariant of the plant broke, a controller halted, or somebody was left waiting
+  2  a mistake in the command line or in a file; one line for each says where and what to do
+
+examples:
+  bus-sim run                          a real day on the one-floor site, as fast as possible
+  bus-sim run level1 --speed 60        the same, a minute a second
+  bus-sim run level1 --one-car 300     one car by hand, fetched after five minutes
+  bus-sim run level1 --serve           at the pace of the clock, the fleet bus on 127.0.0.1:29536 (socketcand)
+  bus-sim run level1 --bus socketcan:vcan0
+                                       the fleet bus on an interface, so that `candump vcan0` shows it
+  bus-sim dbc level1 > level1.dbc      one message for each machine, for candump | cantools decode, Wireshark ...
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The command line of ``bus-sim``."""
+    parser = argparse.ArgumentParser(
+        prog="bus-sim",
+        description="Run a site on a simulated CAN bus: all controllers, the plant and its customers in one process.",
+        epilog=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"bus-sim {__version__}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _add_run(commands.add_parser("run", help="run a site", epilog=HELP,
+                                 formatter_class=argparse.RawDescriptionHelpFormatter))
+    dbc = commands.add_parser("dbc", help="print the DBC of a site: one message for each machine")
+    dbc.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file")
+    commands.add_parser("sites", help="list the sites that ship with the simulator")
+    return parser
+
+
+def _add_run(run: argparse.ArgumentParser) -> None:
+    run.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file (default: level1)")
+    demand = run.add_argument_group("who comes (default: the shipped real day, 2019-07-24)")
+    demand.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file (columns as in bus_sim/data)")
+    demand.add_argument("--day", metavar="YYYY-MM-DD", help="only sessions that begin on this local day")
+    demand.add_argument("--stalls", metavar="NAME,...", default="AG-1F", help="only stalls so named, or beginning so "
+                        "(default: AG-1F, the fourteen stalls of level 1)")
+    demand.add_argument("--one-car", type=float, metavar="SECONDS", help="one car by hand, fetched after so long")
+    demand.add_argument("--random", nargs=2, type=float, metavar=("MEAN", "SIGMA"),
+                        help="cars at normal intervals of this mean and standard deviation, in seconds")
+    demand.add_argument("--cars", type=int, default=50, metavar="N", help="number of cars with --random (default: 50)")
+    how = run.add_argument_group("how it runs")
+    how.add_argument("--seed", type=int, default=1, help="seed of everything that is drawn by chance (default: 1)")
+    how.add_argument("--speed", type=float, metavar="FACTOR", help="simulated seconds a second (default: as fast as "
+                     "possible; 1 with --serve or --bus)")
+    how.add_argument("--for", type=float, dest="limit_s", metavar="SECONDS", help="stop after so much simulated time")
+    how.add_argument("--without", action="append", default=[], metavar="MACHINE",
+                     help="leave this machine's controller out; it may join from another process")
+    how.add_argument("--fault", action="append", default=[], metavar="FAULT", help="a fault on the fleet bus, such as "
+                     "omission:receivers=11,probability=0.01,seed=7 (repeatable)")
+    out = run.add_argument_group("what comes out")
+    out.add_argument("--trace", type=Path, default=Path("trace.log"), metavar="FILE",
+                     help="candump log of the fleet bus (default: trace.log)")
+    out.add_argument("--devices", action="store_true", help="log every machine's device bus as well")
+    out.add_argument("--json", type=Path, metavar="FILE", help="write the summary as JSON too")
+    out.add_argument("--serve", nargs="?", const="127.0.0.1:29536", metavar="HOST:PORT",
+                     help="serve the buses in the socketcand protocol (default 127.0.0.1:29536)")
+    out.add_argument("--bus", action="append", default=[], metavar="INTERFACE:CHANNEL",
+                     help="join the fleet bus with a python-can interface (repeatable)")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    args = build_parser().parse_args(argv)
+    try:
+        if args.command == "sites":
+            print("\n".join(site_names()))
+            return 0
+        site = find_site(args.site)
+        if args.command == "dbc":
+            sys.stdout.write(site_dbc(site))
+            return 0
+        summary = run_day(site, _day_options(args))
+    except (ConfigError, DemandError, SiteNotFoundError, BusOpenError, OptionError) as error:
+        for line in str(error).splitlines():
+            print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
+        return 2
+    except BrokenPipeError:
+        return 1
+    if args.json is not None:
+        args.json.write_text(json.dumps(summary.to_json(), indent=2) + "\n", encoding="utf-8")
+    return 0 if summary.is_good else 1
+
+
+class OptionError(ValueError):
+    """A mistake in one option: its name, the value and the remedy in one line."""
+
+
+def _day_options(args: argparse.Namespace) -> DayOptions:
+    faults = []
+    for text in args.fault:
+        try:
+            faults.append(parse_fault(text))
+        except ValueError as error:
+            raise OptionError(f"--fault {text}: {error}") from error
+    if args.speed is not None and args.speed <= 0:
+        raise OptionError(f"--speed {args.speed}: must be above 0")
+    live = args.serve is not None or bool(args.bus)
+    return DayOptions(
+        sessions=args.sessions,
+        day=args.day,
+        stalls=tuple(name for name in args.stalls.split(",") if name),
+        one_car_s=args.one_car,
+        random_s=tuple(args.random) if args.random is not None else None,
+        cars=args.cars,
+        seed=args.seed,
+        speed=args.speed if args.speed is not None or not live else 1.0,
+        limit_s=args.limit_s,
+        without=frozenset(args.without),
+        faults=tuple(faults),
+        trace=args.trace,
+        devices=args.devices,
+        serve=args.serve,
+        buses=tuple(args.bus),
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

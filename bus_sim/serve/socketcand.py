@@ -1,0 +1,74 @@
+"""The simulated buses served in the socketcand protocol, so that other processes can join them as nodes.
+
+Each client is a node of its own on the bus that it opens: it takes part in arbitration, and hears the others' frames
+and not its own. python-can, SavvyCAN, Kayak and our own controllers speak this protocol.
+"""
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable
+
+from bus_sim.serve.socketcand_session import Session
+from onboard.io.socketcand_protocol import DEFAULT_PORT
+from onboard.ports.bus import Bus
+
+#: Gives a client, by channel and client name, its own node on that bus; None where there is no such channel.
+JoinBus = Callable[[str, str], Bus | None]
+#: Microseconds since the epoch for a loop time in microseconds.
+Stamp = Callable[[int], int]
+
+
+class ServeError(Exception):
+    """The address cannot be served; ``str`` is one line for a person."""
+
+
+class SocketcandServer:
+    """Serves on one address. ``counts`` says what clients did, in words; see ``Session`` for its keys.
+
+    Only loopback is meant to be served: the protocol knows no password.
+    """
+
+    def __init__(self, join: JoinBus, stamp: Stamp, host: str = "127.0.0.1", port: int = DEFAULT_PORT) -> None:
+        """``port`` 0 takes a free one, which ``start`` returns."""
+        self.counts: Counter[str] = Counter()
+        self._join = join
+        self._stamp = stamp
+        self._address = (host, port)
+        self._server: asyncio.Server | None = None
+        self._sessions: set[Session] = set()
+        self._leaving: set[asyncio.Task[None]] = set()
+        self._clients = 0
+
+    async def start(self) -> int:
+        """Listen; returns the port. Raises ``ServeError``."""
+        host, port = self._address
+        try:
+            self._server = await asyncio.get_running_loop().create_server(self._session, host, port)
+        except OSError as error:
+            raise ServeError(
+                f"cannot serve on {host}:{port}: {error.strerror or error}; another program may hold it, choose another port"
+            ) from error
+        bound: int = self._server.sockets[0].getsockname()[1]
+        return bound
+
+    async def close(self) -> None:
+        """Stop listening, disconnect all clients and take their nodes off the buses."""
+        if self._server is not None:
+            self._server.close()
+        for session in list(self._sessions):
+            session.disconnect()
+        while self._sessions or self._leaving:
+            await asyncio.sleep(0)
+
+    def _session(self) -> Session:
+        self._clients += 1
+        session = Session(f"socketcand-{self._clients}", self._join, self._stamp, self.counts, self._on_end)
+        self._sessions.add(session)
+        return session
+
+    def _on_end(self, session: Session, bus: Bus | None) -> None:
+        self._sessions.discard(session)
+        if bus is not None:
+            task = asyncio.get_running_loop().create_task(bus.close())
+            self._leaving.add(task)
+            task.add_done_callback(self._leaving.discard)

@@ -1,0 +1,127 @@
+"""The site as it happens, in a terminal: drawn from what the fleet bus says, and nothing else."""
+
+import time
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from types import TracebackType
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.panel import Panel
+from rich.text import Text
+
+from onboard.core.codes import KindCode, MachineState, Side
+from onboard.core.site import Site, Station, TrackKind
+from onboard.trace.view import SiteView
+
+#: Pictures a second at most; more only costs the simulation time.
+PICTURES_S = 15
+#: Lines of events below the picture.
+EVENT_LINES = 10
+
+_STATE_WORDS = {
+    MachineState.STARTING: "starting",
+    MachineState.IDLE: "idle",
+    MachineState.WORKING: "working",
+    MachineState.WAITING: "waiting",
+    MachineState.OBSTACLE: "obstacle",
+    MachineState.STOPPED: "stopped",
+}
+
+
+class Clock:
+    """Wall time of the simulated day; ``zero`` is the local time of loop time 0."""
+
+    def __init__(self, zero: datetime) -> None:
+        self._zero = zero
+
+    def at(self, time_us: int) -> str:
+        """Local time, to the second."""
+        return (self._zero + timedelta(microseconds=time_us)).strftime("%H:%M:%S")
+
+
+def draw_floor(site: Site, view: SiteView, track: int) -> list[Text]:
+    """Three lines: far places, alley with machines, near places and compartments."""
+    taken = view.places_taken()
+    compartments = {station: view.name(node) for node, station in site.compartments.items()}
+    places = set(site.places)
+    rows = []
+    for side in (Side.FAR, Side.NEAR):
+        row = Text(f"{track:>2} {side.name[0]} " if side is Side.FAR else "   N ")
+        for index in range(1, site.tracks[track].length + 1):
+            station = Station(track, index, side)
+            car = taken.get(station.number)
+            if station in compartments:
+                row.append("[" + (f"{car.number:^3}" if car else "I/O") + "]", style="bold magenta")
+            elif station in places:
+                row.append(f"|{car.number:^3}|" if car else "|   |", style="cyan" if car else "dim")
+            else:
+                row.append("     ")
+        rows.append(row)
+    rows.insert(1, _alley(site, view, track))
+    return rows
+
+
+def _alley(site: Site, view: SiteView, track: int) -> Text:
+    row = Text("     ")
+    here: dict[int, list[int]] = {}
+    for node, (segment, _) in view.positions.items():
+        machine = site.machines.get(node)
+        if segment.track == track and machine is not None and machine.kind is not KindCode.COMPARTMENT:
+            here.setdefault(segment.index, []).append(node)
+    for index in range(1, site.tracks[track].length + 1):
+        nodes = here.get(index)
+        if nodes is None:
+            row.append("  .  ", style="dim")
+        else:
+            loaded = any(view.aboard.get(node) is not None for node in nodes)
+            row.append(f"{view.name(nodes[0])[:4]:^5}", style="bold reverse green" if loaded else "bold green")
+    return row
+
+
+def draw(site: Site, view: SiteView, clock: Clock, line: str) -> Group:
+    """The whole picture: floors from the top, machines' states, the last events, one line of figures."""
+    floors: list[Text] = []
+    for number in sorted((n for n, t in site.tracks.items() if t.kind is TrackKind.ALLEY), reverse=True):
+        floors += draw_floor(site, view, number)
+    states = Text("   ".join(f"{view.name(n)} {_STATE_WORDS[state]}" for n, state in sorted(view.states.items())))
+    events = [Text(f"{clock.at(when)}  {text}", overflow="ellipsis") for when, text in list(view.events)[-EVENT_LINES:]]
+    events += [Text("")] * (EVENT_LINES - len(events))
+    title = f"{site.name}  {clock.at(view.now_us)}"
+    return Group(Panel(Group(*floors, Text(""), states), title=title), Panel(Group(*events), title="on the bus"), Text(line))
+
+
+class TerminalShow:
+    """A live picture where output is a terminal, else one plain line each simulated hour."""
+
+    def __init__(self, site: Site, view: SiteView, clock: Clock, figures: Callable[[], str], console: Console) -> None:
+        self._site = site
+        self._view = view
+        self._clock = clock
+        self._figures = figures
+        self._console = console
+        self._next_line_us = 0
+        self._last_s = 0.0
+        self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
+
+    def __enter__(self) -> "TerminalShow":
+        if self._live is not None:
+            self._live.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        if self._live is not None:
+            self._live.stop()
+
+    def update(self, now_us: int) -> None:
+        """Show the site as it is now, if it is time to."""
+        if self._live is None:
+            if now_us >= self._next_line_us:
+                self._next_line_us = (now_us // 3_600_000_000 + 1) * 3_600_000_000
+                self._console.print(f"{self._clock.at(now_us)}  {self._figures()}", highlight=False)
+            return
+        now_s = time.monotonic()
+        if now_s - self._last_s >= 1 / PICTURES_S:
+            self._last_s = now_s
+            self._live.update(draw(self._site, self._view, self._clock, self._figures()), refresh=True)
+

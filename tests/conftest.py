@@ -1,0 +1,15 @@
+"""What holds for every test: repeatable properties, and skips that fail where nothing may be missing.
+
+``pytest --hypothesis-profile explore`` looks for new counterexamples; what it finds becomes an ``@example``.
+"""
+
+import hypothesis
+
+from tests.skips import pytest_make_collect_report, pytest_runtest_makereport
+
+__all__ = ["pytest_make_collect_report", "pytest_runtest_makereport"]
+
+# No deadline: a shared machine's pace is not a property of the code. No database: the same examples in every clone.
+hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
+hypothesis.settings.register_profile("explore", max_examples=2_000, deadline=None, database=None, print_blob=True)
+hypothesis.settings.load_profile("repeatable")

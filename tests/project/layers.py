@@ -1,0 +1,209 @@
+"""Who may import whom: the table of the design, section 2, and a checker that reads import statements.
+
+Nothing is imported to find out: every file is parsed, so a wrong import shows even where it would fail or is only for
+type checkers. Reports are one line each: file, line, what, and the rule it breaks.
+"""
+
+import ast
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+#: What holds no decision: values and names that every layer may share.
+CORE_TYPES = (
+    "onboard.core.codes",
+    "onboard.core.frame",
+    "onboard.core.messages",
+    "onboard.core.serial",
+    "onboard.core.site",
+)
+
+#: Standard modules without I/O, clock, chance or tasks: all that decisions may use.
+PURE_STDLIB = frozenset(
+    {
+        *("__future__", "abc", "array", "bisect", "collections", "contextlib", "copy", "dataclasses", "enum"),
+        *("fractions", "functools", "heapq", "itertools", "math", "numbers", "operator", "string", "struct"),
+        *("types", "typing", "zlib"),
+    }
+)
+
+#: Standard modules by which a clock, chance or a thread comes in through the back door.
+CLOCK_AND_CHANCE = frozenset(
+    ["concurrent", "datetime", "logging", "multiprocessing", "random", "secrets", "threading", "time", "uuid"]
+)
+
+#: Built-in functions that read, print, run text, or depend on the order of memory or the hash seed.
+IMPURE_BUILTINS = frozenset(["breakpoint", "compile", "eval", "exec", "hash", "id", "input", "open", "print"])
+
+ALL_OF_ONBOARD = (
+    "onboard.config",
+    "onboard.controller",
+    "onboard.core",
+    "onboard.io",
+    "onboard.kinds",
+    "onboard.ports",
+    "onboard.wire",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """What the files of one layer may import: ``projects`` and below, third-party ``libraries``, standard modules.
+
+    ``only_stdlib`` None allows the whole standard library but ``not_stdlib``. A layer may always import itself.
+    """
+
+    projects: tuple[str, ...] = ()
+    libraries: tuple[str, ...] = ()
+    only_stdlib: frozenset[str] | None = None
+    not_stdlib: frozenset[str] = frozenset()
+    pure: bool = False
+
+
+#: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli.py`` and ``__main__.py``.
+LAYERS: dict[str, Layer] = {
+    "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.kinds": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
+    "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
+    "onboard.config": Layer(("onboard.core",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
+    "onboard.controller": Layer(
+        ("onboard.core", "onboard.wire", "onboard.ports"), not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"}
+    ),
+    "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
+    "onboard.trace": Layer((*CORE_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})),
+    "onboard": Layer((*ALL_OF_ONBOARD, "onboard.cli"), not_stdlib=frozenset({"random", "threading", "time"})),
+    "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
+    "bus_sim": Layer(
+        ("onboard", "onboard.trace", *ALL_OF_ONBOARD, "dbc"), ("numpy", "rich"), not_stdlib=frozenset({"threading"})
+    ),
+    "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
+}
+
+#: Libraries that exactly one file may know, because their interfaces move.
+EXCLUSIVE: dict[str, str] = {
+    "aiomqtt": "onboard/io/mqtt.py",
+    "can": "onboard/io/pycan.py",
+    "cantools": "onboard/wire/dbc_file.py",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Import:
+    """One imported module: absolute dotted name and the line that asks for it."""
+
+    module: str
+    line: int
+
+
+def check_tree(root: Path) -> list[str]:
+    """All breaches of the table in the packages below ``root``, one line each, in the order of file and line."""
+    breaches: list[str] = []
+    for package in sorted({name.partition(".")[0] for name in LAYERS}):
+        for file in sorted((root / package).rglob("*.py")):
+            breaches += _check_file(root, file)
+    return breaches
+
+
+def _check_file(root: Path, file: Path) -> Iterator[str]:
+    place = file.relative_to(root).as_posix()
+    module = _module_name(root, file)
+    own = layer_of(module)
+    layer = LAYERS[own]
+    tree = ast.parse(file.read_text(encoding="utf-8"), place)
+    for found in imports_of(tree, root, module, is_package=file.name == "__init__.py"):
+        wrong = _breach(found.module, own, layer, place)
+        if wrong:
+            yield f"{place}:{found.line}: {own} imports {found.module}: {wrong}"
+    for line, what in _dynamic_imports(tree):
+        yield f"{place}:{line}: {what}: a computed import cannot be checked; write an import statement"
+    if layer.pure:
+        for line, name in _impure_calls(tree):
+            yield f"{place}:{line}: {own} calls {name}(): decisions do no I/O and depend on no memory order"
+
+
+def layer_of(module: str) -> str:
+    """The layer that a module belongs to. Raises ``KeyError`` for a package that has no line in the table."""
+    parts = module.split(".")
+    if parts[0] == "onboard" and len(parts) > 1 and ".".join(parts[:2]) not in LAYERS:
+        if len(parts) > 2 or parts[1] not in ("cli", "__main__"):
+            raise KeyError(f"{module}: no layer; add a line to the table and to docs/decisions.md")
+        return "onboard"
+    for length in range(len(parts), 0, -1):
+        name = ".".join(parts[:length])
+        if name in LAYERS:
+            return name
+    raise KeyError(f"{module}: no layer")
+
+
+def imports_of(tree: ast.AST, root: Path, module: str, *, is_package: bool) -> Iterator[Import]:
+    """Every module that a file asks for, wherever the statement stands; ``from a import b`` is ``a.b`` if a module."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(alias.name, node.lineno)
+        elif isinstance(node, ast.ImportFrom):
+            base = _absolute(node, module, is_package=is_package)
+            for alias in node.names:
+                below = f"{base}.{alias.name}"
+                yield Import(below if _is_module(root, below) else base, node.lineno)
+
+
+def _absolute(node: ast.ImportFrom, module: str, *, is_package: bool) -> str:
+    if node.level == 0:
+        return node.module or ""
+    parts = module.split(".")
+    parts = parts[: len(parts) - node.level + (1 if is_package else 0)]
+    return ".".join([*parts, *([node.module] if node.module else [])])
+
+
+def _module_name(root: Path, file: Path) -> str:
+    parts = file.relative_to(root).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _is_module(root: Path, name: str) -> bool:
+    path = root.joinpath(*name.split("."))
+    return path.with_suffix(".py").is_file() or (path / "__init__.py").is_file()
+
+
+def _breach(module: str, own: str, layer: Layer, place: str) -> str:
+    """Why ``module`` must not be imported in this place; empty where it may."""
+    top = module.partition(".")[0]
+    if top in {name.partition(".")[0] for name in LAYERS} | {"tests", "bench"}:
+        return "" if _project_allowed(module, own, layer) else f"it may import {_words(layer.projects)}"
+    if top in sys.stdlib_module_names:
+        if layer.only_stdlib is not None and top not in layer.only_stdlib:
+            return "this layer may use only standard modules without I/O, clock, chance or tasks"
+        return "time, chance and I/O come in as arguments or through a port" if top in layer.not_stdlib else ""
+    if top in EXCLUSIVE and place != EXCLUSIVE[top]:
+        return f"only {EXCLUSIVE[top]} may know this library"
+    return "" if top in layer.libraries else f"its libraries are {_words(layer.libraries)}"
+
+
+def _project_allowed(module: str, own: str, layer: Layer) -> bool:
+    if own == "onboard" and module == "onboard.trace":
+        return False
+    # The bare root package holds the version number only: to allow it is not to allow what is below it.
+    below = [f"{name}." for name in (own, *layer.projects) if name != "onboard"]
+    return module in (own, *layer.projects) or module.startswith(tuple(below))
+
+
+def _dynamic_imports(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            function = node.func
+            name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+            if name in ("__import__", "import_module", "run_module", "run_path"):
+                yield node.lineno, f"{name}()"
+
+
+def _impure_calls(tree: ast.AST) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in IMPURE_BUILTINS:
+            yield node.lineno, node.func.id
+
+
+def _words(names: tuple[str, ...]) -> str:
+    return ", ".join(names) if names else "none"

@@ -1,0 +1,24 @@
+"""Sites for tests, as TOML text."""
+
+from onboard.config.site import parse_site
+from onboard.core.site import Site
+
+ONE_FLOOR = """
+[site]
+name = "test"
+[floors]
+count = 1
+positions = {positions}
+[[compartments]]
+name = "IOC1"
+node = 1
+at = "p(1,4)"
+"""
+
+
+def one_floor(robots: int = 1, positions: int = 12, extra: str = "") -> Site:
+    """One alley, a compartment at p(1,4), robots MR1.. on nodes 11.. at the highest positions, one apart."""
+    text = ONE_FLOOR.format(positions=positions)
+    for number in range(1, robots + 1):
+        text += f'[[robots]]\nname = "MR{number}"\nnode = {10 + number}\nhome = "p(1,{positions + 1 - number})"\n'
+    return parse_site(text + extra, "test.toml")
