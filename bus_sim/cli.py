@@ -9,6 +9,8 @@ from pathlib import Path
 from bus_sim.can.faults import parse_fault
 from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
+from bus_sim.serve.bridge import parse_bus_specs
+from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names
 from onboard import __version__
 from onboard.config.problems import ConfigError
@@ -93,7 +95,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stdout.write(site_dbc(site))
             return 0
         summary = run_day(site, _day_options(args))
-    except (ConfigError, DemandError, SiteNotFoundError, BusOpenError, OptionError) as error:
+    except (ConfigError, DemandError, SiteNotFoundError, BusOpenError, ServeError, OptionError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
         return 2
@@ -117,6 +119,10 @@ def _day_options(args: argparse.Namespace) -> DayOptions:
             raise OptionError(f"--fault {text}: {error}") from error
     if args.speed is not None and args.speed <= 0:
         raise OptionError(f"--speed {args.speed}: must be above 0")
+    try:
+        parse_bus_specs(args.bus, 500_000)
+    except ValueError as error:
+        raise OptionError(str(error)) from error
     live = args.serve is not None or bool(args.bus)
     return DayOptions(
         sessions=args.sessions,

@@ -10,9 +10,9 @@ from rich.console import Console
 
 from bus_sim.can.faults import Fault
 from bus_sim.demand import Demand, DemandError
-from bus_sim.run import RunOptions, Simulation, build, run_until
-from bus_sim.serve.bridge import Bridge, open_bridge
-from bus_sim.serve.socketcand import SocketcandServer, serve
+from bus_sim.run import FLEET, RunOptions, Simulation, build, run_until
+from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
+from bus_sim.serve.socketcand import ServeError, SocketcandServer
 from bus_sim.show import Clock, TerminalShow
 from bus_sim.summary import RunSummary, Waiting, bus_figures, negotiation_figures, unserved
 from bus_sim.virtual_time import VirtualTimeLoop
@@ -75,7 +75,7 @@ def run_day(site: Site, options: DayOptions) -> RunSummary:
     if unknown:
         known = ", ".join(machine.name for machine in site.machines.values())
         raise DemandError(f"--without {sorted(unknown)[0]}: no such machine; machines here: {known}")
-    loop = VirtualTimeLoop(options.speed)
+    loop = VirtualTimeLoop(pace=options.speed)
     try:
         asyncio.set_event_loop(loop)
         return loop.run_until_complete(_play(site, options, demand, loop))
@@ -105,15 +105,15 @@ async def _play(site: Site, options: DayOptions, demand: Demand, loop: VirtualTi
                   + "".join(f", fault {fault}" for fault in options.faults), highlight=False)
     simulation.plant.street.add_all(demand, origin_us)
     started_s = time.monotonic()
-    async with _outside(simulation, options, console):
+    async with Outside(simulation, options, console):
         simulation.start()
         limit_us = round(options.limit_s * 1_000_000) if options.limit_s else last_us + origin_us + PATIENCE_US
         clock = Clock(zero)
         with TerminalShow(site, simulation.view, clock, lambda: _figures(simulation), console) as show:
             await run_until(simulation, lambda: simulation.plant.street.is_over, limit_us, STEP_US,
-                            lambda: show.update(loop.now_us))
+                            lambda: show.update(loop.now_us()))
             if options.limit_s is None:
-                await run_until(simulation, lambda: False, loop.now_us + TAIL_US, STEP_US, lambda: show.update(loop.now_us))
+                await run_until(simulation, lambda: False, loop.now_us() + TAIL_US, STEP_US, lambda: show.update(loop.now_us()))
     simulation.close()
     summary = summarise(simulation, time.monotonic() - started_s)
     for line in summary.lines():
@@ -121,7 +121,7 @@ async def _play(site: Site, options: DayOptions, demand: Demand, loop: VirtualTi
     return summary
 
 
-class _outside:  # noqa: N801  # used as a context manager, named as one
+class Outside:
     """Everything that joins the buses from outside, for the time of a run."""
 
     def __init__(self, simulation: Simulation, options: DayOptions, console: Console) -> None:
@@ -132,21 +132,32 @@ class _outside:  # noqa: N801  # used as a context manager, named as one
         self._bridges: list[Bridge] = []
 
     async def __aenter__(self) -> None:
-        epoch_us = self._simulation.options.epoch_us
         if self._options.serve is not None:
-            host, _, port = self._options.serve.rpartition(":")
-            self._server = await serve(self._simulation.join, host or "127.0.0.1", int(port), epoch_us)
-            self._console.print(f"serving the buses at {self._options.serve} (socketcand): fleet, "
-                                + ", ".join(machine.name for machine in self._simulation.site.machines.values()))
-        for spec in self._options.buses:
-            self._bridges.append(await open_bridge(spec, self._simulation.fleet.attach(spec, None)))
-            self._console.print(f"the fleet bus is on {spec}")
+            await self._serve(self._options.serve)
+        bitrate = self._simulation.site.bitrate
+        for settings in parse_bus_specs(self._options.buses, bitrate):
+            bridge, _ = await open_bridge(self._simulation.fleet.attach(str(settings), None), settings)
+            self._bridges.append(bridge)
+            self._console.print(f"the fleet bus is on {settings}", highlight=False)
 
     async def __aexit__(self, *_: object) -> None:
         for bridge in self._bridges:
             await bridge.close()
         if self._server is not None:
             await self._server.close()
+
+    async def _serve(self, address: str) -> None:
+        host, _, port = address.rpartition(":")
+        if not port.isdigit():
+            raise ServeError(f"--serve {address}: must be HOST:PORT, such as 127.0.0.1:29536")
+        epoch_us = self._simulation.options.epoch_us
+        server = SocketcandServer(
+            self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", int(port)
+        )
+        bound = await server.start()
+        self._server = server
+        channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
+        self._console.print(f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False)
 
 
 def _figures(simulation: Simulation) -> str:
@@ -174,7 +185,7 @@ def summarise(simulation: Simulation, wall_s: float) -> RunSummary:
     return RunSummary(
         simulation.site.name,
         simulation.options.seed,
-        simulation.loop.now_us / 1e6,
+        simulation.loop.now_us() / 1e6,
         wall_s,
         street.parked,
         street.served,

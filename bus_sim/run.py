@@ -11,7 +11,7 @@ from pathlib import Path
 from onboard.trace.candump import CandumpWriter
 
 from bus_sim.can.faults import Fault
-from bus_sim.can.medium import Medium
+from bus_sim.can.medium import Medium, Tap
 from bus_sim.journal import SimulatedJournal
 from bus_sim.plant.plant import Plant
 from bus_sim.virtual_time import VirtualTimeLoop
@@ -131,7 +131,7 @@ class Simulation:
             self.writer = CandumpWriter(self.options.trace)
         decoder = Decoder(fleet_codec())
 
-        def on_fleet(frame: Frame, time_us: int) -> None:
+        def on_fleet(frame: Frame, time_us: int, _: str) -> None:
             if self.writer is not None:
                 self.writer.write(self.options.epoch_us + time_us, FLEET, frame)
             message: Message | None = decoder.feed(frame, time_us)
@@ -143,8 +143,8 @@ class Simulation:
             for node_id, medium in self.devices.items():
                 medium.tap(self._device_tap(self.site.machines[node_id].name))
 
-    def _device_tap(self, name: str) -> Callable[[Frame, int], None]:
-        def on_device(frame: Frame, time_us: int) -> None:
+    def _device_tap(self, name: str) -> Tap:
+        def on_device(frame: Frame, time_us: int, _: str) -> None:
             assert self.writer is not None
             self.writer.write(self.options.epoch_us + time_us, name, frame)
 
@@ -153,8 +153,8 @@ class Simulation:
 
 def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
     """All parts of a run, connected but not switched on."""
-    fleet = Medium(loop, site.bitrate, faults=options.faults)
-    devices = {node_id: Medium(loop, site.bitrate) for node_id in site.machines}
+    fleet = Medium(loop, bit_rate=site.bitrate, faults=options.faults)
+    devices = {node_id: Medium(loop, bit_rate=site.bitrate) for node_id in site.machines}
     plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()}, options.seed)
     return Simulation(site, options, loop, fleet, devices, plant, SiteView(site))
 
@@ -171,7 +171,7 @@ async def run_until(
     ``show`` is called after each step.
     """
     while not done():
-        if simulation.loop.now_us >= limit_us:
+        if simulation.loop.now_us() >= limit_us:
             return False
         await asyncio.sleep(step_us / 1_000_000)
         if show is not None:

@@ -118,7 +118,7 @@ class TerminalShow:
         if self._live is None:
             if now_us >= self._next_line_us:
                 self._next_line_us = (now_us // 3_600_000_000 + 1) * 3_600_000_000
-                self._console.print(f"{self._clock.at(now_us)}  {self._figures()}", highlight=False)
+                self._console.print(f"{self._clock.at(now_us)}  {self._figures()}", highlight=False, soft_wrap=True)
             return
         now_s = time.monotonic()
         if now_s - self._last_s >= 1 / PICTURES_S:

@@ -17,6 +17,7 @@ CAN_ERR_CNT: Final = 0x200
 
 _CRTL_RX_PASSIVE: Final = 0x10
 _CRTL_TX_PASSIVE: Final = 0x20
+_LOCATION_CRC_SEQUENCE: Final = 0x08
 _LOCATION_ACK_SLOT: Final = 0x19
 _LARGEST_BYTE: Final = 0xFF
 
@@ -26,6 +27,7 @@ class BusError(Enum):
 
     BIT = (0x01, 0x00)
     STUFF = (0x04, 0x00)
+    CRC = (0x00, _LOCATION_CRC_SEQUENCE)
     ACKNOWLEDGEMENT = (0x00, _LOCATION_ACK_SLOT)
 
 

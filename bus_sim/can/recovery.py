@@ -23,18 +23,19 @@ class Recovery:
         self._medium = medium
         self._missing: dict[SimulatedBus, int] = {}
         self._recessive_since_ticks = -_SEQUENCE_TICKS
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether any node is recovering."""
-        return bool(self._missing)
+        self._timer_us: int | None = None
 
     def begin(self, node: "SimulatedBus") -> None:
         """A node starts to count."""
-        if node not in self._missing:
-            self._settle(self._medium.clock.now_us() * self._medium.bit_rate)
-            self._missing[node] = RECOVERY_SEQUENCES
-            self._set_timer()
+        if node in self._missing:
+            return
+        now_ticks = self._medium.clock.now_us() * self._medium.bit_rate
+        if not self._missing:
+            self._recessive_since_ticks = max(self._recessive_since_ticks, now_ticks)
+        elif self._medium.is_silent:
+            self._settle(now_ticks)
+        self._missing[node] = RECOVERY_SEQUENCES
+        self._set_timer()
 
     def forget(self, node: "SimulatedBus") -> None:
         """A node left before it was back."""
@@ -53,10 +54,16 @@ class Recovery:
 
     def _set_timer(self) -> None:
         due_ticks = self._recessive_since_ticks + min(self._missing.values()) * _SEQUENCE_TICKS
-        clock, bit_rate = self._medium.clock, self._medium.bit_rate
-        clock.at_us(max(-(-due_ticks // bit_rate), clock.now_us()), self._look)
+        clock = self._medium.clock
+        due_us = max(-(-due_ticks // self._medium.bit_rate), clock.now_us())
+        if self._timer_us is None or due_us < self._timer_us:
+            self._timer_us = due_us
+            clock.at_us(due_us, self._look)
 
     def _look(self, now_us: int) -> None:
+        if now_us != self._timer_us:
+            return
+        self._timer_us = None
         if self._medium.is_silent and self._missing:
             self._settle(now_us * self._medium.bit_rate)
             if self._missing:

@@ -38,6 +38,7 @@ class SocketcandServer:
         self._sessions: set[Session] = set()
         self._leaving: set[asyncio.Task[None]] = set()
         self._clients = 0
+        self._all_gone: asyncio.Future[None] | None = None
 
     async def start(self) -> int:
         """Listen; returns the port. Raises ``ServeError``."""
@@ -46,7 +47,8 @@ class SocketcandServer:
             self._server = await asyncio.get_running_loop().create_server(self._session, host, port)
         except OSError as error:
             raise ServeError(
-                f"cannot serve on {host}:{port}: {error.strerror or error}; another program may hold it, choose another port"
+                f"cannot serve on {host}:{port}: {error.strerror or error}; "
+                "another program may hold it, choose another port"
             ) from error
         bound: int = self._server.sockets[0].getsockname()[1]
         return bound
@@ -57,8 +59,9 @@ class SocketcandServer:
             self._server.close()
         for session in list(self._sessions):
             session.disconnect()
-        while self._sessions or self._leaving:
-            await asyncio.sleep(0)
+        if self._sessions or self._leaving:
+            self._all_gone = asyncio.get_running_loop().create_future()
+            await self._all_gone
 
     def _session(self) -> Session:
         self._clients += 1
@@ -71,4 +74,15 @@ class SocketcandServer:
         if bus is not None:
             task = asyncio.get_running_loop().create_task(bus.close())
             self._leaving.add(task)
-            task.add_done_callback(self._leaving.discard)
+            task.add_done_callback(self._left)
+        else:
+            self._report_gone()
+
+    def _left(self, task: asyncio.Task[None]) -> None:
+        self._leaving.discard(task)
+        self._report_gone()
+
+    def _report_gone(self) -> None:
+        gone = self._all_gone
+        if gone is not None and not gone.done() and not self._sessions and not self._leaving:
+            gone.set_result(None)

@@ -1,21 +1,25 @@
-"""Safe-interval path planning (SIPP; Phillips and Likhachev 2011) with whole rest-to-rest runs as edges.
+"""Safe-interval path planning (SIPP; Phillips and Likhachev 2011) with whole rest-to-rest moves as edges.
 
 A state is (phase, segment, safe interval), reached standing at the earliest possible time; waiting inside the interval
-is free. An edge is one run to any other segment of the track with its exact windows, departing as early as all swept
-segments are safe, so following another machine with a headway comes out by itself. Phases are the visits still to be
-made; after the last one the route must end in a refuge that is safe for ever.
+is free. A move departs as early as every window that the body sweeps lies in a safe interval, so following another
+machine with a headway comes out by itself. Phases count the visits made; after the last one the route must end in a
+refuge that is safe for ever.
+
+Best first by (end of the last visit, time, travel, moves), the first a lower bound until the visits are made. A move is
+queued under the time that it takes with nobody in the way and checked only when its turn comes (lazy evaluation of
+edges; Dellin and Srinivasa 2016): most never do.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from bisect import bisect_left
 from heapq import heappop, heappush
 from typing import NamedTuple
 
 from onboard.core.codes import LegAction
-from onboard.core.kinematics import ceil_ms, run_duration_us
-from onboard.core.occupancy import Sweep, leg_sweeps, standing_segments
+from onboard.core.kinematics import ceil_ms
+from onboard.core.occupancy import standing_segments
 from onboard.core.reservations import FOREVER, Interval, Reservations
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.roads import Move, Roads, Swept, roads_of
+from onboard.core.site import Segment, Site
 
 
 class Visit(NamedTuple):
@@ -27,7 +31,10 @@ class Visit(NamedTuple):
 
 
 class RouteLeg(NamedTuple):
-    """One leg ``[begin_us, end_us)``, both whole milliseconds; WORK is a visit's dwell, STAND a wait."""
+    """One leg ``[begin_us, end_us)``, both whole milliseconds; WORK is a visit's dwell, STAND a wait.
+
+    TRAVEL with equal indices is the hop from the segment before it through a junction onto this track.
+    """
 
     action: LegAction
     track: int
@@ -38,7 +45,10 @@ class RouteLeg(NamedTuple):
 
 
 class Route(NamedTuple):
-    """A plan: its legs, when each visit ends, when the last one ends, and what the search cost."""
+    """A plan: its legs, when each visit ends, when the last one ends, and what the search cost.
+
+    Without visits ``finish_us`` is when the route ends in a refuge.
+    """
 
     legs: tuple[RouteLeg, ...]
     visit_ends_us: tuple[int, ...]
@@ -53,183 +63,19 @@ class NoRoute(NamedTuple):
     expansions: int
 
 
-class _State(NamedTuple):
-    phase: int
-    segment: Segment
-    interval: Interval
-
-
-class _Node(NamedTuple):
-    """A state reached at ``time_us`` from ``parent`` by a move that began at ``begin_us``."""
-
-    state: _State
-    time_us: int
-    parent: "_Node | None"
-    action: LegAction
-    begin_us: int
-    visit_ends_us: tuple[int, ...]
-
-
 def free_flow_us(site: Site, start: Segment, start_us: int, visits: tuple[Visit, ...]) -> int:
-    """When the last visit would end with nobody in the way: a bound of every route. FOREVER where out of reach."""
+    """When the last visit would end with nobody in the way: the least of all routes. FOREVER where out of reach."""
+    roads = roads_of(site)
     time_us, here = ceil_ms(start_us), start
     for visit in visits:
-        run_us = _direct_us(site, here, visit.segment)
-        if run_us >= FOREVER:
+        if not (roads.knows(here) and roads.knows(visit.segment)):
             return FOREVER
-        time_us = ceil_ms(max(time_us + run_us, visit.not_before_us) + visit.dwell_us)
+        way_us = roads.shortest_us(here, visit.segment)
+        if way_us >= FOREVER:
+            return FOREVER
+        time_us = max(time_us + way_us, ceil_ms(visit.not_before_us)) + ceil_ms(visit.dwell_us)
         here = visit.segment
     return time_us
-
-
-def _direct_us(site: Site, origin: Segment, goal: Segment) -> int:
-    """Shortest time between two segments: one run on a track, and the short runs through a spur's mouth."""
-    if origin.track == goal.track:
-        pitch_mm = site.tracks[origin.track].pitch_mm
-        return run_duration_us(abs(origin.index - goal.index) * pitch_mm, site.carrier)
-    best_us = FOREVER
-    for mouth, inside in _mouths(site, origin):
-        if inside.track == goal.track and mouth.track == origin.track:
-            hop_us = run_duration_us(site.tracks[inside.track].pitch_mm, site.carrier)
-            best_us = min(best_us, _direct_us(site, origin, mouth) + hop_us + _direct_us(site, inside, goal))
-    if site.tracks[origin.track].kind is TrackKind.SPUR:
-        for mouth in site.tracks[origin.track].joins:
-            hop_us = run_duration_us(site.tracks[origin.track].pitch_mm, site.carrier)
-            best_us = min(
-                best_us, _direct_us(site, Segment(origin.track, 1), origin) + hop_us + _direct_us(site, mouth, goal)
-            )
-    return best_us
-
-
-def _mouths(site: Site, segment: Segment) -> Iterator[tuple[Segment, Segment]]:
-    """Pairs (alley segment, first spur segment) of all spurs on the track of ``segment``."""
-    for track in site.tracks.values():
-        if track.kind is TrackKind.SPUR:
-            for mouth in track.joins:
-                if mouth.track == segment.track:
-                    yield mouth, Segment(track.number, 1)
-
-
-@dataclass
-class _Search:
-    site: Site
-    reservations: Reservations
-    owner: int
-    start_us: int
-    visits: tuple[Visit, ...]
-    refuges: frozenset[Segment]
-    gaps: dict[Segment, list[Interval]] = field(default_factory=dict)
-    standing: dict[Segment, list[Interval]] = field(default_factory=dict)
-
-    # --- safe intervals ----------------------------------------------------------------------------------------
-
-    def safe(self, segment: Segment) -> list[Interval]:
-        """Gaps of one segment, looked up once per search."""
-        found = self.gaps.get(segment)
-        if found is None:
-            found = self.gaps[segment] = self.reservations.safe_intervals(segment, self.owner, self.start_us)
-        return found
-
-    def safe_standing(self, segment: Segment) -> list[Interval]:
-        """When a body may stand at a segment: all that it touches there must be free."""
-        found = self.standing.get(segment)
-        if found is None:
-            touched = standing_segments(self.site, segment)
-            found = self.safe(touched[0])
-            for other in touched[1:]:
-                found = _intersect(found, self.safe(other))
-            self.standing[segment] = found
-        return found
-
-    # --- moves -------------------------------------------------------------------------------------------------
-
-    def runs(self, node: _Node) -> Iterator[tuple[Segment, int, list[tuple[Segment, Sweep]]]]:
-        """All runs from a segment: (destination, duration, swept segments with their times)."""
-        here = node.state.segment
-        track = self.site.tracks[here.track]
-        for index in range(1, track.length + 1):
-            if index == here.index:
-                continue
-            step = 1 if index > here.index else -1
-            count = abs(index - here.index)
-            swept = [
-                (Segment(here.track, here.index + step * sweep.offset), sweep)
-                for sweep in leg_sweeps(self.site, here.track, count)
-                if 1 <= here.index + step * sweep.offset <= track.length
-            ]
-            yield Segment(here.track, index), run_duration_us(count * track.pitch_mm, self.site.carrier), swept
-        yield from self._hops(here)
-
-    def _hops(self, here: Segment) -> Iterator[tuple[Segment, int, list[tuple[Segment, Sweep]]]]:
-        """Short runs through the mouth of a spur: both segments are occupied for the whole run."""
-        for track in self.site.tracks.values():
-            if track.kind is not TrackKind.SPUR:
-                continue
-            inside = Segment(track.number, 1)
-            hop_us = run_duration_us(track.pitch_mm, self.site.carrier)
-            both = Sweep(0, 0, hop_us)
-            for mouth in track.joins:
-                if here == mouth:
-                    yield inside, hop_us, [(mouth, both), (inside, both)]
-                elif here == inside:
-                    yield mouth, hop_us, [(inside, both), (mouth, both)]
-
-    def departure_us(self, not_before_us: int, latest_us: int, swept: list[tuple[Segment, Sweep]]) -> int | None:
-        """Earliest whole millisecond from which every swept window lies in one safe interval, or None.
-
-        Each correction moves the departure to the start of a later gap, so the loop ends.
-        """
-        depart_us = not_before_us
-        settled = False
-        while not settled:
-            settled = True
-            for segment, sweep in swept:
-                gap = _gap_for(self.safe(segment), depart_us + sweep.enter_us, depart_us + sweep.leave_us)
-                if gap is None:
-                    return None
-                if gap.from_us > depart_us + sweep.enter_us:
-                    depart_us = ceil_ms(gap.from_us - sweep.enter_us)
-                    settled = False
-                if depart_us > latest_us:
-                    return None
-        return depart_us
-
-    def successors(self, node: _Node) -> Iterator[_Node]:
-        """Dwell where the next visit is, and every run."""
-        phase, here, interval = node.state
-        if phase < len(self.visits) and self.visits[phase].segment == here:
-            visit = self.visits[phase]
-            begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
-            end_us = ceil_ms(begin_us + visit.dwell_us)
-            if end_us <= interval.to_us:
-                ends = (*node.visit_ends_us, end_us)
-                yield _Node(_State(phase + 1, here, interval), end_us, node, LegAction.WORK, begin_us, ends)
-        for destination, duration_us, swept in self.runs(node):
-            for gap in self.safe_standing(destination):
-                if gap.to_us <= node.time_us + duration_us:
-                    continue
-                not_before_us = max(node.time_us, ceil_ms(gap.from_us - duration_us))
-                latest_us = min(interval.to_us - 1, gap.to_us - duration_us - 1)
-                depart_us = self.departure_us(not_before_us, latest_us, swept)
-                if depart_us is None:
-                    continue
-                arrival_us = depart_us + duration_us
-                state = _State(phase, destination, gap)
-                yield _Node(state, arrival_us, node, LegAction.TRAVEL, depart_us, node.visit_ends_us)
-
-    # --- the search --------------------------------------------------------------------------------------------
-
-    def priority(self, node: _Node) -> tuple[int, int]:
-        """Earliest finish that is still possible, then earliest rest in a refuge: both lower bounds."""
-        phase, here, _ = node.state
-        if phase < len(self.visits):
-            return free_flow_us(self.site, here, node.time_us, self.visits[phase:]), node.time_us
-        return node.visit_ends_us[-1] if node.visit_ends_us else self.start_us, node.time_us
-
-    def is_goal(self, node: _Node) -> bool:
-        """All visits made, and a refuge that is safe for ever."""
-        phase, here, interval = node.state
-        return phase == len(self.visits) and here in self.refuges and interval.to_us >= FOREVER
 
 
 def plan_route(
@@ -244,60 +90,255 @@ def plan_route(
 ) -> Route | NoRoute:
     """The route with the earliest end of the last visit, from standing at ``start`` at bus time ``start_us``.
 
-    Bounded by ``max_expansions``, never by wall time; ties are broken in the order of discovery, which is fixed.
+    Equal ends go to the earlier arrival in a refuge, then to less travel and fewer moves among those that come to the
+    same states at the same times. Windows of ``owner`` itself are no obstacle. Bounded by ``max_expansions``, never by
+    wall time; what is still equal is taken in the order of discovery, which is fixed.
     """
     start_us = ceil_ms(start_us)
-    search = _Search(site, reservations, owner, start_us, visits, refuges)
-    first = next((gap for gap in search.safe_standing(start) if gap.from_us <= start_us < gap.to_us), None)
+    if free_flow_us(site, start, start_us, visits) >= FOREVER or not roads_of(site).knows(start):
+        return NoRoute("a visit is out of reach of the start", 0)
+    safe = _SafeIntervals(site, reservations, owner, start_us)
+    first = next((gap for gap in safe.standing(start) if gap.from_us <= start_us < gap.to_us), None)
     if first is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
-    root = _Node(_State(0, start, first), start_us, None, LegAction.STAND, start_us, ())
-    queue = [(search.priority(root), 0, root)]
-    done: set[_State] = set()
-    pushed = expansions = 0
-    while queue:
-        _, _, node = heappop(queue)
-        if node.state in done:
-            continue
-        done.add(node.state)
-        if search.is_goal(node):
-            finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
-            return Route(tuple(_legs(node)), node.visit_ends_us, finish_us, expansions)
-        if expansions >= max_expansions:
-            return NoRoute("the search's bound of expansions is reached", expansions)
-        expansions += 1
-        for following in search.successors(node):
-            if following.state not in done:
-                pushed += 1
-                heappush(queue, (search.priority(following), pushed, following))
-    return NoRoute("no order of waits and runs leads to the goal and a refuge", expansions)
+    return _Search(roads_of(site), safe, visits, refuges).run(start, start_us, first, max_expansions)
+
+
+class _SafeIntervals:
+    """Safe intervals of one search, each looked up once."""
+
+    def __init__(self, site: Site, reservations: Reservations, owner: int, start_us: int) -> None:
+        self._site = site
+        self._reservations = reservations
+        self._owner = owner
+        self._start_us = start_us
+        self._always = [Interval(start_us, FOREVER)]
+        self._gaps: dict[Segment, list[Interval]] = {}
+        self._standing: dict[Segment, list[Interval]] = {}
+
+    def gaps(self, segment: Segment) -> list[Interval]:
+        """When nobody else is in one segment."""
+        found = self._gaps.get(segment)
+        if found is None:
+            found = self._reservations.safe_intervals(segment, self._owner, self._start_us)
+            found = self._gaps[segment] = self._always if found == self._always else found
+        return found
+
+    def standing(self, segment: Segment) -> list[Interval]:
+        """When a body may stand at a segment: all that it touches there must be free."""
+        found = self._standing.get(segment)
+        if found is None:
+            touched = standing_segments(self._site, segment)
+            found = self.gaps(touched[0])
+            for other in touched[1:]:
+                found = _intersect(found, self.gaps(other))
+            self._standing[segment] = found
+        return found
+
+    def departure_us(self, not_before_us: int, latest_us: int, swept: list[Swept]) -> int | None:
+        """Earliest whole millisecond from which every swept window lies in one safe interval, or None.
+
+        Each correction moves the departure to the begin of a later gap, so the loop ends.
+        """
+        depart_us = not_before_us
+        before_us = None
+        while depart_us != before_us:
+            before_us = depart_us
+            for segment, enter_us, leave_us in swept:
+                gaps = self.gaps(segment)
+                if gaps is self._always:
+                    continue
+                gap_us = _gap_begin_us(gaps, depart_us + enter_us, depart_us + leave_us)
+                if gap_us > depart_us + enter_us:
+                    depart_us = ceil_ms(gap_us - enter_us)
+                    if depart_us > latest_us:
+                        return None
+        return depart_us
+
+
+class _Node(NamedTuple):
+    """A state reached at ``time_us`` from ``parent`` by a leg that began at ``begin_us``."""
+
+    phase: int
+    segment: Segment
+    interval: Interval
+    time_us: int
+    parent: "_Node | None"
+    action: LegAction
+    begin_us: int
+    visit_ends_us: tuple[int, ...]
+    travel_mm: int
+    moves: int
+
+
+#: (end of the last visit, time, travel, moves, order of discovery): the last is unique.
+_Key = tuple[int, int, int, int, int]
+
+
+class _Search:
+    """One search. ``_tails`` holds for each phase (work, floor): arriving at its visit at t, one ends the last visit
+    at max(t + work, floor) with nobody in the way."""
+
+    def __init__(
+        self, roads: Roads, safe: _SafeIntervals, visits: tuple[Visit, ...], refuges: frozenset[Segment]
+    ) -> None:
+        self.roads = roads
+        self.safe = safe
+        self.visits = visits
+        self.refuges = refuges
+        self._tails = _tails(roads, visits)
+        self._way_us: list[dict[Segment, int]] = [{} for _ in visits]
+        self._queue: list[tuple[_Key, _Node, Move | None]] = []
+        self._pushed = 0
+        self._closed: dict[tuple[int, Segment, Interval], int] = {}
+
+    def run(self, start: Segment, start_us: int, interval: Interval, max_expansions: int) -> Route | NoRoute:
+        """Search from standing at ``start``; see ``plan_route``."""
+        self._push(_Node(0, start, interval, start_us, None, LegAction.STAND, start_us, (), 0, 0), None)
+        expansions = 0
+        while self._queue:
+            _, node, unchecked = heappop(self._queue)
+            if self._is_beaten(node):
+                continue
+            if unchecked is not None and not self._check(node, unchecked):
+                continue
+            if self._is_goal(node):
+                finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
+                return Route(tuple(_legs(node)), node.visit_ends_us, finish_us, expansions)
+            if expansions >= max_expansions:
+                return NoRoute("the search's bound of expansions is reached", expansions)
+            expansions += 1
+            self._closed[node[:3]] = node.time_us
+            self._expand(node)
+        return NoRoute("no order of waits and moves leads to the goal and a refuge", expansions)
+
+    def _is_beaten(self, node: _Node) -> bool:
+        """Whether the state was left before at the same time or earlier.
+
+        Only after the last visit can a state come up again earlier: under a later end of that visit.
+        """
+        closed_us = self._closed.get(node[:3])
+        return closed_us is not None and closed_us <= node.time_us
+
+    def _is_goal(self, node: _Node) -> bool:
+        return node.phase == len(self.visits) and node.segment in self.refuges and node.interval.to_us >= FOREVER
+
+    def _expand(self, node: _Node) -> None:
+        """Queue the dwell of the next visit, if it is here, and every move."""
+        if node.phase < len(self.visits) and self.visits[node.phase].segment == node.segment:
+            self._push_dwell(node, self.visits[node.phase])
+        for move in self.roads.moves(node.segment):
+            for gap in self.safe.standing(move.destination):
+                begin_us = max(node.time_us, ceil_ms(gap.from_us - move.duration_us))
+                if begin_us < node.interval.to_us and begin_us + move.duration_us < gap.to_us:
+                    self._push_move(node, move, gap, begin_us)
+
+    def _push_dwell(self, node: _Node, visit: Visit) -> None:
+        begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
+        end_us = begin_us + ceil_ms(visit.dwell_us)
+        if end_us <= node.interval.to_us:
+            ends = (*node.visit_ends_us, end_us)
+            done = node._replace(
+                phase=node.phase + 1,
+                time_us=end_us,
+                parent=node,
+                action=LegAction.WORK,
+                begin_us=begin_us,
+                visit_ends_us=ends,
+            )
+            self._push(done, None)
+
+    def _push_move(self, node: _Node, move: Move, gap: Interval, begin_us: int) -> None:
+        arrival_us = begin_us + move.duration_us
+        there = _Node(
+            node.phase,
+            move.destination,
+            gap,
+            arrival_us,
+            node,
+            LegAction.TRAVEL,
+            begin_us,
+            node.visit_ends_us,
+            node.travel_mm + move.distance_mm,
+            node.moves + 1,
+        )
+        if not self._is_beaten(there):
+            self._push(there, move)
+
+    def _check(self, node: _Node, move: Move) -> bool:
+        """Whether the move can depart when it was queued for; if only later, it is queued again."""
+        assert node.parent is not None
+        latest_us = min(node.parent.interval.to_us, node.interval.to_us - move.duration_us) - 1
+        swept = self.roads.swept(node.parent.segment, move.destination)
+        depart_us = self.safe.departure_us(node.begin_us, latest_us, swept)
+        if depart_us is None:
+            return False
+        if depart_us == node.begin_us:
+            return True
+        self._push(node._replace(begin_us=depart_us, time_us=depart_us + move.duration_us), None)
+        return False
+
+    def _push(self, node: _Node, unchecked: Move | None) -> None:
+        self._pushed += 1
+        key = (self._finish_us(node), node.time_us, node.travel_mm, node.moves, self._pushed)
+        heappush(self._queue, (key, node, unchecked))
+
+    def _finish_us(self, node: _Node) -> int:
+        """Earliest end of the last visit that is still possible; without visits all routes are equal."""
+        if node.phase == len(self.visits):
+            return node.visit_ends_us[-1] if node.visit_ends_us else 0
+        ways = self._way_us[node.phase]
+        way_us = ways.get(node.segment)
+        if way_us is None:
+            way_us = ways[node.segment] = self.roads.shortest_us(node.segment, self.visits[node.phase].segment)
+        work_us, floor_us = self._tails[node.phase]
+        return max(node.time_us + way_us + work_us, floor_us)
+
+
+def _tails(roads: Roads, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
+    """For each phase the constants of ``_Search``, from the last visit backwards."""
+    tails: list[tuple[int, int]] = []
+    work_us = floor_us = 0
+    after: Segment | None = None
+    for visit in reversed(visits):
+        way_us = 0 if after is None else roads.shortest_us(visit.segment, after)
+        work_us += ceil_ms(visit.dwell_us) + way_us
+        floor_us = max(floor_us, ceil_ms(visit.not_before_us) + work_us)
+        tails.append((work_us, floor_us))
+        after = visit.segment
+    return tails[::-1]
 
 
 def _legs(node: _Node) -> list[RouteLeg]:
-    """The legs from the start to ``node``, waits made explicit."""
+    """The legs from the start to ``node``, waits made explicit.
+
+    A route that sets off with a hop gets a first leg of no length, so that it tells where the hop begins.
+    """
     legs: list[RouteLeg] = []
     while node.parent is not None:
         before = node.parent
-        here, there = before.state.segment, node.state.segment
-        hop = here.track != there.track
-        legs.append(
-            RouteLeg(
-                node.action, there.track, there.index if hop else here.index, there.index, node.begin_us, node.time_us
-            )
-        )
-        if node.begin_us > before.time_us:
+        here, there = before.segment, node.segment
+        hops = here.track != there.track
+        from_index = there.index if hops else here.index
+        legs.append(RouteLeg(node.action, there.track, from_index, there.index, node.begin_us, node.time_us))
+        if node.begin_us > before.time_us or (hops and before.parent is None):
             legs.append(RouteLeg(LegAction.STAND, here.track, here.index, here.index, before.time_us, node.begin_us))
         node = before
     return legs[::-1]
 
 
-def _gap_for(gaps: list[Interval], enter_us: int, leave_us: int) -> Interval | None:
-    """The first gap that can hold a window of this length at ``enter_us`` or later."""
+def _gap_begin_us(gaps: list[Interval], enter_us: int, leave_us: int) -> int:
+    """Begin of the first gap that can hold a window of this length at ``enter_us`` or later; FOREVER if none can."""
     length_us = leave_us - enter_us
-    for gap in gaps:
-        if gap.to_us >= leave_us and gap.to_us - max(gap.from_us, enter_us) >= length_us:
-            return gap
-    return None
+    for place in range(bisect_left(gaps, leave_us, key=_end_us), len(gaps)):
+        gap = gaps[place]
+        if gap.to_us - max(gap.from_us, enter_us) >= length_us:
+            return gap.from_us
+    return FOREVER
+
+
+def _end_us(gap: Interval) -> int:
+    return gap.to_us
 
 
 def _intersect(first: list[Interval], second: list[Interval]) -> list[Interval]:

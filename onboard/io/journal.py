@@ -1,7 +1,7 @@
 """``ports.Journal`` in a directory: an append-only file, one checked line a record.
 
-A line is ``CRC NUMBER ENTRY``: CRC-32 (ISO 3309, as in zlib) over the rest in eight hex digits, a number that counts from
-one, and the entry as JSON with sorted keys. So a person can read it, and a torn write shows.
+A line is ``CRC NUMBER ENTRY``: CRC-32 (ISO 3309, as in zlib) over the rest in eight hex digits, a number that counts
+from one, and the entry as JSON with sorted keys. So a person can read it, and a torn write shows.
 """
 
 import asyncio
@@ -26,9 +26,9 @@ class JournalDamagedError(OSError):
 class FileJournal:
     """The journal of one controller. One process holds a directory at a time.
 
-    Writes happen in one thread of its own, in the order of the calls; each is followed by ``fdatasync``. A write that fails
-    (disk full) is taken back, and later ones may succeed; once a sync has failed nothing more is accepted, for Linux
-    may have thrown the data away and report success the next time.
+    Writes happen in one thread of its own, in the order of the calls; each is followed by ``fdatasync``. A write that
+    fails (disk full) is taken back, and later ones may succeed; once a sync has failed nothing more is accepted, for
+    Linux may have thrown the data away and report success the next time.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -42,6 +42,7 @@ class FileJournal:
         self._broken: OSError | None = None
         self._replayed = False
         self._writer = ThreadPoolExecutor(1, "journal")
+        self._closed = False
 
     @property
     def size_bytes(self) -> int:
@@ -84,6 +85,9 @@ class FileJournal:
 
     async def close(self) -> None:
         """Finish pending writes and give the directory back."""
+        if self._closed:
+            return
+        self._closed = True
         await asyncio.get_running_loop().run_in_executor(None, self._writer.shutdown)
         for descriptor in (self._file, self._lock):
             os.close(descriptor)
@@ -102,7 +106,11 @@ class FileJournal:
         except OSError:
             self._take_back(before)
             raise
-        self._sync(self._file)
+        try:
+            os.fdatasync(self._file)
+        except OSError as error:
+            self._broken = error
+            raise
         self._records += 1
 
     def _compact(self, entries: list[Entry]) -> None:
@@ -113,13 +121,17 @@ class FileJournal:
             for number, entry in enumerate(entries, 1):
                 _write_all(descriptor, _line(number, entry))
             os.fdatasync(descriptor)
-            os.replace(temporary, self._path)
+            temporary.replace(self._path)
         except OSError:
             os.close(descriptor)
             raise
         os.close(self._file)
         self._file, self._records = descriptor, len(entries)
-        _sync_directory(self._path.parent)
+        try:
+            _sync_directory(self._path.parent)
+        except OSError as error:
+            self._broken = error
+            raise
 
     def _check(self) -> None:
         if self._broken is not None:
@@ -131,13 +143,6 @@ class FileJournal:
             os.ftruncate(self._file, size)
         except OSError as error:
             self._broken = error
-
-    def _sync(self, descriptor: int) -> None:
-        try:
-            os.fdatasync(descriptor)
-        except OSError as error:
-            self._broken = error
-            raise
 
 
 def _hold(path: Path) -> int:
@@ -180,7 +185,9 @@ def _line(number: int, entry: Entry) -> bytes:
 def _parse(content: bytes) -> tuple[list[Entry], int, bool]:
     """Entries, the bytes that they take, and whether a good record stands after a bad one."""
     entries: list[Entry] = []
-    lines = content.splitlines(keepends=True)
+    *lines, rest = (line + b"\n" for line in content.split(b"\n"))
+    if rest != b"\n":
+        lines.append(rest[:-1])
     good = 0
     for index, line in enumerate(lines):
         entry = _entry(line, len(entries) + 1)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from onboard.io.settings import BusOpenError, BusSettings, Interface
+from onboard.io.socketcand import open_socketcand
 from onboard.ports.bus import Bus
 
 __all__ = ["OWN_INTERFACES", "BusOpenError", "BusSettings", "OpenBus", "add_bus_arguments", "bus_settings", "open_bus"]
@@ -80,11 +81,9 @@ def bus_settings(arguments: argparse.Namespace, default: Interface) -> BusSettin
 async def open_bus(settings: Interface) -> OpenBus:
     """Open a bus on the running loop. Raises ``BusOpenError``."""
     if settings.interface == "socketcand-asyncio":
-        from onboard.io.socketcand import open_socketcand
-
         return await open_socketcand(BusSettings.of(settings))
     try:
-        from onboard.io.pycan import open_python_can
+        from onboard.io.pycan import open_python_can  # noqa: PLC0415 - see the top of this file
     except ImportError as error:
         raise BusOpenError(
             f'interface "{settings.interface}": python-can cannot be imported ({error}); '

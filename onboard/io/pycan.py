@@ -1,4 +1,4 @@
-"""``ports.Bus`` over any interface of python-can: the one file that imports it. Needs python-can 4.6.1 or newer, below 5."""
+"""``ports.Bus`` over any interface of python-can 4.6: the one file that imports it."""
 
 import asyncio
 import errno

@@ -13,7 +13,7 @@ from onboard.core.frame import Frame
 QUEUE_LIMIT = 1024
 #: A full driver queue is tried again this much later, us: about the time of eight 8-byte frames at 500 kbit/s.
 RETRY_US = 2_000
-#: A frame that the driver refuses for so long is given up and counted, us. At 500 kbit/s some 1,500 frames take so long.
+#: A frame that the driver refuses for so long is given up and counted, us; 1,500 frames take so long at 500 kbit/s.
 GIVE_UP_US = 500_000
 
 

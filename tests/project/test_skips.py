@@ -20,21 +20,11 @@ def run_pytest(folder: Path, source: str, require: str) -> subprocess.CompletedP
     """Pytest in a process of its own on one file, with the plugin of this project and nothing else of it."""
     (folder / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
     (folder / "test_it.py").write_text(source, encoding="utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        "-p",
-        "tests.skips",
-        "-p",
-        "no:cacheprovider",
-        "-rs",
-        "--rootdir",
-        folder,
-    ]
+    plugins = ["-p", "tests.skips", "-p", "no:cacheprovider"]
+    where = ["--rootdir", str(folder), "-c", str(folder / "pytest.ini"), str(folder / "test_it.py")]
     environment = {name: value for name, value in os.environ.items() if not name.startswith(("PYTEST", "COV"))}
     return subprocess.run(
-        [*command, "--rootdir", str(folder), "-c", str(folder / "pytest.ini"), str(folder / "test_it.py")],
+        [sys.executable, "-m", "pytest", "-rs", *plugins, *where],
         cwd=ROOT,
         env=environment | {"REQUIRE": require},
         capture_output=True,

@@ -59,5 +59,6 @@ def test_what_is_allowed_is_not_reported(text: str) -> None:
 
 def test_a_document_that_is_named_must_exist(tmp_path: Path) -> None:
     (tmp_path / "onboard").mkdir()
-    (tmp_path / "onboard" / "a.py").write_text('"""See ' + 'docs/nowhere.md."""\n', encoding="utf-8")
-    assert check_tree(tmp_path) == ["onboard/a.py:1: docs/" + "nowhere.md does not exist"]
+    name = "docs/" + "nowhere.md"
+    (tmp_path / "onboard" / "a.py").write_text(f'"""See {name}."""\n', encoding="utf-8")
+    assert check_tree(tmp_path) == [f"onboard/a.py:1: {name} does not exist"]

@@ -1,0 +1,36 @@
+"""Programs of others that tests run: found, or the test is skipped by the program's name."""
+
+import os
+import shutil
+import subprocess
+
+import pytest
+
+#: What installs a tool where it is missing (Debian, Ubuntu).
+PACKAGES = {
+    "candump": "can-utils",
+    "canplayer": "can-utils",
+    "log2asc": "can-utils",
+    "tshark": "tshark",
+}
+#: How long a foreign program may take, s; it waits on events, so this is only met by one that hangs.
+DEADLINE_S = 60.0
+
+
+def require_tool(name: str) -> str:
+    """The path of a program. Skips the test where it is missing, or fails it where ``REQUIRE=all`` forbids a skip."""
+    path = shutil.which(name)
+    if path is not None:
+        return path
+    why = f"{name} is not installed (apt-get install {PACKAGES.get(name, name)})"
+    if os.environ.get("REQUIRE") == "all":
+        pytest.fail(why)
+    pytest.skip(why)
+
+
+def run_tool(*command: str, stdin: bytes = b"") -> str:
+    """Run a program to its end; its standard output. Fails the test, showing what it said, where it fails."""
+    done = subprocess.run(command, input=stdin, capture_output=True, timeout=DEADLINE_S, check=False)
+    if done.returncode:
+        pytest.fail(f"{' '.join(command)}: exit status {done.returncode}\n{done.stderr.decode(errors='replace')}")
+    return done.stdout.decode()
