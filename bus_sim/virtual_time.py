@@ -112,7 +112,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         self,
         when: float,
         callback: Callable[[Unpack[_Ts]], object],
-        *args: Unpack[_Ts],
+        *args: *_Ts,
         context: Context | None = None,
     ) -> asyncio.TimerHandle:
         """As asyncio's, with ``when`` rounded to a whole microsecond and never before the present."""
@@ -135,7 +135,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     # --- the world outside -------------------------------------------------------------------------------------
 
     def run_in_executor(
-        self, executor: Executor | None, func: Callable[[Unpack[_Ts]], _T], *args: Unpack[_Ts]
+        self, executor: Executor | None, func: Callable[[Unpack[_Ts]], _T], *args: *_Ts
     ) -> asyncio.Future[_T]:
         """As asyncio's; virtual time waits for the job."""
         future = super().run_in_executor(executor, func, *args)
@@ -143,7 +143,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         future.add_done_callback(self._job_came_back)
         return future
 
-    async def shutdown_default_executor(self, timeout: float | None = None) -> None:
+    async def shutdown_default_executor(
+        self,
+        timeout: float | None = None,  # noqa: ASYNC109  # the base class has it
+    ) -> None:
         """As asyncio's; virtual time waits for the threads, so ``timeout`` is not needed and not used."""
         self._jobs_outside += 1
         try:
@@ -171,7 +174,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
             heapq.heapify(self._timers)
             self._cancelled_timers = 0
 
-    def _turn(self, selector: "_Selector") -> "list[_Event]":
+    def turn(self, selector: "_Selector") -> "list[_Event]":
         """Nothing is ready: look outside, else move the clock and fire timers until something is ready."""
         timers = self._timers
         while timers and (head := timers[0][2]) is not None and head.cancelled():
@@ -226,7 +229,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
                     continue
                 timer.waiting = False
                 self._now_us = when_us
-                timer._run()
+                timer._run()  # noqa: SLF001  # as asyncio does: context, and its rule for exceptions
 
     def _why_stuck(self) -> str:
         waiting = sorted(getattr(task.get_coro(), "__qualname__", "?") for task in asyncio.all_tasks(self))
@@ -280,7 +283,7 @@ class _Selector(selectors.BaseSelector):
         if self.loop is None:
             return self._inner.select(timeout)
         if timeout != 0:
-            return self.loop._turn(self)
+            return self.loop.turn(self)
         return self.poll(0)
 
 

@@ -80,6 +80,7 @@ _CRC = _crc_table()
 def header_bits(frame: Frame) -> list[int]:
     """SOF to DLC, unstuffed; 0 is dominant. 19 bits, or 39 where the frame is extended."""
     rtr = int(frame.is_remote)
+    fields: tuple[tuple[int, int], ...]
     if frame.is_extended:
         identifier = frame.arbitration_id & CAN_EFF_MASK
         fields = ((0, 1), (identifier >> 18, 11), (0b11, 2), (identifier & 0x3FFFF, 18), (rtr, 1), (0, 2))

@@ -8,15 +8,14 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Final
 
-from bus_sim.can.arbitration import arbitration_key
 from bus_sim.can.faults import FaultInjector, FaultKind
 from bus_sim.can.node import SimulatedBus
 from bus_sim.virtual_time import Clock
 from onboard.core.frame import Frame
 from onboard.ports.bus import FrameHandler
 
-#: A node that sends more different identifiers than this (a fuzzer) has its routes worked out anew.
-_ROUTES_LIMIT: Final = 4096
+#: Where there are more than this many different identifiers (a fuzzer), routes are worked out anew.
+_ROUTES_LIMIT: Final = 16384
 
 
 class Route:
@@ -75,14 +74,14 @@ class Delivery:
                     route.handlers[index] = _deaf
         self.forget_routes()
 
-    def deliver(self, frame: Frame, senders: Sequence[SimulatedBus], now_us: int) -> None:
-        """Hand a frame that ended at ``now_us`` to everybody but its senders."""
+    def deliver(self, frame: Frame, key: int, excepted: Sequence[SimulatedBus], now_us: int) -> None:
+        """Hand a frame of arbitration field ``key`` that ended at ``now_us`` to all but ``excepted``, its senders first."""
         if self._injectors:
             struck = [i for i in self._injectors if i.concerns(frame, now_us)]
             if struck:
-                self._deliver_struck(frame, senders, now_us, struck)
+                self._deliver_struck(frame, excepted, now_us, struck)
                 return
-        route = self._route(frame, senders)
+        route = self._route(frame, key, excepted)
         route.frames += 1
         self._under_way = route
         for handler in route.handlers:
@@ -91,28 +90,25 @@ class Delivery:
         for node in route.slow:
             node.receive(frame, now_us)
 
-    def _route(self, frame: Frame, senders: Sequence[SimulatedBus]) -> Route:
-        sender = senders[0]
-        if len(senders) > 1:
-            self.forget_routes()
-        key = arbitration_key(frame)
-        route = sender.routes.get(key)
+    def _route(self, frame: Frame, key: int, excepted: Sequence[SimulatedBus]) -> Route:
+        sender = excepted[0]
+        usual = len(excepted) == 1
+        route = sender.routes.get(key) if usual else None
         if route is None:
-            if len(sender.routes) >= _ROUTES_LIMIT:
+            if len(self._routed) >= _ROUTES_LIMIT:
                 self.forget_routes()
-            route = Route(node for node in self.listeners if node not in senders and node.accepts(frame))
+            route = Route(node for node in self.listeners if node not in excepted and node.accepts(frame))
             self._routed.append(route)
-            if not sender.routes:
+            if usual:
                 self._senders.append(sender)
-            if len(senders) == 1:
                 sender.routes[key] = route
         return route
 
     def _deliver_struck(
-        self, frame: Frame, senders: Sequence[SimulatedBus], now_us: int, struck: Sequence[FaultInjector]
+        self, frame: Frame, excepted: Sequence[SimulatedBus], now_us: int, struck: Sequence[FaultInjector]
     ) -> None:
         for node in list(self.listeners):
-            if node in senders or not node.accepts(frame):
+            if node in excepted or not node.accepts(frame):
                 continue
             for delay_us in _copies(node, struck):
                 if delay_us:

@@ -1,4 +1,4 @@
-"""Error frames as monitors see them: class bits in the identifier and eight data bytes as in Linux ``linux/can/error.h``."""
+"""Error frames as monitors see them: class bits and eight data bytes as in Linux ``linux/can/error.h``."""
 
 from enum import Enum
 from typing import Final

@@ -1,4 +1,4 @@
-"""How a frame on the wire fails: when the nodes notice, and how long their error flags take together (ISO 11898-1, 10.6).
+"""How a frame on the wire fails: when the nodes notice, and how long their error flags take (ISO 11898-1, 10.6).
 
 Error flags overlap: the first to notice sends six bits, which break the stuffing rule for the others, whose own six
 follow. Together they take 6 to 12 bits, and the eight bits of the error delimiter come after the last of them.

@@ -148,7 +148,9 @@ def parse_fault(text: str) -> Fault:
     for part in settings.split(",") if settings.strip() else ():
         key, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or key not in _KEYS:
-            raise ValueError(f"fault {text!r}: {part.strip()!r} is no setting; known are {', '.join(_KEYS)} (key=value)")
+            raise ValueError(
+                f"fault {text!r}: {part.strip()!r} is no setting; known are {', '.join(_KEYS)} (key=value)"
+            )
         if key in values or (key == "id" and "id_mask" in values):
             raise ValueError(f"fault {text!r}: {key} is given twice")
         values |= _read_id(text, value) if key == "id" else {_field(key): _read(text, key, value)}
@@ -172,7 +174,7 @@ def _read_id(text: str, value: str) -> dict[str, object]:
     try:
         id_value, id_mask = _whole(number), _whole(mask) if colon else CAN_EFF_MASK
     except ValueError:
-        id_value = -1
+        id_value = id_mask = -1
     if not (0 <= id_value <= CAN_EFF_MASK and 0 <= id_mask <= CAN_EFF_MASK):
         raise ValueError(
             f"fault {text!r}: id={value}: must be VALUE or VALUE:MASK, hexadecimal with 0x, up to 0x{CAN_EFF_MASK:X}"
@@ -187,7 +189,7 @@ class FaultInjector:
         self.fault = fault
         self.matched = 0
         self.struck = 0
-        self._random = random.Random(fault.seed)  # noqa: S311  # chance in a simulation, not a secret
+        self._random = random.Random(fault.seed)
         self._receivers = frozenset(fault.receivers)
         self._wanted_id = fault.id_value & fault.id_mask
 

@@ -47,7 +47,7 @@ class _Phase(Enum):
 
 
 class Medium:
-    """One CAN bus. ``bit_rate`` in bit/s, 1,000 to 1,000,000; ``ValueError`` outside. ``faults`` act in the order given.
+    """One CAN bus. ``bit_rate``: 1,000 to 1,000,000 bit/s, ``ValueError`` outside. ``faults`` act in the order given.
 
     A lone node's frame is not acknowledged and is repeated for ever, as on a real bus: virtual time then never stands
     still, and every repetition is an error frame in the taps.
@@ -229,6 +229,8 @@ class Medium:
         self.clock.at_us(self._event_us, self._end)
 
     def _is_acknowledged(self) -> bool:
+        if len(self._wire) == 1:
+            return len(self.delivery.listeners) > self._wire[0][2].is_open
         return len(self.delivery.listeners) > sum(offer[2].is_open for offer in self._wire)
 
     def _collide(self) -> Failure | None:
@@ -316,7 +318,7 @@ class Medium:
         frame = wire[0][3]
         senders = [offer[2] for offer in wire]
         for node in senders:
-            if node.counters.tec:
+            if node.counters.tec or node.counters.rec:
                 node.counters.transmission_succeeded()
                 self._confine(node, self._idle_ticks)
         if self._ailing or deaf:
@@ -325,7 +327,7 @@ class Medium:
             callback(frame, when_us, senders[0].name)
         for node in senders:
             node.transmitted(frame, when_us)
-        self.delivery.deliver(frame, senders + deaf if deaf else senders, when_us)
+        self.delivery.deliver(frame, wire[0][0], senders + deaf if deaf else senders, when_us)
 
     def _heal(self, senders: list[SimulatedBus], deaf: list[SimulatedBus]) -> None:
         """Book a reception for those whose REC is not 0."""
@@ -385,9 +387,7 @@ class Medium:
 
     def _members_changed(self) -> None:
         self.delivery.listeners = [
-            node
-            for node in self._nodes
-            if node not in self._joining and node.counters.state is not ErrorState.BUS_OFF
+            node for node in self._nodes if node not in self._joining and node.counters.state is not ErrorState.BUS_OFF
         ]
         self.delivery.forget_routes()
 

@@ -61,7 +61,12 @@ class SimulatedBus:
     """
 
     def __init__(
-        self, medium: "Medium", name: str, node_id: int | None, filters: Sequence[AcceptanceFilter], options: NodeOptions
+        self,
+        medium: "Medium",
+        name: str,
+        node_id: int | None,
+        filters: Sequence[AcceptanceFilter],
+        options: NodeOptions,
     ) -> None:
         self.name = name
         self.node_id = node_id

@@ -206,8 +206,9 @@ class Customer:
         self._press_key()
 
     def _press_key(self) -> None:
-        self._place.press_key()
+        # Patience first: the answer may come before the call returns.
         self._wait(PATIENCE_US)
+        self._place.press_key()
 
     def _walk_out(self) -> None:
         self._wait(self._draw_us(WALK_S))
@@ -241,9 +242,9 @@ class Customer:
         if self.visit.asked_us is None:
             self.visit.asked_us = self._timers.now_us()
             self.compartment = self._choose(self)
+        self._wait(PATIENCE_US)
         if self.ticket is not None:
             self._place.insert_ticket(self.ticket)
-        self._wait(PATIENCE_US)
 
     def _cancel(self) -> None:
         """While the car is still in the bay the cancel key may do; else, or without an answer, the ticket does."""
@@ -252,8 +253,8 @@ class Customer:
             return
         self._refusal = Outcome.CANCELLED
         self.visit.asked_us = self._timers.now_us()
-        self._place.press_cancel(self.ticket)
         self._wait(PATIENCE_US)
+        self._place.press_cancel(self.ticket)
 
     def _try_later(self) -> None:
         self._tries += 1

@@ -64,6 +64,7 @@ class Oracle:
         self._persons: dict[int, int] = {node: bay.persons for node, bay in world.bays.items()}
         self._where: dict[str, Location] = {}
         self.take_stock()
+        self._overlapping: set[tuple[int, int]] = set()
         self._present: set[tuple[Rule, str]] = set()
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
@@ -202,8 +203,13 @@ class Oracle:
         if one.track != two.track:
             return
         from_us = max(one.from_us, two.from_us)
+        limit_mm = self.world.site.carrier_length_mm - OVERLAP_TOLERANCE_MM
         gap_mm, at_us = least_distance(one.motion, two.motion, from_us, now_us)
-        if gap_mm < self.world.site.carrier_length_mm - OVERLAP_TOLERANCE_MM:
+        known = (first, second) in self._overlapping
+        self._overlapping.discard((first, second))
+        if abs(one.motion.at(now_us)[0] - two.motion.at(now_us)[0]) < limit_mm:
+            self._overlapping.add((first, second))
+        if gap_mm < limit_mm and not known:
             text = f"robots {first} and {second} on track {one.track}, centres {gap_mm:.1f} mm apart"
             self.violations.append(Violation(at_us, Rule.BODIES_APART, text))
 

@@ -2,7 +2,7 @@
 
 With ``d`` the distance, ``v`` the top speed and ``a`` acceleration and braking, a run lasts ``d/v + v/a`` where
 ``d >= v*v/a`` and ``2*sqrt(d/a)`` otherwise (Biagiotti and Melchiorri, Trajectory Planning for Automatic Machines and
-Robots, 2008, section 3.2). Integer arithmetic throughout (``math.isqrt``), so every machine computes the same
+Robots, 2008, chapter 3). Integer arithmetic throughout (``math.isqrt``), so every machine computes the same
 microsecond; each result is a bound, rounded to the side that its docstring names.
 """
 

@@ -76,8 +76,11 @@ def junction_segments(site: Site, origin: Segment, inside: Segment) -> list[Segm
 
 
 def travel_windows(site: Site, origin: Segment, to_index: int, begin_us: int, end_us: int) -> list[Window]:
-    """Windows of one run. Where ``[begin, end)`` is not exactly the run's duration (a delay, a leg under way), a
-    segment counts as occupied from the earliest entering to the latest leaving that fit."""
+    """Windows of one run from standing at ``origin``.
+
+    Where ``[begin, end)`` is not exactly the run's duration (a delay, a leg under way), a segment counts as occupied
+    from the earliest entering to the latest leaving that fit.
+    """
     track = site.tracks[origin.track]
     step = 1 if to_index > origin.index else -1
     segments = abs(to_index - origin.index)

@@ -7,7 +7,7 @@ refuge that is safe for ever.
 
 Best first by (end of the last visit, time, travel, moves), the first a lower bound until the visits are made. A move is
 queued under the time that it takes with nobody in the way and checked only when its turn comes (lazy evaluation of
-edges; Dellin and Srinivasa 2016): most never do.
+edges; Cohen, Phillips and Likhachev 2014): most never do.
 """
 
 from bisect import bisect_left
@@ -176,8 +176,11 @@ _Key = tuple[int, int, int, int, int]
 
 
 class _Search:
-    """One search. ``_tails`` holds for each phase (work, floor): arriving at its visit at t, one ends the last visit
-    at max(t + work, floor) with nobody in the way."""
+    """One search.
+
+    ``_tails`` holds for each phase (work, floor): whoever arrives at its visit at t ends the last visit at
+    max(t + work, floor) with nobody in the way.
+    """
 
     def __init__(
         self, roads: Roads, safe: _SafeIntervals, visits: tuple[Visit, ...], refuges: frozenset[Segment]

@@ -183,7 +183,7 @@ def _line(number: int, entry: Entry) -> bytes:
 
 
 def _parse(content: bytes) -> tuple[list[Entry], int, bool]:
-    """Entries, the bytes that they take, and whether a good record stands after a bad one."""
+    """Entries, the bytes that they take, and whether a good record stands where it should not: beyond a bad one, or out of turn."""
     entries: list[Entry] = []
     *lines, rest = (line + b"\n" for line in content.split(b"\n"))
     if rest != b"\n":
@@ -192,7 +192,7 @@ def _parse(content: bytes) -> tuple[list[Entry], int, bool]:
     for index, line in enumerate(lines):
         entry = _entry(line, len(entries) + 1)
         if entry is None:
-            return entries, good, any(_entry(later, None) is not None for later in lines[index + 1 :])
+            return entries, good, any(_entry(later, None) is not None for later in lines[index:])
         entries.append(entry)
         good += len(line)
     return entries, good, False

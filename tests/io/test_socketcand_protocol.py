@@ -8,8 +8,8 @@ from onboard.core.frame import Frame
 from onboard.io.socketcand_protocol import Splitter, format_frame, format_send, parse_frame, parse_send
 
 FRAMES = st.one_of(
-    st.builds(Frame, st.integers(0, 0x1FFFFFFF), st.binary(max_size=8)),
-    st.builds(Frame, st.integers(0, 0x7FF), st.binary(max_size=8), st.just(False)),
+    st.tuples(st.integers(0, 0x1FFFFFFF), st.binary(max_size=8)).map(lambda one: Frame(*one)),
+    st.tuples(st.integers(0, 0x7FF), st.binary(max_size=8)).map(lambda one: Frame(*one, is_extended=False)),
 )
 
 

@@ -19,7 +19,7 @@ def test_a_door_travels_closes_and_is_bolted_in_time() -> None:
     bench = Bench()
     bench.door(DoorName.INPUT, DoorAction.OPEN)
     bench.door(DoorName.INPUT, DoorAction.CLOSE)
-    changes = []
+    changes: list[tuple[int, DoorPosition]] = []
     for time_us, state in bench.links[COMPARTMENT].all(DoorState):
         if not changes or changes[-1][1] is not state.input_door:
             changes.append((time_us, state.input_door))

@@ -31,6 +31,7 @@ from onboard.core.messages import (
 from onboard.core.site import Station
 from tests.plant.support import COMPARTMENT, ROBOT, Bench
 
+NO_CAR = Reference(0, 0)
 Script = Iterator[Callable[[], bool]]
 
 
@@ -85,7 +86,7 @@ class Valet:
         self.sequence = self.sequence % 255 + 1
         return self.sequence
 
-    def desk(self, text: DeskText, car: Reference = Reference(0, 0)) -> None:
+    def desk(self, text: DeskText, car: Reference = NO_CAR) -> None:
         self.bench.links[COMPARTMENT].order(DeskOrder(COMPARTMENT, self.next(), text, car))
 
     def light(self, colour: LightColour) -> None:
@@ -169,8 +170,10 @@ class Valet:
 
     def fetch(self, car: Reference) -> Script:
         self.light(LightColour.RED)
-        yield self.door(DoorName.INPUT, DoorAction.CLOSE)
+        locked = self.door(DoorName.INPUT, DoorAction.CLOSE)
+        yield lambda: locked() or not self.is_empty()
         if not self.is_empty():
+            # Somebody still drove in: they go first.
             self.tickets.appendleft(car)
             return
         place, wheelbase_mm = self.parked.pop(car)

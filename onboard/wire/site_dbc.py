@@ -1,0 +1,70 @@
+"""The DBC of one site: one message for each machine (``MR1_Bid``), so that stock tools decode without an id mask.
+
+Masked decoding makes cantools' monitor and plot merge all machines into one line; a full identifier for each sender
+does not. Text is templated, as cantools' own writer reorders signals and drops attributes.
+"""
+
+from collections.abc import Iterable
+
+from onboard.core.codes import KindCode
+from onboard.core.site import Machine, Site
+from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
+
+#: Senders of the fleet contract and of the device contract that each kind of machine stands for.
+_ROLES: dict[KindCode, frozenset[str]] = {
+    KindCode.ROBOT: frozenset({"Robot", "Controller", "Drive", "Shuttle"}),
+    KindCode.LIFT: frozenset({"Lift", "Controller", "Drive"}),
+    KindCode.COMPARTMENT: frozenset({"Compartment", "Controller", "Doors", "Desk", "Bay"}),
+}
+#: Device messages by the roles of both ends: a robot's controller sends nothing to doors.
+_ENDS: dict[KindCode, frozenset[str]] = {
+    KindCode.ROBOT: frozenset({"Controller", "Drive", "Shuttle"}),
+    KindCode.LIFT: frozenset({"Controller", "Drive"}),
+    KindCode.COMPARTMENT: frozenset({"Controller", "Doors", "Desk", "Bay"}),
+}
+_EXTENDED = 1 << 31
+
+
+def _sent_by(machine: Machine) -> Iterable[MessageLayout]:
+    """What a machine, or its devices, say."""
+    for layout in fleet_layouts():
+        if _ROLES[machine.kind] & set(layout.senders):
+            yield layout
+    for layout in device_layouts():
+        if set(layout.senders) | set(layout.receivers) <= _ENDS[machine.kind]:
+            yield layout
+
+
+def _signal(signal: SignalLayout, receivers: str) -> str:
+    sign = "-" if signal.signed else "+"
+    return (
+        f" SG_ {signal.name} : {signal.shift}|{signal.bits}@1{sign} ({signal.scale},{signal.offset}) "
+        f'[{signal.minimum}|{signal.maximum}] "{signal.unit}" {receivers}'
+    )
+
+
+def site_dbc(site: Site) -> str:
+    """DBC text with every message of every machine of a site, full identifiers, comments and value tables kept."""
+    machines = list(site.machines.values())
+    names = [machine.name for machine in machines]
+    lines = ['VERSION ""', "", "NS_ :", "\tCM_", "\tBA_DEF_", "\tBA_", "\tVAL_", "\tBA_DEF_DEF_", "", "BS_:", ""]
+    lines += ["BU_: " + " ".join(names), ""]
+    comments = [f'CM_ "Site {site.name}, digest {site.digest}: one message for each machine. Generated; do not edit.";']
+    attributes: list[str] = []
+    values: list[str] = []
+    for machine in machines:
+        others = ",".join(name for name in names if name != machine.name) or "Vector__XXX"
+        for layout in _sent_by(machine):
+            number = _EXTENDED | layout.frame_id | machine.node_id
+            lines.append(f"BO_ {number} {machine.name}_{layout.name}: {layout.length} {machine.name}")
+            lines += [_signal(signal, others) for signal in layout.signals] + [""]
+            comments.append(f'CM_ BO_ {number} "{layout.comment}";')
+            comments += [f'CM_ SG_ {number} {signal.name} "{signal.comment}";' for signal in layout.signals]
+            if layout.cycle_ms:
+                attributes.append(f'BA_ "GenMsgCycleTime" BO_ {number} {layout.cycle_ms};')
+            for signal in layout.signals:
+                if signal.choices:
+                    table = " ".join(f'{value} "{name}"' for value, name in reversed(signal.choices))
+                    values.append(f"VAL_ {number} {signal.name} {table} ;")
+    definitions = ['BA_DEF_ BO_  "GenMsgCycleTime" INT 0 60000;', 'BA_DEF_DEF_  "GenMsgCycleTime" 0;']
+    return "\n".join([*lines, *comments, "", *definitions, *attributes, "", *values]) + "\n"

@@ -1,0 +1,39 @@
+"""Small sites made of plain values, with axes and lengths that no site file would accept."""
+
+from onboard.core.site import Axis, CarLimits, Segment, Site, Timing, Track, TrackKind
+
+ALLEY = 1
+SPUR = 192
+
+
+def line_site(
+    length: int,
+    pitch_mm: int,
+    axis: Axis,
+    carrier_length_mm: int,
+    clearance_mm: int = 0,
+    spur_at: int | None = None,
+    spur_length: int = 1,
+) -> Site:
+    """One alley of ``length`` segments and, where asked for, a spur that joins it."""
+    tracks = {ALLEY: Track(ALLEY, TrackKind.ALLEY, length, pitch_mm)}
+    if spur_at is not None:
+        tracks[SPUR] = Track(SPUR, TrackKind.SPUR, spur_length, pitch_mm, (Segment(ALLEY, spur_at),))
+    return Site(
+        name="line",
+        digest=1,
+        bitrate=500_000,
+        tracks=tracks,
+        places=(),
+        machines={},
+        stewards={},
+        carrier=axis,
+        carrier_length_mm=carrier_length_mm,
+        carrier_clearance_mm=clearance_mm,
+        shuttle=Axis(750, 500),
+        shuttle_reach_mm=5_400,
+        lift=Axis(1_083, 500),
+        floor_height_mm=2_500,
+        cars=CarLimits(1_800, 3_400, 5_300, 2_100, 3_000),
+        timing=Timing(*[1_000] * 12),
+    )

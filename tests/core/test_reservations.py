@@ -1,0 +1,85 @@
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from onboard.core.reservations import FOREVER, Interval, Reservations, Window
+from onboard.core.site import Segment
+
+HERE = Segment(1, 4)
+THERE = Segment(1, 5)
+HORIZON = 40
+
+WINDOWS = st.builds(
+    lambda segment, start, length: Window(segment, start, FOREVER if length == 0 else start + length),
+    st.sampled_from([HERE, THERE]),
+    st.integers(0, HORIZON - 1),
+    st.integers(0, 12),
+)
+#: What a bus brings: a node's new plan takes the place of its old one, or a node's plan is voided.
+PLANS = st.lists(st.tuples(st.integers(1, 3), st.lists(WINDOWS, max_size=4)), max_size=6)
+
+
+def filled(plans: list[tuple[int, list[Window]]]) -> tuple[Reservations, list[tuple[int, Window]]]:
+    """The reservations under test, and beside them the naive list."""
+    reservations = Reservations()
+    naive: list[tuple[int, Window]] = []
+    for owner, windows in plans:
+        reservations.release(owner)
+        reservations.reserve(owner, windows)
+        naive = [entry for entry in naive if entry[0] != owner] + [(owner, window) for window in windows]
+    return reservations, naive
+
+
+@given(PLANS, st.integers(0, 4), st.integers(0, HORIZON))
+def test_safe_intervals_are_the_instants_that_no_other_node_holds(
+    plans: list[tuple[int, list[Window]]], owner: int, from_us: int
+) -> None:
+    reservations, naive = filled(plans)
+    for segment in (HERE, THERE):
+        gaps = reservations.safe_intervals(segment, owner, from_us)
+        others = [w for holder, w in naive if holder != owner and w.segment == segment]
+        for instant in [*range(from_us, 2 * HORIZON), FOREVER - 1]:
+            held = any(w.from_us <= instant < w.to_us for w in others)
+            assert held != any(gap.from_us <= instant < gap.to_us for gap in gaps)
+        assert all(gap.from_us >= from_us for gap in gaps)
+        # In order and as long as can be: two gaps never touch.
+        assert all(one.from_us < one.to_us < two.from_us for one, two in zip(gaps, gaps[1:], strict=False))
+
+
+@given(PLANS, st.integers(1, 3), st.lists(WINDOWS, max_size=4))
+def test_conflicts_are_all_overlaps_with_other_nodes(
+    plans: list[tuple[int, list[Window]]], owner: int, windows: list[Window]
+) -> None:
+    reservations, naive = filled(plans)
+    expected = [
+        (window, holder)
+        for window in windows
+        for holder, other in naive
+        if holder != owner and other.segment == window.segment
+        if other.from_us < window.to_us and window.from_us < other.to_us
+    ]
+    assert sorted(reservations.conflicts(owner, windows)) == sorted(expected)
+
+
+@given(PLANS, st.integers(1, 3), st.integers(0, HORIZON))
+def test_passing_order_is_read_from_the_first_window_that_is_not_over(
+    plans: list[tuple[int, list[Window]]], owner: int, now_us: int
+) -> None:
+    reservations, naive = filled(plans)
+    open_here = [(holder, w.from_us) for holder, w in naive if w.segment == HERE and w.to_us > now_us]
+    mine = [start for holder, start in open_here if holder == owner]
+    others = [start for holder, start in open_here if holder != owner]
+    assert reservations.first_start(owner, HERE, now_us) == min(mine, default=None)
+    assert reservations.earliest_other_start(owner, HERE, now_us) == min(others, default=None)
+    assert reservations.is_free(HERE, now_us, excluding=owner) == (not others)
+
+
+def test_a_released_node_leaves_the_windows_of_others() -> None:
+    reservations, _ = filled([(1, [Window(HERE, 10, 20)]), (2, [Window(HERE, 15, 30)]), (1, [])])
+    assert reservations.safe_intervals(HERE, 9, 0) == [Interval(0, 15), Interval(30, FOREVER)]
+
+
+@pytest.mark.parametrize("to_us", [10, 9])
+def test_a_window_without_length_is_a_broken_invariant(to_us: int) -> None:
+    with pytest.raises(ValueError, match=r"node 7 has no length"):
+        Reservations().reserve(7, [Window(HERE, 10, to_us)])
