@@ -132,6 +132,9 @@ class Outside:
         self._bridges: list[Bridge] = []
 
     async def __aenter__(self) -> None:
+        if self._options.serve is not None or self._options.buses:
+            # Somebody acknowledges from the start: a lone controller would repeat its first frame for ever.
+            self._simulation.fleet.attach("gateway")
         if self._options.serve is not None:
             await self._serve(self._options.serve)
         bitrate = self._simulation.site.bitrate

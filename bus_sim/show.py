@@ -35,6 +35,12 @@ class Clock:
     def __init__(self, zero: datetime) -> None:
         self._zero = zero
 
+    def until_next_hour_us(self, time_us: int) -> int:
+        """From a loop time to the next full hour of local time, above 0."""
+        local = self._zero + timedelta(microseconds=time_us)
+        past_us = (local.minute * 60 + local.second) * 1_000_000 + local.microsecond
+        return 3_600_000_000 - past_us
+
     def at(self, time_us: int) -> str:
         """Local time, to the second."""
         return (self._zero + timedelta(microseconds=time_us)).strftime("%H:%M:%S")
@@ -117,7 +123,7 @@ class TerminalShow:
         """Show the site as it is now, if it is time to."""
         if self._live is None:
             if now_us >= self._next_line_us:
-                self._next_line_us = (now_us // 3_600_000_000 + 1) * 3_600_000_000
+                self._next_line_us = now_us + self._clock.until_next_hour_us(now_us)
                 self._console.print(f"{self._clock.at(now_us)}  {self._figures()}", highlight=False, soft_wrap=True)
             return
         now_s = time.monotonic()

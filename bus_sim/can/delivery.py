@@ -75,7 +75,7 @@ class Delivery:
         self.forget_routes()
 
     def deliver(self, frame: Frame, key: int, excepted: Sequence[SimulatedBus], now_us: int) -> None:
-        """Hand a frame of arbitration field ``key`` that ended at ``now_us`` to all but ``excepted``, its senders first."""
+        """Hand a frame with arbitration field ``key`` to all but ``excepted``, of whom the first sent it."""
         if self._injectors:
             struck = [i for i in self._injectors if i.concerns(frame, now_us)]
             if struck:

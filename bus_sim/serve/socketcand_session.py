@@ -29,9 +29,9 @@ class Mode(Enum):
 class Session(asyncio.Protocol):
     """A client's connection.
 
-    Keys that it counts: ``clients``, ``opened``, ``refused`` (no such channel), ``sent`` and ``send_refused`` (the
-    node's queue was full), ``received``, ``remote_dropped`` (the protocol has no remote frames), ``malformed``,
-    ``unknown_command``, ``too_slow``.
+    Keys that it counts: ``clients``, ``opened``, ``refused`` (no such channel), ``listening`` (raw mode was entered),
+    ``sent`` and ``send_refused`` (the node's queue was full), ``received``, ``remote_dropped`` (the protocol has no
+    remote frames), ``malformed``, ``unknown_command``, ``too_slow``.
     """
 
     def __init__(
@@ -123,6 +123,7 @@ class Session(asyncio.Protocol):
         self._say("ok")
 
     def _enter_raw_mode(self) -> None:
+        self._counts["listening"] += 1
         self._say("ok")
         self._mode = Mode.RAW
         self._held = []

@@ -1,12 +1,19 @@
 """A person's mistakes in a file: all of them at once, one clear line each."""
 
+import json
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+
+_LONGEST_SHOWN = 60
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One mistake: ``file:line: key = value: what is wrong; remedy``. ``line`` 0 where the file has none for it."""
+    """One mistake: ``file:line: key = value: what is wrong; remedy``.
+
+    ``line`` is 0 where the file has none for it, ``key`` empty where the whole file is meant, and ``value`` None where
+    there is none to show.
+    """
 
     file: str
     line: int
@@ -17,14 +24,37 @@ class Problem:
 
     def __str__(self) -> str:
         place = f"{self.file}:{self.line}" if self.line else self.file
-        shown = "" if self.value is None else f" = {_shown(self.value)}"
-        key = f" {self.key}{shown}:" if self.key else ""
+        value = "" if self.value is None else f" = {_shown(self.value)}"
+        key = f" {self.key}{value}:" if self.key else ""
         return f"{place}:{key} {self.what}; {self.remedy}"
 
 
 def _shown(value: object) -> str:
-    text = f'"{value}"' if isinstance(value, str) else str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    """A value as TOML writes it, on one line, shortened."""
+    text = _written(value)
+    return text if len(text) <= _LONGEST_SHOWN else text[: _LONGEST_SHOWN - 3] + "..."
+
+
+def _written(value: object) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            return quoted(value)
+        case int():
+            # Python refuses to write very long numbers in decimal (sys.get_int_max_str_digits).
+            return str(value) if value.bit_length() <= 64 else hex(value)
+        case list():
+            return "[" + ", ".join(_written(item) for item in value[:_LONGEST_SHOWN]) + "]"
+        case dict():
+            pairs = list(value.items())[:_LONGEST_SHOWN]
+            return "{" + ", ".join(f"{quoted(key)} = {_written(item)}" for key, item in pairs) + "}"
+    return str(value)
+
+
+def quoted(text: str) -> str:
+    """A text in double quotes on one line, with everything that is not printable escaped."""
+    return json.dumps(text, ensure_ascii=not text.isprintable())
 
 
 class ConfigError(Exception):
@@ -41,7 +71,9 @@ class ConfigError(Exception):
 def nearest(name: str, known: list[str]) -> str:
     """A remedy for an unknown name: the nearest known one, or all of them."""
     close = get_close_matches(name, known, n=1)
-    return f'did you mean "{close[0]}"?' if close else "known here: " + ", ".join(sorted(known))
+    if close:
+        return f'did you mean "{close[0]}"?'
+    return "known here: " + ", ".join(sorted(known)) if known else "remove it"
 
 
 @dataclass
@@ -55,7 +87,11 @@ class Problems:
         """Note one mistake."""
         self.found.append(Problem(self.file, line, key, value, what, remedy))
 
+    def in_order(self) -> list[Problem]:
+        """All mistakes in the order of the file's lines."""
+        return sorted(self.found, key=lambda one: one.line)
+
     def raise_if_any(self) -> None:
         """Raise ``ConfigError`` with all mistakes, in the order of the file's lines."""
         if self.found:
-            raise ConfigError(sorted(self.found, key=lambda one: one.line))
+            raise ConfigError(self.in_order())

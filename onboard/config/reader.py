@@ -5,118 +5,138 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from onboard.config.problems import Problems, nearest
-from onboard.config.toml_lines import Document
+from onboard.config.toml_lines import Document, KeyPath, path_text
+from onboard.core.site import Segment
 
-_SEGMENT = re.compile(r"^p\(\s*(\d+)\s*,\s*(\d+)\s*\)$")
+_SEGMENT = re.compile(r"p\(\s*(\d{1,3})\s*,\s*(\d{1,3})\s*\)")
+_TYPE_NAMES = {
+    bool: "true or false",
+    int: "a whole number",
+    float: "a decimal number",
+    str: "a text",
+    list: "a list",
+    dict: "a table",
+}
+
+
+def type_name(value: object) -> str:
+    """The type of a TOML value in words."""
+    return _TYPE_NAMES.get(type(value), "a date or time")
 
 
 @dataclass
 class Table:
-    """One table of a document; ``path`` as in ``robots[0]``, empty for the whole file."""
+    """One table of a document.
+
+    The stand-in for a wrong value is the default where there is one, else the lowest value allowed; ``wrong`` names
+    the keys that have a stand-in, so that no second mistake is reported that only follows from the first.
+    """
 
     document: Document
     problems: Problems
-    path: str
+    path: KeyPath
     values: dict[str, Any]
     asked: set[str] = field(default_factory=set)
+    wrong: set[str] = field(default_factory=set)
+    below: "list[Table]" = field(default_factory=list)
 
-    def key(self, name: str) -> str:
-        """Full path of a key."""
-        return f"{self.path}.{name}" if self.path else name
-
-    def bad(self, name: str, value: object, what: str, remedy: str) -> None:
-        """Note a mistake at one key."""
-        self.problems.add(self.document.line(self.key(name)), self.key(name), value, what, remedy)
+    def bad(self, name: str, value: object, what: str, remedy: str, *, item: int | None = None) -> None:
+        """Note a mistake at one key, or at one ``item`` of the list there."""
+        self.wrong.add(name)
+        path = (*self.path, name) if item is None else (*self.path, name, item)
+        self.problems.add(self.document.line(path), path_text(path), value, what, remedy)
 
     def has(self, name: str) -> bool:
         """Whether the key is there."""
         self.asked.add(name)
         return name in self.values
 
-    def _get(self, name: str, default: Any, kind: type, words: str) -> Any:
-        self.asked.add(name)
-        if name not in self.values:
-            if default is None:
-                self.bad(name, None, "missing", f"write {name} = {words}")
-            return default
-        value = self.values[name]
-        if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-            self.bad(name, value, f"wrong type {type(value).__name__}", f"write {words}")
-            return default
-        return value
-
     def integer(self, name: str, low: int, high: int, default: int | None = None) -> int:
         """A whole number in ``[low, high]``; ``default`` None makes the key required."""
-        value = self._get(name, default, int, f"a whole number from {low} to {high}")
+        stand_in = low if default is None else default
+        words = f"a whole number from {low} to {high}"
+        value = self._get(name, int, words, required=default is None)
         if value is None:
-            return low
+            return stand_in
         if not low <= value <= high:
-            self.bad(name, value, "out of range", f"write a whole number from {low} to {high}")
-            return low
+            self.bad(name, value, "out of range", f"write {words}")
+            return stand_in
         return int(value)
 
     def text(self, name: str, default: str | None = None) -> str:
-        """A text that is not empty."""
-        value = self._get(name, default, str, "a text in quotes")
+        """A text that is not empty; the stand-in without a default is the empty text."""
+        value = self._get(name, str, "a text in quotes", required=default is None)
         if value == "":
             self.bad(name, value, "empty", "write a text in quotes")
-        return value or ""
+        return value or default or ""
 
     def choice(self, name: str, known: list[str], default: str | None = None) -> str:
-        """One of a few words."""
-        value = self.text(name, default)
-        if value and value not in known:
+        """One of a few words; the stand-in without a default is the first of them."""
+        value = self._get(name, str, " or ".join(f'"{word}"' for word in known), required=default is None)
+        if value is not None and value not in known:
             self.bad(name, value, "unknown word", nearest(value, known))
-            return known[0]
-        return value or known[0]
+            value = None
+        return value or default or known[0]
 
-    def integers(self, name: str, low: int, high: int, default: list[int] | None = None) -> list[int]:
-        """A list of whole numbers in ``[low, high]``."""
-        values = self._get(name, default, list, f"a list of whole numbers from {low} to {high}")
-        good = []
-        for value in values or []:
-            if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-                self.bad(name, value, "not a whole number in range", f"write whole numbers from {low} to {high}")
-            else:
-                good.append(value)
-        return good
+    def items(self, name: str, words: str) -> list[Any] | None:
+        """A list as it is, each item still to be judged; None where it is missing or no list."""
+        value: list[Any] | None = self._get(name, list, words, required=False)
+        return value
 
-    def segment(self, name: str) -> tuple[int, int]:
-        """A position written ``p(track,index)``; (0, 0) where it is wrong."""
-        value = self._get(name, None, str, 'a position such as "p(1,4)"')
+    def segment(self, name: str) -> Segment | None:
+        """A position written ``p(track,index)``; None where it is missing or not of this form."""
+        form = 'a position such as "p(1,4)", which is floor 1, index 4'
+        value = self._get(name, str, form, required=True)
         if value is None:
-            return 0, 0
-        found = _SEGMENT.match(value)
+            return None
+        found = _SEGMENT.fullmatch(value)
         if found is None:
-            self.bad(name, value, "not a position", 'write a position such as "p(1,4)": floor 1, index 4')
-            return 0, 0
-        return int(found.group(1)), int(found.group(2))
+            self.bad(name, value, "not a position", f"write {form}")
+            return None
+        return Segment(int(found.group(1)), int(found.group(2)))
 
     def table(self, name: str, *, required: bool = False) -> "Table":
-        """A table within; an empty one where it is missing."""
+        """A table within; an empty one where it is missing. Ask once for each."""
         self.asked.add(name)
         value = self.values.get(name)
         if value is None and required:
-            self.problems.add(self.document.line(self.path), self.key(name), None, "missing", f"add a table [{name}]")
+            self.bad(name, None, "missing", f"add a table [{path_text((*self.path, name))}]")
         if value is not None and not isinstance(value, dict):
-            self.bad(name, value, "not a table", f"write it as [{self.key(name)}]")
+            self.bad(name, value, f"is {type_name(value)}", f"write a table [{path_text((*self.path, name))}]")
             value = None
-        return Table(self.document, self.problems, self.key(name), value or {})
+        return self._below((*self.path, name), value or {})
 
     def tables(self, name: str) -> "list[Table]":
-        """An array of tables, ``[[name]]``."""
+        """An array of tables, ``[[name]]``; empty where it is missing. Ask once for each."""
         self.asked.add(name)
         values = self.values.get(name, [])
         if not isinstance(values, list) or not all(isinstance(value, dict) for value in values):
-            self.bad(name, None, "not an array of tables", f"write it as [[{self.key(name)}]]")
+            self.bad(name, values, "not an array of tables", f"write [[{path_text((*self.path, name))}]]")
             return []
-        return [
-            Table(self.document, self.problems, f"{self.key(name)}[{number}]", value)
-            for number, value in enumerate(values)
-        ]
+        return [self._below((*self.path, name, number), value) for number, value in enumerate(values)]
 
     def check_unknown(self) -> None:
-        """Note every key that nobody asked for, with the nearest known name."""
+        """Note every key here and below that nobody asked for, with the nearest known name."""
         for name in self.values:
             if name not in self.asked:
                 self.bad(name, None, "unknown key", nearest(name, sorted(self.asked)))
+        for table in self.below:
+            table.check_unknown()
+
+    def _get(self, name: str, kind: type, words: str, *, required: bool) -> Any:
+        """The value if it is there and of its type, else None."""
+        self.asked.add(name)
+        if name not in self.values:
+            if required:
+                self.bad(name, None, "missing", f"write {words}")
+            return None
+        value = self.values[name]
+        if type(value) is not kind:  # isinstance would take true for a whole number
+            self.bad(name, value, f"is {type_name(value)}", f"write {words}")
+            return None
+        return value
+
+    def _below(self, path: KeyPath, values: dict[str, Any]) -> "Table":
+        table = Table(self.document, self.problems, path, values)
+        self.below.append(table)
+        return table

@@ -1,111 +1,171 @@
-"""TOML with line numbers: ``tomllib`` reads the values, a small scanner finds on which line each key stands."""
+"""TOML with line numbers: ``tomllib`` reads the values, a scanner finds on which line each of them stands.
+
+The scanner follows the grammar of TOML 1.0 (https://toml.io/en/v1.0.0) and relies on ``tomllib`` having accepted the
+text: it looks for keys and for where values end, and judges nothing.
+"""
 
 import re
 import tomllib
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import Any
 
-from onboard.config.problems import Problems
+from onboard.config.problems import Problems, quoted
 
-_HEADER = re.compile(r"^\s*(\[\[?)\s*([^\]]+?)\s*\]\]?\s*(#.*)?$")
-_KEY = re.compile(r"""^\s*((?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[A-Za-z0-9_-]+|"[^"]*"|'[^']*'))*)\s*=""")
-_WORD = re.compile(r"""[A-Za-z0-9_-]+|"[^"]*"|'[^']*'""")
-_LINE_IN_MESSAGE = re.compile(r"\(at line (\d+), column \d+\)")
+#: Where a value is: keys of tables and, from 0, numbers in arrays.
+KeyPath = tuple[str | int, ...]
+
+_BLANK = re.compile(r"(?:[ \t\n]|#[^\n]*)*")
+_SPACE = re.compile(r"[ \t]*")
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_STRING = re.compile(
+    r'"""(?:\\.|[^\\])*?"{3,5}' + r"|'''.*?'{3,5}" + r'|"(?:\\.|[^"\\\n])*"' + r"|'[^'\n]*'", re.DOTALL
+)
+_OTHER_VALUE = re.compile(r"[^,\]}#\n]*")
+_LINE_IN_MESSAGE = re.compile(r"\s*\(at line (\d+), column \d+\)")
+
+
+def path_text(path: KeyPath) -> str:
+    """A path as a person writes it: ``robots[0].home``; keys that TOML would quote are quoted."""
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            text += ("." if text else "") + (part if _BARE_KEY.fullmatch(part) else quoted(part))
+    return text
 
 
 @dataclass
 class Document:
-    """Parsed values, and the line of each key path such as ``robots[0].home`` (the table's line for a table)."""
+    """Parsed values, and the line of each table, key and array element by its path."""
 
     file: str
     values: dict[str, Any] = field(default_factory=dict)
-    lines: dict[str, int] = field(default_factory=dict)
+    lines: dict[KeyPath, int] = field(default_factory=dict)
 
-    def line(self, path: str) -> int:
-        """Line of a key; of the table around it where the key is not there; 0 where neither is."""
-        while path:
-            if path in self.lines:
-                return self.lines[path]
-            path = path.rpartition(".")[0]
-        return 0
+    def line(self, path: KeyPath) -> int:
+        """Line of a value, from 1; of what is around it where it is not there; 0 where neither is."""
+        while path and path not in self.lines:
+            path = path[:-1]
+        return self.lines.get(path, 0)
 
 
 def parse(text: str, file: str, problems: Problems) -> Document:
-    """Read a TOML text; a text that is not TOML becomes one problem and an empty document."""
+    """Read a TOML text; one that is not TOML becomes one problem and an empty document."""
     try:
-        values = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        return Document(file, tomllib.loads(text), _Scanner(text.replace("\r\n", "\n")).scan())
+    except RecursionError:
+        problems.add(0, "", None, "arrays or tables nested too deeply", "write the file in the documented form")
+    except ValueError as error:
+        # Not only tomllib.TOMLDecodeError: numbers of thousands of digits are refused by int() itself.
         found = _LINE_IN_MESSAGE.search(str(error))
-        what = _LINE_IN_MESSAGE.sub("", str(error)).strip()
-        line = int(found.group(1)) if found else text.count("\n") + 1
-        problems.add(line, "", None, f"not TOML: {what}", "see https://toml.io")
-        return Document(file)
-    return Document(file, values, _scan(text))
+        line = int(found.group(1)) if found else 0
+        what = _LINE_IN_MESSAGE.sub("", str(error))
+        problems.add(line, "", None, f"not TOML: {what}", "correct the syntax there (https://toml.io)")
+    return Document(file)
 
 
-def _scan(text: str) -> dict[str, int]:
-    """Line of every key. Lines inside multi-line strings and arrays hold no keys and are passed over."""
-    lines: dict[str, int] = {}
-    arrays: dict[str, int] = {}
-    prefix = ""
-    depth, quote = 0, ""
-    for number, line in enumerate(text.splitlines(), start=1):
-        if not depth and not quote:
-            header = _HEADER.match(line)
-            if header is not None:
-                prefix = _header_path(header.group(2), header.group(1) == "[[", arrays)
-                lines.setdefault(prefix, number)
-                continue
-            key = _KEY.match(line)
-            if key is not None:
-                path = ".".join(word.strip("\"'") for word in _WORD.findall(key.group(1)))
-                lines.setdefault(f"{prefix}.{path}" if prefix else path, number)
-        depth, quote = _nesting(line, depth, quote)
-    return lines
+class _Scanner:
+    """One pass over a valid text; ``place`` is the offset of the next character."""
 
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.place = 0
+        self.newlines = [found.start() for found in re.finditer("\n", text)]
+        self.lines: dict[KeyPath, int] = {}
+        self.implied: dict[KeyPath, int] = {}
+        self.last_element: dict[KeyPath, int] = {}
 
-def _header_path(name: str, is_array: bool, arrays: dict[str, int]) -> str:
-    words = [word.strip("\"'") for word in _WORD.findall(name)]
-    path = ""
-    for place, word in enumerate(words):
-        path = f"{path}.{word}" if path else word
-        last = place == len(words) - 1
-        if last and is_array:
-            arrays[path] = arrays.get(path, -1) + 1
-        if path in arrays:
-            path = f"{path}[{arrays[path]}]"
-    return path
+    def scan(self) -> dict[KeyPath, int]:
+        """Lines of all paths; a table that has no header of its own gets the line that first mentions it."""
+        table: KeyPath = ()
+        self._pass(_BLANK)
+        while self.place < len(self.text):
+            if self.text[self.place] == "[":
+                table = self._header()
+            else:
+                self._pair(table)
+            self._pass(_BLANK)
+        return self.implied | self.lines
 
+    def _header(self) -> KeyPath:
+        line = self._line()
+        is_array = self.text.startswith("[[", self.place)
+        self.place += 2 if is_array else 1
+        path: KeyPath = ()
+        words = self._dotted_key()
+        for number, word in enumerate(words):
+            path = (*path, word)
+            self.implied.setdefault(path, line)
+            if is_array and number == len(words) - 1:
+                self.last_element[path] = self.last_element.get(path, -1) + 1
+            if path in self.last_element:
+                path = (*path, self.last_element[path])
+        self.lines[path] = line
+        self.place += 2 if is_array else 1
+        return path
 
-def _nesting(line: str, depth: int, quote: str) -> tuple[int, str]:
-    """Bracket depth and open multi-line quote after a line."""
-    place = 0
-    while place < len(line):
-        if quote:
-            end = line.find(quote, place)
-            if end < 0:
-                return depth, quote if len(quote) == 3 else ""
-            place, quote = end + len(quote), ""
-            continue
-        letter = line[place]
-        if letter == "#":
-            break
-        if line[place : place + 3] in ('"""', "'''"):
-            quote = line[place : place + 3]
-            place += 3
-            continue
-        if letter in "\"'":
-            place = _end_of_string(line, place)
-        elif letter in "[{":
-            depth += 1
-        elif letter in "]}":
-            depth = max(0, depth - 1)
-        place += 1
-    return depth, quote
+    def _pair(self, table: KeyPath) -> None:
+        line = self._line()
+        path = table
+        for word in self._dotted_key():
+            path = (*path, word)
+            self.implied.setdefault(path, line)
+        self.lines[path] = line
+        self.place += 1  # the equals sign
+        self._pass(_SPACE)
+        self._value(path)
 
+    def _dotted_key(self) -> list[str]:
+        words = []
+        while True:
+            self._pass(_SPACE)
+            raw = self._pass(_STRING) or self._pass(_BARE_KEY)
+            # tomllib itself undoes quotes and escapes.
+            words.append(next(iter(tomllib.loads(f"{raw} = 0"))))
+            self._pass(_SPACE)
+            if not self.text.startswith(".", self.place):
+                return words
+            self.place += 1
 
-def _end_of_string(line: str, start: int) -> int:
-    mark, place = line[start], start + 1
-    while place < len(line) and line[place] != mark:
-        place += 2 if line[place] == "\\" and mark == '"' else 1
-    return place
+    def _value(self, path: KeyPath) -> None:
+        first = self.text[self.place]
+        if first == "[":
+            self._array(path)
+        elif first == "{":
+            self._inline_table(path)
+        elif not self._pass(_STRING):
+            self._pass(_OTHER_VALUE)
+
+    def _array(self, path: KeyPath) -> None:
+        number = 0
+        while self._next_item("]"):
+            self.lines[(*path, number)] = self._line()
+            self._value((*path, number))
+            number += 1
+
+    def _inline_table(self, path: KeyPath) -> None:
+        while self._next_item("}"):
+            self._pair(path)
+
+    def _next_item(self, end: str) -> bool:
+        """Step over the opening bracket or comma before an item; False, and past the end, where none follows."""
+        self._pass(_BLANK)
+        if self.text[self.place] != end:
+            self.place += 1
+            self._pass(_BLANK)
+        if self.text[self.place] == end:
+            self.place += 1
+            return False
+        return True
+
+    def _pass(self, pattern: re.Pattern[str]) -> str:
+        found = pattern.match(self.text, self.place)
+        if found is None:
+            return ""
+        self.place = found.end()
+        return found.group()
+
+    def _line(self) -> int:
+        return bisect_right(self.newlines, self.place) + 1

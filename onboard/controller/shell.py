@@ -93,7 +93,7 @@ class Controller:
 
     def _post(self, handle: Callable[[Frame, int], list[Effect]], frame: Frame, time_us: int) -> None:
         if self._writing is None and not self._inbox:
-            self._outbox.extend(handle(frame, time_us))
+            self._guarded(lambda: self._outbox.extend(handle(frame, time_us)))
             self._carry_out()
         elif len(self._inbox) < INBOX_LIMIT:
             self._inbox.append((handle, frame, time_us))
@@ -116,14 +116,27 @@ class Controller:
         if self._writing is not None:
             return
         self.holon.wire_drops = self.wire_drops()
-        self._outbox.extend(self.holon.wake(self._now_us()))
+        self._guarded(lambda: self._outbox.extend(self.holon.wake(self._now_us())))
         self.ports.watchdog.alive()
         self._carry_out()
 
     # --- effects out -------------------------------------------------------------------------------------------
 
+    def _guarded(self, action: Callable[[], object]) -> None:
+        """A decision that raises has broken an invariant of ours: the machine stops and says why."""
+        try:
+            action()
+        except Exception as error:  # noqa: BLE001  # whatever it is, going on with a broken belief would be worse
+            self._outbox.clear()
+            self._halt(f"{type(error).__name__}: {error}")
+
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
+        self._guarded(self._work_off)
+        if self._writing is None:
+            self._set_timer()
+
+    def _work_off(self) -> None:
         while self._writing is None:
             if self._outbox:
                 self._perform(self._outbox.popleft())
@@ -132,8 +145,6 @@ class Controller:
                 self._outbox.extend(handle(frame, time_us))
             else:
                 break
-        if self._writing is None:
-            self._set_timer()
 
     def _perform(self, effect: Effect) -> None:
         match effect:

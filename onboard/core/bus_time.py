@@ -20,6 +20,11 @@ class BusClock:
     heard_at_us: int | None = None
     is_source: bool = False
 
+    @property
+    def is_set(self) -> bool:
+        """Whether bus time is known at all: heard once, or made here."""
+        return self.is_source or self.heard_at_us is not None
+
     def bus_us(self, local_us: int) -> int:
         """Bus time at loop time ``local_us``."""
         return local_us + self.offset_us

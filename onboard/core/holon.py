@@ -74,6 +74,7 @@ class Holon:
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
         self._mismatches: Counter[int] = Counter()
+        self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes exactly the message class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             TokenRequest: self._on_token_request,
@@ -108,8 +109,7 @@ class Holon:
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
         if isinstance(message, BusTime):
-            self.clock.heard(message.bus_time_us, local_us)
-            return []
+            return self._on_bus_time(message, local_us)
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
             self.drops[Reason.DUPLICATE_NODE_ID] += 1
@@ -121,6 +121,10 @@ class Holon:
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
+        if not self.clock.is_set:
+            # Plans made before bus time is known would be told in a time of one's own.
+            self._sensed_early[type(message)] = message
+            return []
         now_us = self.clock.bus_us(local_us)
         return self._settle(self.behaviour.sense(message, now_us), now_us)
 
@@ -145,6 +149,20 @@ class Holon:
         ]
         due = [time for time in times if time is not None]
         return self.clock.local_us(min(due)) if due and self.halted is None else None
+
+    def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
+        if message.sender == self.node_id:
+            return self._halt("another node sends under this node-ID")
+        first = not self.clock.is_set
+        self.clock.heard(message.bus_time_us, local_us)
+        effects: list[Effect] = []
+        if first:
+            now_us = self.clock.bus_us(local_us)
+            self._heartbeat_due_us = now_us
+            for early in self._sensed_early.values():
+                effects += self._settle(self.behaviour.sense(early, now_us), now_us)
+            self._sensed_early.clear()
+        return effects
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -203,7 +221,11 @@ class Holon:
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
             return []
-        return self.behaviour.statements(now_us)
+        effects = self.behaviour.statements(now_us)
+        if self.clock.is_source:
+            # Who asks may just have joined: it need not wait for the next period.
+            effects = [Send(BusTime(self.node_id, now_us)), *effects]
+        return effects
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")

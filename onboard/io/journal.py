@@ -183,7 +183,7 @@ def _line(number: int, entry: Entry) -> bytes:
 
 
 def _parse(content: bytes) -> tuple[list[Entry], int, bool]:
-    """Entries, the bytes that they take, and whether a good record stands where it should not: beyond a bad one, or out of turn."""
+    """Entries, the bytes that they take, and whether a good record stands behind a bad one, or out of turn."""
     entries: list[Entry] = []
     *lines, rest = (line + b"\n" for line in content.split(b"\n"))
     if rest != b"\n":

@@ -14,7 +14,7 @@ from onboard.core.frame import CAN_MAX_DLC, Frame
 from onboard.io.receive import BusLostError, LoopReader, Reader, ThreadReader
 from onboard.io.settings import BusOpenError, BusSettings
 from onboard.io.subscribers import Subscribers
-from onboard.io.transmit import DirectTransmitter, Submitted, ThreadTransmitter, Transmitter
+from onboard.io.transmit import DirectTransmitter, Submitted, ThreadTransmitter, Transmitter, is_sendable
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
 
 #: Interfaces whose ``send`` never blocks; every other one gets a thread to send from.
@@ -70,7 +70,7 @@ class PythonCanBus:
 
     def send(self, frame: Frame) -> bool:
         """As in the port. An accepted frame that the driver refuses for half a second is given up and counted."""
-        if self._closed or self._lost.done() or frame.is_error or not self._transmitter.send(frame):
+        if self._closed or self._lost.done() or not is_sendable(frame) or not self._transmitter.send(frame):
             self.counts["send_refused"] += 1
             return False
         return True

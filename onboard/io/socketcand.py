@@ -9,6 +9,7 @@ from onboard.core.frame import Frame
 from onboard.io.settings import BusOpenError, BusSettings
 from onboard.io.socketcand_protocol import DEFAULT_PORT, Splitter, format_send, parse_frame
 from onboard.io.subscribers import Subscribers
+from onboard.io.transmit import is_sendable
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
 
 #: Bytes that wait for the server; about 2,000 frames. Beyond that ``send`` refuses.
@@ -55,8 +56,8 @@ class SocketcandBus:
 
     def send(self, frame: Frame) -> bool:
         """As in the port."""
-        unsendable = frame.is_remote or frame.is_error
-        if self._closed or unsendable or self._connection is None or not self._connection.write(format_send(frame)):
+        possible = is_sendable(frame) and not frame.is_remote
+        if self._closed or not possible or self._connection is None or not self._connection.write(format_send(frame)):
             self.counts["send_refused"] += 1
             return False
         self._loop.call_soon(self._sent, frame)

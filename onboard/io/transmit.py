@@ -7,7 +7,7 @@ from collections.abc import Callable
 from enum import Enum, auto
 from typing import Protocol
 
-from onboard.core.frame import Frame
+from onboard.core.frame import CAN_EFF_MASK, CAN_MAX_DLC, CAN_SFF_MASK, Frame
 
 #: Frames that wait for the driver's queue; SocketCAN's own queue (``txqueuelen``) comes on top.
 QUEUE_LIMIT = 1024
@@ -15,6 +15,13 @@ QUEUE_LIMIT = 1024
 RETRY_US = 2_000
 #: A frame that the driver refuses for so long is given up and counted, us; 1,500 frames take so long at 500 kbit/s.
 GIVE_UP_US = 500_000
+
+
+def is_sendable(frame: Frame) -> bool:
+    """Whether a frame is one that a node of a classic CAN bus can send (ISO 11898-1); error frames nobody sends."""
+    highest = CAN_EFF_MASK if frame.is_extended else CAN_SFF_MASK
+    length = frame.remote_dlc if frame.is_remote else len(frame.data)
+    return not frame.is_error and 0 <= frame.arbitration_id <= highest and 0 <= length <= CAN_MAX_DLC
 
 
 class Submitted(Enum):

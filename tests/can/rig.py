@@ -48,7 +48,10 @@ class Rig:
         return bus
 
     def at(self, when_us: int, bus: SimulatedBus, frame: Frame) -> None:
-        self.loop.at_us(when_us, lambda _when_us: bus.send(frame))
+        def send(_when_us: int) -> None:
+            bus.send(frame)
+
+        self.loop.at_us(when_us, send)
 
     def run(self, duration_us: int) -> None:
         self.loop.run_until_complete(asyncio.sleep(duration_us / 1e6))

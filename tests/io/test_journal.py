@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.io.journal import FILE_NAME, FileJournal, JournalDamagedError
+from onboard.io.journal import FILE_NAME, FileJournal, JournalDamagedError, _parse
 from onboard.ports.journal import Entry
 
 ENTRIES: list[Entry] = [
@@ -148,6 +148,4 @@ async def test_a_compaction_cut_short_changes_nothing(tmp_path: Path, monkeypatc
 
 @given(st.binary(max_size=200))
 async def test_no_file_content_is_read_as_an_entry(content: bytes) -> None:
-    from onboard.io.journal import _parse  # noqa: PLC0415 - the parser alone, without a directory for each example
-
     assert _parse(content)[0] == []

@@ -36,7 +36,9 @@ def test_reports_carry_the_frame(frame: Frame, stamp_us: int) -> None:
 
 
 def test_reports_as_the_protocol_shows_them() -> None:
-    assert format_frame(Frame(0x123, bytes.fromhex("1A220344"), False), 23_424_242) == b"< frame 123 23.424242 1A220344 >"
+    assert (
+        format_frame(Frame(0x123, bytes.fromhex("1A220344"), False), 23_424_242) == b"< frame 123 23.424242 1A220344 >"
+    )
     assert format_frame(Frame(0x123, b"", False), 1) == b"< frame 123 0.000001  >"
     assert format_send(Frame(0x1AAAAAAA, b"\x01\xf1")) == b"< send 1AAAAAAA 2 1 f1 >"
 
@@ -59,7 +61,9 @@ def test_requests_of_other_clients(text: str, frame: Frame) -> None:
     assert parse_send(text.split(" ")) == frame
 
 
-@pytest.mark.parametrize("text", ["", "123", "xyz 0", "123 9", "123 1 1 2", "123 2 1", "123 1 1ff", "123 1 -1", "40000123 0"])
+@pytest.mark.parametrize(
+    "text", ["", "123", "xyz 0", "123 9", "123 1 1 2", "123 2 1", "123 1 1ff", "123 1 -1", "40000123 0"]
+)
 def test_requests_that_are_no_frame(text: str) -> None:
     with pytest.raises(ValueError, match=r"send needs|identifier|length|byte"):
         parse_send(text.split())

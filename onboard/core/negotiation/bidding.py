@@ -1,8 +1,13 @@
-"""When to speak and which bid is better: the two rules that keep the bus quiet."""
+"""When to speak, until when, and which bid is better: the rules that keep the bus quiet."""
+
+from collections.abc import Callable
 
 from onboard.core.codes import Criterion
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Timing
+
+#: How long a bidder waits: from its cost, the call's floor, the criterion and the site's times, in us.
+DelayRule = Callable[[int, int, Criterion, Timing], int]
 
 _HALF = BUS_MS_MODULUS >> 1
 
@@ -28,3 +33,20 @@ def delay_us(cost: int, floor: int, criterion: Criterion, timing: Timing) -> int
     """
     above = max(0, cost_difference(cost, floor, criterion)) * 1000
     return timing.bid_delay_us * above // (above + timing.bid_half_us)
+
+
+def cut_off_us(deadline_us: int, timing: Timing) -> int:
+    """Bids received later than this, by one's own bus time, do not count: one guard before the deadline.
+
+    Initiator and participants use the same moment, so that they differ by no more than their clocks do.
+    """
+    return deadline_us - timing.deadline_guard_us
+
+
+def last_bid_us(deadline_us: int, timing: Timing) -> int:
+    """From this moment on no bid is sent: a second guard before the deadline, for the way to the others.
+
+    A bid sent before it is received before the cut-off as long as bus latency and clock error together stay below one
+    guard; so no bid surprises its sender by coming too late.
+    """
+    return deadline_us - 2 * timing.deadline_guard_us

@@ -1,8 +1,8 @@
 """The participant's side of one call, as one transition table (rows P05 to P11, P14).
 
-States and events are below; ``TABLE`` holds every pair that matters, all others change nothing. The participant is
-lazy: it first waits for what its free-flow bound owes, then searches, then waits for what the real cost still owes. A
-call that it cannot win costs no search and no frame.
+States and events are below; ``TABLE``, at the end, holds every pair that matters, all others change nothing. The
+participant is lazy: it first waits for what its free-flow bound owes, then searches, then waits for what the real cost
+still owes. A call that it cannot win costs no search and no frame.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,8 @@ from enum import Enum
 from onboard.core.codes import CallResult, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Bid, CallForProposals
-from onboard.core.negotiation.bidding import beats, delay_us
+from onboard.core.negotiation.bidding import DelayRule, beats, cut_off_us, delay_us, last_bid_us
+from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import (
     Awarded,
     CallKey,
@@ -22,10 +23,13 @@ from onboard.core.negotiation.events import (
     Proposal,
     Released,
 )
-from onboard.core.serial import from_bus_ms
 from onboard.core.site import Timing
 
 Outcome = list[Effect | NegotiationEvent]
+
+#: A belief without an award lapses this many award repeats after the deadline (10 s at the default of 100 ms): by then
+#: an initiator that meant this machine has said so about twenty times. Ours.
+LAPSE_REPEATS = 100
 
 
 class State(Enum):
@@ -36,35 +40,22 @@ class State(Enum):
     PRE_ASSIGNED = "own bid stands best"
     SILENT = "beaten or unable"
     BELIEVING = "deadline passed with own bid best, no award heard yet"
+    LAPSED = "no award came for long; one that comes yet still counts"
     ASSIGNED = "awarded"
-    LOST = "closed for another"
+    LOST = "closed for another, or for nobody"
 
 
 class Event(Enum):
     """What can happen to a participant."""
 
     DUE = "own delay has run out"
+    IMPOSSIBLE = "the search found no solution"
     BEATEN = "a better bid is on the bus than I can make or made"
-    DEADLINE = "the call's deadline has passed"
+    DEADLINE = "it is too late to bid, or the call's deadline has passed"
+    LAPSE = "the award is overdue"
     AWARD_ME = "the initiator awards me"
     AWARD_OTHER = "the initiator closes the call for another, or for nobody"
-
-
-@dataclass
-class Counters:
-    """What one machine's bidding has cost so far."""
-
-    calls_heard: int = 0
-    calls_of_other_kind: int = 0
-    calls_impossible: int = 0
-    searches: int = 0
-    searches_saved: int = 0
-    bids_sent: int = 0
-    bids_saved: int = 0
-    outbid: int = 0
-    won: int = 0
-    late_bids_ignored: int = 0
-    beliefs_without_award: int = 0
+    SUPERSEDED = "the initiator has called anew for the same task"
 
 
 @dataclass
@@ -78,6 +69,7 @@ class Participant:
     counters: Counters
     silent: bool
     deadline_us: int
+    delay: DelayRule = delay_us
     state: State = State.WAITING_BOUND
     due_us: int | None = None
     heard_us: int = 0
@@ -86,29 +78,14 @@ class Participant:
     proposal: Proposal | None = None
     best: tuple[int, int] | None = None
     award: Award | None = None
-    _table: dict[tuple[State, Event], tuple[State, Callable[[int], Outcome]]] = field(init=False, repr=False)
+    last_bid_us: int = field(init=False)
+    cut_off_us: int = field(init=False)
+    lapse_us: int = field(init=False)
 
     def __post_init__(self) -> None:
-        waits, searched = State.WAITING_BOUND, State.WAITING_COST
-        mine, silent, believes = State.PRE_ASSIGNED, State.SILENT, State.BELIEVING
-        self._table = {
-            (waits, Event.DUE): (searched, self._search),
-            (waits, Event.BEATEN): (silent, self._save_search),
-            (waits, Event.DEADLINE): (silent, self._save_search),
-            (waits, Event.AWARD_OTHER): (State.LOST, self._save_search),
-            (searched, Event.DUE): (mine, self._bid),
-            (searched, Event.BEATEN): (silent, self._save_bid),
-            (searched, Event.DEADLINE): (silent, self._save_bid),
-            (searched, Event.AWARD_OTHER): (State.LOST, self._save_bid),
-            (mine, Event.BEATEN): (silent, self._outbid),
-            (mine, Event.DEADLINE): (believes, self._believe),
-            (mine, Event.AWARD_ME): (State.ASSIGNED, self._assign),
-            (mine, Event.AWARD_OTHER): (State.LOST, self._outbid),
-            (silent, Event.AWARD_ME): (State.ASSIGNED, self._assign),
-            (silent, Event.AWARD_OTHER): (State.LOST, self._nothing),
-            (believes, Event.AWARD_ME): (State.ASSIGNED, self._assign),
-            (believes, Event.AWARD_OTHER): (State.LOST, self._outbid),
-        }
+        self.last_bid_us = last_bid_us(self.deadline_us, self.timing)
+        self.cut_off_us = cut_off_us(self.deadline_us, self.timing)
+        self.lapse_us = self.deadline_us + LAPSE_REPEATS * self.timing.award_repeat_us
 
     @property
     def key(self) -> CallKey:
@@ -120,23 +97,28 @@ class Participant:
         """Whether nothing can happen any more."""
         return self.state in (State.ASSIGNED, State.LOST)
 
+    @property
+    def is_committed(self) -> bool:
+        """Whether the machine keeps reservations for this call."""
+        return self.state in (State.PRE_ASSIGNED, State.BELIEVING)
+
+    # --- events ------------------------------------------------------------------------------------------------
+
     def open(self, now_us: int) -> Outcome:
         """Hear the call: compute floor and bound and start waiting, or stay silent for good."""
         self.counters.calls_heard += 1
         self.heard_us = now_us
         bound = self.estimator.lower_bound(self.call, now_us)
         if bound is None:
-            self.counters.calls_impossible += 1
-            self.state = State.SILENT
-            return []
+            return self._fire(Event.IMPOSSIBLE, now_us)
         self.bound = bound
         self.floor = self.estimator.floor(self.call, now_us)
         self.due_us = now_us + self._delay_us(bound)
         return []
 
     def on_bid(self, bid: Bid, now_us: int) -> Outcome:
-        """A bid of another machine; one received after the deadline is ignored and counted."""
-        if now_us > self.deadline_us:
+        """A bid of another machine; one received after the cut-off is ignored and counted, as the initiator does."""
+        if now_us > self.cut_off_us:
             self.counters.late_bids_ignored += 1
             return []
         if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):
@@ -149,47 +131,53 @@ class Participant:
         mine = award.result is CallResult.AWARDED and award.winner == self.node_id and self.proposal is not None
         return self._fire(Event.AWARD_ME if mine else Event.AWARD_OTHER, now_us)
 
+    def supersede(self, now_us: int) -> Outcome:
+        """The call is void: a newer one is for the same task, or there is no room to remember this one."""
+        return self._fire(Event.SUPERSEDED, now_us)
+
     def wake(self, now_us: int) -> Outcome:
-        """Let the delay and the deadline pass where they are due."""
+        """Let the delay, the deadline and the patience after it pass where they are due."""
         outcome: Outcome = []
         # A search may owe no further delay, so being due can follow being due; the table ends that after two.
-        while self.due_us is not None and self.due_us <= now_us:
+        while self.due_us is not None and min(self.due_us, self.last_bid_us) <= now_us:
             self.due_us = None
-            last_us = self.deadline_us - self.timing.deadline_guard_us
-            outcome += self._fire(Event.DUE if now_us < last_us else Event.DEADLINE, now_us)
+            outcome += self._fire(Event.DUE if now_us < self.last_bid_us else Event.DEADLINE, now_us)
         if now_us >= self.deadline_us:
             outcome += self._fire(Event.DEADLINE, now_us)
+        if now_us >= self.lapse_us:
+            outcome += self._fire(Event.LAPSE, now_us)
         return outcome
 
     def next_wake(self) -> int | None:
-        """The delay's end, or the deadline where that changes something."""
+        """The delay's end, or the moment at which waiting for something else ends."""
         if self.due_us is not None:
-            return min(self.due_us, self.deadline_us)
-        return self.deadline_us if self.state is State.PRE_ASSIGNED else None
+            return min(self.due_us, self.last_bid_us)
+        if self.state is State.PRE_ASSIGNED:
+            return self.deadline_us
+        return self.lapse_us if self.state is State.BELIEVING else None
 
     def _fire(self, event: Event, now_us: int) -> Outcome:
-        entry = self._table.get((self.state, event))
+        entry = TABLE.get((self.state, event))
         if entry is None:
             return []
         self.state, action = entry
-        return action(now_us)
+        return action(self, now_us)
 
     # --- actions -----------------------------------------------------------------------------------------------
 
-    def _search(self, now_us: int) -> Outcome:
+    def search(self, now_us: int) -> Outcome:
+        """Ask for the real cost, then wait for what it owes beyond the bound."""
         self.counters.searches += 1
-        proposal = self.estimator.estimate(self.call, now_us)
-        if proposal is None:
-            self.counters.calls_impossible += 1
-            self.state = State.SILENT
-            return []
-        self.proposal = proposal
+        self.proposal = self.estimator.estimate(self.call, now_us)
+        if self.proposal is None:
+            return self._fire(Event.IMPOSSIBLE, now_us)
         if self._is_beaten():
             return self._fire(Event.BEATEN, now_us)
-        self.due_us = max(now_us, self.heard_us + self._delay_us(proposal.cost))
+        self.due_us = max(now_us, self.heard_us + self._delay_us(self.proposal.cost))
         return []
 
-    def _bid(self, now_us: int) -> Outcome:
+    def bid(self, now_us: int) -> Outcome:
+        """Release the bid, and with it the reservations that it rests on (rows P10, P48)."""
         assert self.proposal is not None
         self.counters.bids_sent += 1
         itinerary = self.proposal.itinerary
@@ -202,40 +190,64 @@ class Participant:
         outcome.append(PreAssigned(self.key, self.call, self.proposal))
         return outcome
 
-    def _outbid(self, now_us: int) -> Outcome:
-        assert self.proposal is not None
-        self.counters.outbid += 1
-        return [Released(self.key, self.call, self.proposal, Reason.BEATEN)]
-
-    def _believe(self, now_us: int) -> Outcome:
+    def believe(self, now_us: int) -> Outcome:
         """The deadline passed with my bid best. I may prepare; I act only on the award (but in the silent form)."""
-        assert self.proposal is not None
-        if not self.silent:
-            self.counters.beliefs_without_award += 1
-            return []
-        self.state = State.ASSIGNED
-        self.counters.won += 1
-        return [Awarded(self.key, self.call, self.proposal, None)]
+        if self.silent:
+            return self._fire(Event.AWARD_ME, now_us)
+        self.counters.beliefs_without_award += 1
+        return []
 
-    def _assign(self, now_us: int) -> Outcome:
+    def assign(self, now_us: int) -> Outcome:
+        """The task is mine."""
         assert self.proposal is not None
         self.counters.won += 1
         return [Awarded(self.key, self.call, self.proposal, self.award)]
 
-    def _save_search(self, now_us: int) -> Outcome:
+    def release_beaten(self, now_us: int) -> Outcome:
+        """A better bid frees what mine reserved."""
+        self.counters.outbid += 1
+        return self._release(Reason.BEATEN)
+
+    def release_closed(self, now_us: int) -> Outcome:
+        """So does the initiator's last word; its reason says why where the call had no winner."""
+        assert self.award is not None
+        return self._release(self.award.reason if self.award.reason is not Reason.NONE else Reason.BEATEN)
+
+    def release_void(self, now_us: int) -> Outcome:
+        """So does a newer call for the same task."""
+        return self._release(Reason.CANCELLED)
+
+    def release_lapsed(self, now_us: int) -> Outcome:
+        """So does an award that does not come; nobody waits for ever (row P14)."""
+        self.counters.beliefs_lapsed += 1
+        return self._release(Reason.LATE)
+
+    def save_search(self, now_us: int) -> Outcome:
+        """Decided before a search was worth it."""
         self.due_us = None
         self.counters.searches_saved += 1
         return []
 
-    def _save_bid(self, now_us: int) -> Outcome:
+    def save_bid(self, now_us: int) -> Outcome:
+        """Decided before the bid was due."""
         self.due_us = None
         self.counters.bids_saved += 1
         return []
 
-    def _nothing(self, now_us: int) -> Outcome:
+    def give_up(self, now_us: int) -> Outcome:
+        """The task cannot be done: silence (rows P09, P45)."""
+        self.counters.calls_impossible += 1
+        return []
+
+    def rest(self, now_us: int) -> Outcome:
+        """Nothing to do."""
         return []
 
     # --- judgement ---------------------------------------------------------------------------------------------
+
+    def _release(self, reason: Reason) -> Outcome:
+        assert self.proposal is not None
+        return [Released(self.key, self.call, self.proposal, reason)]
 
     def _is_beaten(self) -> bool:
         """Whether the best bid heard is at least as good as what I made or could make (row P07)."""
@@ -245,9 +257,36 @@ class Participant:
         return not beats(cost, self.node_id, *self.best, self.call.criterion)
 
     def _delay_us(self, cost: int) -> int:
-        return delay_us(cost, self.floor, self.call.criterion, self.timing)
+        return self.delay(cost, self.floor, self.call.criterion, self.timing)
 
 
-def deadline_of(call: CallForProposals, now_us: int) -> int:
-    """A call's deadline as bus time in us."""
-    return from_bus_ms(call.deadline_ms, now_us)
+#: The whole protocol of a participant: (state, event) to the next state and what is done on the way.
+TABLE: dict[tuple[State, Event], tuple[State, Callable[[Participant, int], Outcome]]] = {
+    (State.WAITING_BOUND, Event.DUE): (State.WAITING_COST, Participant.search),
+    (State.WAITING_BOUND, Event.IMPOSSIBLE): (State.SILENT, Participant.give_up),
+    (State.WAITING_BOUND, Event.BEATEN): (State.SILENT, Participant.save_search),
+    (State.WAITING_BOUND, Event.DEADLINE): (State.SILENT, Participant.save_search),
+    (State.WAITING_BOUND, Event.AWARD_OTHER): (State.LOST, Participant.save_search),
+    (State.WAITING_BOUND, Event.SUPERSEDED): (State.LOST, Participant.save_search),
+    (State.WAITING_COST, Event.DUE): (State.PRE_ASSIGNED, Participant.bid),
+    (State.WAITING_COST, Event.IMPOSSIBLE): (State.SILENT, Participant.give_up),
+    (State.WAITING_COST, Event.BEATEN): (State.SILENT, Participant.save_bid),
+    (State.WAITING_COST, Event.DEADLINE): (State.SILENT, Participant.save_bid),
+    (State.WAITING_COST, Event.AWARD_OTHER): (State.LOST, Participant.save_bid),
+    (State.WAITING_COST, Event.SUPERSEDED): (State.LOST, Participant.save_bid),
+    (State.PRE_ASSIGNED, Event.BEATEN): (State.SILENT, Participant.release_beaten),
+    (State.PRE_ASSIGNED, Event.DEADLINE): (State.BELIEVING, Participant.believe),
+    (State.PRE_ASSIGNED, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
+    (State.PRE_ASSIGNED, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
+    (State.PRE_ASSIGNED, Event.SUPERSEDED): (State.LOST, Participant.release_void),
+    (State.SILENT, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
+    (State.SILENT, Event.AWARD_OTHER): (State.LOST, Participant.rest),
+    (State.SILENT, Event.SUPERSEDED): (State.LOST, Participant.rest),
+    (State.BELIEVING, Event.LAPSE): (State.LAPSED, Participant.release_lapsed),
+    (State.BELIEVING, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
+    (State.BELIEVING, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
+    (State.BELIEVING, Event.SUPERSEDED): (State.LOST, Participant.release_void),
+    (State.LAPSED, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
+    (State.LAPSED, Event.AWARD_OTHER): (State.LOST, Participant.rest),
+    (State.LAPSED, Event.SUPERSEDED): (State.LOST, Participant.rest),
+}

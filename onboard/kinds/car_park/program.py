@@ -10,11 +10,13 @@ from typing import NamedTuple
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
-from onboard.core.serial import successor, to_bus_ms
+from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Site, Station
 
 #: Most steps that fit in an itinerary: the leg number has 5 bits.
 MAX_STEPS = 31
+#: Farthest end of a leg after the stamp: 24 bits of milliseconds (4.6 h).
+MAX_LEG_US = ((1 << 24) - 1) * 1000
 
 
 class Handling(Enum):
@@ -131,17 +133,22 @@ class Program:
 
     def itinerary(self, sender: int, now_us: int) -> Itinerary:
         """The firm itinerary as it goes on the bus; one STAND leg where nothing is left to do."""
-        steps = self.remaining
+        steps, stamp = self.remaining, self.stamp
         if not steps:
             if self.standing is None:
                 raise ValueError("no position is known yet")
             place = self.standing
             steps = [Step(LegAction.STAND, place.track, place.index, place.index, now_us, now_us + 1000)]
-        return to_itinerary(sender, self.version, Grade.FIRM, self.stamp, steps)
+            # What was awarded is long done: an old award time could not be reached by the leg's 24 bits.
+            stamp = stamp._replace(award_ms=to_bus_ms(now_us))
+        return to_itinerary(sender, self.version, Grade.FIRM, stamp, steps)
 
 
 def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: list[Step]) -> Itinerary:
-    """Steps as legs on the wire; ends are rounded up to the millisecond."""
+    """Steps as legs on the wire; ends are rounded up to the millisecond.
+
+    An end that a delay has pushed before the stamp, or beyond what 24 bits hold, is told as the nearest that fits.
+    """
     legs = tuple(
         Leg(
             step.action,
@@ -149,8 +156,13 @@ def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: l
             step.from_index,
             step.to_index,
             step.work.station.side if step.work is not None else Side.NEAR,
-            to_bus_ms(step.end_us),
+            _leg_end_ms(step.end_us, stamp.award_ms),
         )
         for step in steps
     )
     return Itinerary(sender, version, grade, stamp, legs)
+
+
+def _leg_end_ms(end_us: int, award_ms: int) -> int:
+    award_us = from_bus_ms(award_ms, end_us)
+    return to_bus_ms(max(award_us, min(end_us, award_us + MAX_LEG_US)))

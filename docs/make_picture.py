@@ -1,0 +1,49 @@
+"""Draws docs/level1.svg: the terminal picture of the real day, at a busy moment. Run: python docs/make_picture.py"""
+
+import asyncio
+from datetime import timedelta
+from pathlib import Path
+
+from rich.console import Console
+
+from bus_sim.day import LEAD_US, DayOptions, choose_demand
+from bus_sim.run import RunOptions, build
+from bus_sim.show import Clock, draw
+from bus_sim.sites import find_site
+from bus_sim.virtual_time import VirtualTimeLoop
+
+#: 16:18:51 local time: a car is on its way to its place, another waits to come in.
+MOMENT_S = 16 * 3600 + 18 * 60 + 51
+
+
+async def _picture(loop: VirtualTimeLoop) -> None:
+    site = find_site("level1")
+    demand = choose_demand(DayOptions(stalls=("AG-1F",)))
+    first_us = demand.stays[0].arrival_us
+    simulation = build(site, RunOptions(), loop)
+    simulation.plant.street.add_all(demand, LEAD_US - first_us)
+    simulation.start()
+    await asyncio.sleep(MOMENT_S - first_us / 1e6 + LEAD_US / 1e6)
+    assert demand.zero is not None
+    clock = Clock(demand.zero + timedelta(microseconds=first_us - LEAD_US))
+    console = Console(record=True, width=76, file=Path("/dev/null").open("w"))
+    street = simulation.plant.street.summary()
+    line = (
+        f" cars in {street.parked}   out {street.served}   inside {street.inside}   "
+        f"calls {simulation.view.calls_opened}   bids {simulation.view.bids}   "
+        f"bus load {simulation.fleet.statistics().mean_load:.2%}"
+    )
+    console.print(draw(site, simulation.view, clock, line))
+    console.save_svg(str(Path(__file__).parent / "level1.svg"), title="bus-sim run level1")
+
+
+def main() -> None:
+    """Draw the picture."""
+    loop = VirtualTimeLoop()
+    asyncio.set_event_loop(loop)
+    loop.run_until_complete(_picture(loop))
+    loop.close()
+
+
+if __name__ == "__main__":
+    main()

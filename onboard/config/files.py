@@ -1,0 +1,27 @@
+"""Reading a file that a person wrote."""
+
+from pathlib import Path
+
+from onboard.config.problems import ConfigError, Problem, Problems
+from onboard.config.reader import Table
+from onboard.config.toml_lines import parse
+
+
+def read_text(path: Path, what: str) -> str:
+    """The text of a UTF-8 file, with or without a byte-order mark. Raises ``ConfigError`` with one problem."""
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        why = "does not exist"
+    except UnicodeDecodeError:
+        why = "is not UTF-8 text"
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        why = f"cannot be read ({getattr(error, 'strerror', None) or error})"
+    raise ConfigError([Problem(str(path), 0, "", None, why, f"name an existing {what} file")])
+
+
+def root_table(text: str, problems: Problems) -> Table:
+    """The whole document as a table. Raises ``ConfigError`` where the text is not TOML."""
+    document = parse(text, problems.file, problems)
+    problems.raise_if_any()
+    return Table(document, problems, (), document.values)

@@ -1,0 +1,114 @@
+"""The machines of a site file, and who is steward of what."""
+
+import re
+from dataclasses import dataclass, field
+
+from onboard.config.layout import FIRST_LIFT, SIDES, Layout
+from onboard.config.reader import Table
+from onboard.config.toml_lines import path_text
+from onboard.core.codes import MAX_NODE_ID, KindCode
+from onboard.core.site import Machine, Segment, Station, Track
+
+#: A C identifier, as a DBC names nodes and messages, short enough for ``<name>_<message>`` within its 32 characters.
+#: No underscore at the end: most words of the DBC language end so. The others are ``_DBC_WORDS``.
+_NAME = re.compile(r"[A-Za-z](?:[A-Za-z0-9_]{0,14}[A-Za-z0-9])?")
+_DBC_WORDS = frozenset(["FILTER", "VERSION", "Vector__XXX"])
+_NOWHERE = Segment(0, 0)
+
+
+@dataclass
+class Fleet:
+    """Machines read so far, by node-ID, and everything that has a name already, mistaken machines included."""
+
+    by_node: dict[int, Machine] = field(default_factory=dict)
+    by_name: dict[str, Machine | None] = field(default_factory=dict)
+    homes: dict[Segment, str] = field(default_factory=dict)
+
+    def add(self, table: Table, kind: KindCode, home: Segment, station: Station | None = None) -> None:
+        """Read name and node-ID of one machine; both are its own. A machine with a mistake is named but not added."""
+        name = table.text("name")
+        if name and (not _NAME.fullmatch(name) or name in _DBC_WORDS):
+            table.bad(
+                "name", name, "not usable in a DBC", "write a letter, then up to 15 letters, digits or _ (not last)"
+            )
+        elif name in self.by_name:
+            table.bad("name", name, "used twice", "give each machine a name of its own")
+        node = table.integer("node", 1, MAX_NODE_ID)
+        if "node" not in table.wrong and node in self.by_node:
+            what = f"node-ID of {self.by_node[node].name} already"
+            table.bad("node", node, what, "give each machine a node-ID of its own")
+        if table.wrong & {"name", "node"}:
+            self.by_name.setdefault(name, None)
+            return
+        self.by_name[name] = self.by_node[node] = Machine(node, name, kind, home, station)
+
+    def fixed(self) -> list[Machine]:
+        """Compartments and lifts by node-ID: what can be a steward."""
+        return [machine for _, machine in sorted(self.by_node.items()) if machine.kind is not KindCode.ROBOT]
+
+
+def read_fleet(root: Table, layout: Layout) -> Fleet:
+    """Lifts, compartments and robots of a site file."""
+    fleet = Fleet()
+    for number, table in enumerate(layout.lifts, start=FIRST_LIFT):
+        fleet.add(table, KindCode.LIFT, Segment(number, 1))
+    for table in root.tables("compartments"):
+        side = table.choice("side", list(SIDES), "near")
+        station = layout.take(table, layout.find(table, "at"), side)
+        if station is not None:
+            layout.kept.setdefault(station.segment, f"the front of {path_text(table.path)} is")
+        fleet.add(table, KindCode.COMPARTMENT, station.segment if station is not None else _NOWHERE, station)
+    for table in root.tables("robots"):
+        fleet.add(table, KindCode.ROBOT, _read_home(table, layout, fleet))
+    return fleet
+
+
+def _read_home(table: Table, layout: Layout, fleet: Fleet) -> Segment:
+    """Where a robot stands at first: a refuge of its own, as it may stand there for ever."""
+    home = layout.find(table, "home", spurs=True)
+    if home is None:
+        return _NOWHERE
+    if home in layout.kept:
+        remedy = "choose a segment where a robot may stand for ever"
+        table.bad("home", table.values["home"], f"{layout.kept[home]} there", remedy)
+    elif home in fleet.homes:
+        what = f"home of {fleet.homes[home]} already"
+        table.bad("home", table.values["home"], what, "give each robot a segment of its own")
+    fleet.homes.setdefault(home, path_text(table.path))
+    return home
+
+
+def read_stewards(table: Table, layout: Layout, fleet: Fleet) -> dict[int, int]:
+    """Node-ID of the steward of each track: the one named, else the nearest fixed machine.
+
+    Nearest is the lift for its own shaft, and otherwise by floors away, then by node-ID.
+    """
+    fixed = fleet.fixed()
+    stewards = {}
+    for number, track in layout.tracks.items():
+        if not table.has(str(number)):
+            if fixed:
+                stewards[number] = min((_distance(layout, one, track), one.node_id) for one in fixed)[1]
+            continue
+        name = table.text(str(number))
+        machine = fleet.by_name.get(name)
+        if machine in fixed and machine is not None:
+            stewards[number] = machine.node_id
+        elif name and (machine is not None or name not in fleet.by_name):
+            known = ", ".join(one.name for one in fixed)
+            table.bad(str(number), name, "no fixed machine of this name", f"fixed machines here: {known}")
+    return stewards
+
+
+def _distance(layout: Layout, machine: Machine, track: Track) -> int:
+    """Floors between a fixed machine and a track; -1 between a lift and its own shaft."""
+    if machine.home.track == track.number:
+        return -1
+    return min(
+        abs(one - other) for one in _floors(layout, machine.home.track) for other in _floors(layout, track.number)
+    )
+
+
+def _floors(layout: Layout, number: int) -> list[int]:
+    track = layout.tracks.get(number)
+    return [sill.track for sill in track.joins] if track is not None and track.joins else [number]
