@@ -96,9 +96,11 @@ async def both_directions_work(pair: Pair) -> None:
 async def a_handler_may_send(pair: Pair) -> None:
     """An answer sent from within the handler of the question arrives."""
     at_a = Listener(pair.a)
-    pair.b.subscribe(
-        lambda frame, _time_us: None if frame.is_remote else _ignore(pair.b.send(Frame(0x201, frame.data)))
-    )
+
+    def answer(frame: Frame, _time_us: int) -> None:
+        pair.b.send(Frame(0x201, frame.data))
+
+    pair.b.subscribe(answer)
     pair.a.send(Frame(0x200, b"\x01\x02"))
     await pair.settle()
     await pair.settle()
@@ -207,10 +209,6 @@ async def closing_ends_it(pair: Pair) -> None:
     assert at_b.heard == []
     assert pair.a.health().send_refused == 1
     await pair.a.close()
-
-
-def _ignore(_answer: bool) -> None:
-    return None
 
 
 CONFORMANCE: list[Callable[[Pair], Awaitable[None]]] = [

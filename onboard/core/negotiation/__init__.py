@@ -1,6 +1,7 @@
 """The Mechatronics Interaction Protocol (MIP) of Pujo, Ounnar and Zanni: a contract net without a manager."""
 
-from onboard.core.negotiation.bidding import beats, cost_difference, delay_us
+from onboard.core.negotiation.bidding import DelayRule, beats, cost_difference, cut_off_us, delay_us, last_bid_us
+from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import (
     EVENT_TYPES,
     Awarded,
@@ -15,7 +16,7 @@ from onboard.core.negotiation.events import (
 )
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy, RestartStep
 from onboard.core.negotiation.negotiation import Negotiation
-from onboard.core.negotiation.participant import Counters, Participant
+from onboard.core.negotiation.participant import Participant
 
 __all__ = [
     "EVENT_TYPES",
@@ -24,6 +25,7 @@ __all__ = [
     "CallTerms",
     "Closed",
     "Counters",
+    "DelayRule",
     "Estimator",
     "Initiator",
     "Negotiation",
@@ -36,5 +38,7 @@ __all__ = [
     "RestartStep",
     "beats",
     "cost_difference",
+    "cut_off_us",
     "delay_us",
+    "last_bid_us",
 ]

@@ -5,18 +5,24 @@ as refused. Somebody wins: one award closes the call and is said again until the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from onboard.core.codes import NOBODY, CallResult, Grade, Reason
-from onboard.core.effects import Effect, Send
+from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Reason
+from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, TaskReport
-from onboard.core.negotiation.bidding import beats
+from onboard.core.negotiation.bidding import beats, cut_off_us
+from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import CallTerms, Closed, NegotiationEvent
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Timing
 
 Outcome = list[Effect | NegotiationEvent]
+
+#: Quick repeats of an award bridge lost frames; after these the winner is down, and a reminder at a tenth of the pace
+#: is enough. Ours.
+QUICK_AWARDS = 10
+SLOW_DOWN = 10
 
 
 class State(Enum):
@@ -40,9 +46,24 @@ class Event(Enum):
 
 @dataclass(frozen=True, slots=True)
 class RestartStep:
-    """How one further attempt differs: its window is the site's times ``window_percent`` / 100."""
+    """How one attempt differs: its window in per cent of the site's, and terms replaced (None: as they were).
+
+    The paper's "possibly after a modification" (row P12): more time, another entry or exit, another measure.
+    """
 
     window_percent: int
+    from_station: int | None = None
+    to_station: int | None = None
+    criterion: Criterion | None = None
+
+    def changed(self, terms: CallTerms) -> CallTerms:
+        """The terms of this attempt."""
+        return replace(
+            terms,
+            from_station=terms.from_station if self.from_station is None else self.from_station,
+            to_station=terms.to_station if self.to_station is None else self.to_station,
+            criterion=terms.criterion if self.criterion is None else self.criterion,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +72,13 @@ class RestartPolicy:
 
     steps: tuple[RestartStep, ...] = (RestartStep(100), RestartStep(150), RestartStep(200), RestartStep(300))
 
+    def step(self, attempt: int) -> RestartStep:
+        """The step for attempt 1, 2, ..."""
+        return self.steps[min(attempt, len(self.steps)) - 1]
+
     def window_us(self, attempt: int, timing: Timing) -> int:
         """Length of attempt 1, 2, ... in us."""
-        step = self.steps[min(attempt, len(self.steps)) - 1]
-        return timing.call_window_us * step.window_percent // 100
+        return timing.call_window_us * self.step(attempt).window_percent // 100
 
 
 @dataclass
@@ -67,30 +91,21 @@ class Initiator:
     policy: RestartPolicy
     number: Callable[[], int]
     silent: bool = False
+    counters: Counters = field(default_factory=Counters)
     state: State = State.OPEN
     call: CallForProposals | None = None
     attempt: int = 0
     best: tuple[int, int] | None = None
     due_us: int | None = None
-    late_bids_ignored: int = 0
     awards_sent: int = 0
-    _table: dict[tuple[State, Event], tuple[State, Callable[[int], Outcome]]] = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        self._table = {
-            (State.OPEN, Event.DEADLINE_WITH_BID): (State.AWARDING, self._award_first),
-            (State.OPEN, Event.DEADLINE_EMPTY): (State.OPEN, self._reopen),
-            (State.OPEN, Event.EXHAUSTED): (State.CLOSED, self._refuse),
-            (State.OPEN, Event.WITHDRAW): (State.CLOSED, self._withdraw),
-            (State.AWARDING, Event.REPEAT): (State.AWARDING, self._award),
-            (State.AWARDING, Event.HEARD): (State.CLOSED, self._end),
-        }
+    # --- events ------------------------------------------------------------------------------------------------
 
     def open(self, now_us: int) -> Outcome:
         """Send the call for the next attempt."""
         self.attempt += 1
         self.best = None
-        terms = self.terms
+        terms = self.policy.step(self.attempt).changed(self.terms)
         deadline_us = now_us + self.policy.window_us(self.attempt, self.timing)
         self.call = CallForProposals(
             self.node_id,
@@ -113,8 +128,8 @@ class Initiator:
     def on_bid(self, bid: Bid, now_us: int) -> Outcome:
         """A bid counts if received before the deadline minus the guard, by my own bus time (decision on flag 11)."""
         assert self.call is not None and self.due_us is not None
-        if self.state is not State.OPEN or now_us > self.due_us - self.timing.deadline_guard_us:
-            self.late_bids_ignored += 1
+        if self.state is not State.OPEN or now_us > cut_off_us(self.due_us, self.timing):
+            self.counters.late_bids_ignored += 1
             return []
         if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):
             self.best = (bid.cost, bid.sender)
@@ -151,50 +166,70 @@ class Initiator:
         return self._fire(Event.EXHAUSTED if last else Event.DEADLINE_EMPTY, now_us)
 
     def _fire(self, event: Event, now_us: int) -> Outcome:
-        entry = self._table.get((self.state, event))
+        entry = TABLE.get((self.state, event))
         if entry is None:
             return []
         self.state, action = entry
-        return action(now_us)
+        return action(self, now_us)
 
     # --- actions -----------------------------------------------------------------------------------------------
 
-    def _award_first(self, now_us: int) -> Outcome:
-        if self.silent:
-            self.state = State.CLOSED
-            return self._end(now_us)
-        return self._award(now_us)
+    def decide(self, now_us: int) -> Outcome:
+        """The best bid has won; in the silent form everybody is taken to know that."""
+        return self._fire(Event.HEARD, now_us) if self.silent else self.award(now_us)
 
-    def _award(self, now_us: int) -> Outcome:
-        """Never given up: a winner that is never heard keeps its award, as only custody rules may re-award."""
+    def award(self, now_us: int) -> Outcome:
+        """Say who has won.
+
+        Never given up: a winner that is not heard may be working, so only custody rules may re-award (design, section
+        4). A person is told once.
+        """
         assert self.best is not None
+        winner = self.best[1]
         self.awards_sent += 1
-        repeat_us = self.timing.award_repeat_us
-        # Ten quick repeats bridge lost frames; after that the winner is down and a slow reminder is enough.
-        self.due_us = now_us + (repeat_us if self.awards_sent <= 10 else 10 * repeat_us)
-        return [Send(self._closing(self.best[1], CallResult.AWARDED, Reason.NONE))]
+        slow = self.awards_sent > QUICK_AWARDS
+        self.due_us = now_us + self.timing.award_repeat_us * (SLOW_DOWN if slow else 1)
+        outcome: Outcome = [Send(self._closing(winner, CallResult.AWARDED, Reason.NONE))]
+        if self.awards_sent == QUICK_AWARDS + 1:
+            task = self.terms.task
+            outcome.append(Report(f"node {winner} was awarded task {task.origin}.{task.number} and is not heard"))
+        return outcome
 
-    def _end(self, now_us: int) -> Outcome:
-        assert self.best is not None and self.call is not None
-        self.due_us = None
-        return [Closed(self.call, self.best[1], CallResult.AWARDED, Reason.NONE, self.attempt)]
+    def end(self, now_us: int) -> Outcome:
+        """The call is over: somebody has the task."""
+        assert self.best is not None
+        return self._closed(self.best[1], CallResult.AWARDED, Reason.NONE)
 
-    def _reopen(self, now_us: int) -> Outcome:
-        closing = self._closing(NOBODY, CallResult.REOPENED, Reason.NO_BID)
-        return [Send(closing), *self.open(now_us)]
+    def reopen(self, now_us: int) -> Outcome:
+        """Close this attempt for nobody and open the next."""
+        return [Send(self._closing(NOBODY, CallResult.REOPENED, Reason.NO_BID)), *self.open(now_us)]
 
-    def _refuse(self, now_us: int) -> Outcome:
-        assert self.call is not None
-        self.due_us = None
+    def refuse(self, now_us: int) -> Outcome:
+        """Nobody can do it: say so and why."""
         closing = self._closing(NOBODY, CallResult.REFUSED, Reason.NO_BID)
-        return [Send(closing), Closed(self.call, NOBODY, CallResult.REFUSED, Reason.NO_BID, self.attempt)]
+        return [Send(closing), *self._closed(NOBODY, CallResult.REFUSED, Reason.NO_BID)]
 
-    def _withdraw(self, now_us: int) -> Outcome:
+    def cancel(self, now_us: int) -> Outcome:
+        """The task is gone."""
+        closing = self._closing(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)
+        return [Send(closing), *self._closed(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)]
+
+    def _closed(self, winner: int, result: CallResult, reason: Reason) -> Outcome:
         assert self.call is not None
         self.due_us = None
-        closing = self._closing(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)
-        return [Send(closing), Closed(self.call, NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED, self.attempt)]
+        return [Closed(self.call, winner, result, reason, self.attempt)]
 
     def _closing(self, winner: int, result: CallResult, reason: Reason) -> Award:
         assert self.call is not None
         return Award(self.node_id, self.call.call, winner, self.terms.task, self.terms.task_version, result, reason)
+
+
+#: The whole protocol of an initiator: (state, event) to the next state and what is done on the way.
+TABLE: dict[tuple[State, Event], tuple[State, Callable[[Initiator, int], Outcome]]] = {
+    (State.OPEN, Event.DEADLINE_WITH_BID): (State.AWARDING, Initiator.decide),
+    (State.OPEN, Event.DEADLINE_EMPTY): (State.OPEN, Initiator.reopen),
+    (State.OPEN, Event.EXHAUSTED): (State.CLOSED, Initiator.refuse),
+    (State.OPEN, Event.WITHDRAW): (State.CLOSED, Initiator.cancel),
+    (State.AWARDING, Event.REPEAT): (State.AWARDING, Initiator.award),
+    (State.AWARDING, Event.HEARD): (State.CLOSED, Initiator.end),
+}

@@ -5,16 +5,19 @@ from dataclasses import dataclass, field
 from onboard.core.codes import KindCode
 from onboard.core.effects import Effect
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
+from onboard.core.negotiation.bidding import DelayRule, delay_us, last_bid_us
+from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import CallKey, CallTerms, Estimator, NegotiationEvent
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy
 from onboard.core.negotiation.initiator import State as InitiatorState
-from onboard.core.negotiation.participant import Counters, Participant, deadline_of
-from onboard.core.serial import successor
+from onboard.core.negotiation.participant import Participant
+from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Timing
 
-#: A participation is forgotten this long after its deadline: repeats of the award have ended by then.
+#: A participation that is over, or in which this machine never bid, is forgotten this long after its deadline: frames
+#: that wait in a queue longer than that are too late by the call's own deadline.
 FORGET_US = 60_000_000
-#: Most participations remembered at once; beyond it the oldest goes. A fleet has tens of calls open, not hundreds.
+#: Most participations remembered at once. A fleet has tens of calls open, not hundreds.
 MAX_CALLS = 256
 
 Outcome = list[Effect | NegotiationEvent]
@@ -22,7 +25,11 @@ Outcome = list[Effect | NegotiationEvent]
 
 @dataclass
 class Negotiation:
-    """Participants by call, initiators by own call number. ``silent`` is the award-free form, for comparison only."""
+    """Participants by call, initiators by own call number. ``silent`` is the award-free form, for comparison only.
+
+    ``boot``, 0 to 255, begins the call numbers, so that a machine that starts again does not use those of a moment
+    ago. ``delay`` is when to speak.
+    """
 
     node_id: int
     kind: KindCode
@@ -33,11 +40,18 @@ class Negotiation:
     counters: Counters = field(default_factory=Counters)
     participants: dict[CallKey, Participant] = field(default_factory=dict)
     initiators: list[Initiator] = field(default_factory=list)
-    _last_call: int = 0
+    boot: int = 0
+    delay: DelayRule = delay_us
+    _last_call: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._last_call = (self.boot & 0xFF) << 8
 
     def open(self, terms: CallTerms, now_us: int) -> list[Effect]:
         """Call for a task. The answer comes as a ``Closed`` event from ``receive`` or ``wake``."""
-        initiator = Initiator(self.node_id, terms, self.timing, self.policy, self._next_call, self.silent)
+        initiator = Initiator(
+            self.node_id, terms, self.timing, self.policy, self._next_call, self.silent, self.counters
+        )
         self.initiators.append(initiator)
         return [item for item in initiator.open(now_us) if not isinstance(item, NegotiationEvent)]
 
@@ -47,7 +61,18 @@ class Negotiation:
         for initiator in self.initiators:
             if initiator.terms == terms:
                 outcome += initiator.withdraw(now_us)
+        self._forget(now_us)
         return outcome
+
+    def standing_bid(self, key: CallKey) -> tuple[int, int] | None:
+        """Cost and node-ID of the best bid heard for another machine's call; after the deadline, the winner (P11).
+
+        None where nobody has bid, or where the call is not known to this machine.
+        """
+        participant = self.participants.get(key)
+        return participant.best if participant is not None else None
+
+    # --- events ------------------------------------------------------------------------------------------------
 
     def receive(self, message: Message, now_us: int) -> Outcome:
         """A call, bid, award, itinerary or task report of another machine."""
@@ -86,37 +111,68 @@ class Negotiation:
         due = [time for time in times if time is not None]
         return min(due) if due else None
 
+    # --- calls of others ---------------------------------------------------------------------------------------
+
     def _on_call(self, call: CallForProposals, now_us: int) -> Outcome:
-        key = CallKey(call.sender, call.call)
-        if key in self.participants:
-            return []
         if call.kind not in (KindCode.ANY, self.kind):
             self.counters.calls_of_other_kind += 1
             return []
-        deadline_us = deadline_of(call, now_us)
+        key = CallKey(call.sender, call.call)
+        known = self.participants.get(key)
+        if known is not None and known.call == call:
+            return []
+        deadline_us = from_bus_ms(call.deadline_ms, now_us)
+        if now_us >= last_bid_us(deadline_us, self.timing):
+            self.counters.calls_too_late += 1
+            return []
+        older = [one for one in self.participants.values() if one.key == key or _is_for_same_task(one.call, call)]
+        if any(one.deadline_us > deadline_us and not one.is_over for one in older):
+            self.counters.calls_stale += 1
+            return []
+        outcome: Outcome = []
+        for one in older:
+            outcome += one.supersede(now_us)
+        self.participants.pop(key, None)
+        outcome += self._make_room(now_us)
         participant = Participant(
-            self.node_id, call, self.timing, self.estimator, self.counters, self.silent, deadline_us
+            self.node_id, call, self.timing, self.estimator, self.counters, self.silent, deadline_us, self.delay
         )
         self.participants[key] = participant
-        if len(self.participants) > MAX_CALLS:
-            del self.participants[next(iter(self.participants))]
-        return participant.open(now_us)
+        return outcome + participant.open(now_us)
 
     def _on_bid(self, bid: Bid, now_us: int) -> Outcome:
         if bid.initiator == self.node_id:
             for initiator in self.initiators:
                 if initiator.call is not None and initiator.call.call == bid.call:
                     return initiator.on_bid(bid, now_us)
+            self.counters.late_bids_ignored += 1
             return []
         participant = self.participants.get(CallKey(bid.initiator, bid.call))
         return participant.on_bid(bid, now_us) if participant is not None else []
+
+    def _make_room(self, now_us: int) -> Outcome:
+        """Drop the oldest that is over, else the oldest that reserves nothing, else the oldest, which is told."""
+        if len(self.participants) < MAX_CALLS:
+            return []
+        victim = min(self.participants.values(), key=lambda one: 0 if one.is_over else 1 + one.is_committed)
+        del self.participants[victim.key]
+        return victim.supersede(now_us)
+
+    def _forget(self, now_us: int) -> None:
+        self.initiators = [one for one in self.initiators if one.state is not InitiatorState.CLOSED]
+        old = [
+            key
+            for key, one in self.participants.items()
+            if now_us > one.deadline_us + FORGET_US and (one.is_over or not one.has_bid)
+        ]
+        for key in old:
+            del self.participants[key]
 
     def _next_call(self) -> int:
         self._last_call = successor(self._last_call, 16)
         return self._last_call
 
-    def _forget(self, now_us: int) -> None:
-        self.initiators = [one for one in self.initiators if one.state is not InitiatorState.CLOSED]
-        old = [key for key, one in self.participants.items() if now_us > one.deadline_us + FORGET_US]
-        for key in old:
-            del self.participants[key]
+
+def _is_for_same_task(one: CallForProposals, other: CallForProposals) -> bool:
+    """Whether two calls are attempts at one thing; calls for parts of one task differ in operation or depth."""
+    return (one.sender, one.task, one.operation, one.depth) == (other.sender, other.task, other.operation, other.depth)

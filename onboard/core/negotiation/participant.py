@@ -78,6 +78,7 @@ class Participant:
     proposal: Proposal | None = None
     best: tuple[int, int] | None = None
     award: Award | None = None
+    has_bid: bool = False
     last_bid_us: int = field(init=False)
     cut_off_us: int = field(init=False)
     lapse_us: int = field(init=False)
@@ -128,7 +129,7 @@ class Participant:
     def on_award(self, award: Award, now_us: int) -> Outcome:
         """The initiator closes the call. Idempotent."""
         self.award = award
-        mine = award.result is CallResult.AWARDED and award.winner == self.node_id and self.proposal is not None
+        mine = award.result is CallResult.AWARDED and award.winner == self.node_id and self.has_bid
         return self._fire(Event.AWARD_ME if mine else Event.AWARD_OTHER, now_us)
 
     def supersede(self, now_us: int) -> Outcome:
@@ -180,6 +181,7 @@ class Participant:
         """Release the bid, and with it the reservations that it rests on (rows P10, P48)."""
         assert self.proposal is not None
         self.counters.bids_sent += 1
+        self.has_bid = True
         itinerary = self.proposal.itinerary
         version = itinerary.version if itinerary is not None else 0
         self.best = (self.proposal.cost, self.node_id)
