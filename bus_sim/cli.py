@@ -44,8 +44,9 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"bus-sim {__version__}")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    _add_run(commands.add_parser("run", help="run a site", epilog=HELP,
-                                 formatter_class=argparse.RawDescriptionHelpFormatter))
+    _add_run(
+        commands.add_parser("run", help="run a site", epilog=HELP, formatter_class=argparse.RawDescriptionHelpFormatter)
+    )
     dbc = commands.add_parser("dbc", help="print the DBC of a site: one message for each machine")
     dbc.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file")
     commands.add_parser("sites", help="list the sites that ship with the simulator")
@@ -53,34 +54,74 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _add_run(run: argparse.ArgumentParser) -> None:
-    run.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file (default: level1)")
+    run.add_argument(
+        "site", nargs="?", default="level1", help="name of a shipped site, or a site file (default: level1)"
+    )
     demand = run.add_argument_group("who comes (default: the shipped real day, 2019-07-24)")
     demand.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file (columns as in bus_sim/data)")
     demand.add_argument("--day", metavar="YYYY-MM-DD", help="only sessions that begin on this local day")
-    demand.add_argument("--stalls", metavar="NAME,...", default="AG-1F", help="only stalls so named, or beginning so "
-                        "(default: AG-1F, the fourteen stalls of level 1)")
+    demand.add_argument(
+        "--stalls",
+        metavar="NAME,...",
+        default="AG-1F",
+        help="only stalls so named, or beginning so (default: AG-1F, the fourteen stalls of level 1)",
+    )
     demand.add_argument("--one-car", type=float, metavar="SECONDS", help="one car by hand, fetched after so long")
-    demand.add_argument("--random", nargs=2, type=float, metavar=("MEAN", "SIGMA"),
-                        help="cars at normal intervals of this mean and standard deviation, in seconds")
+    demand.add_argument(
+        "--random",
+        nargs=2,
+        type=float,
+        metavar=("MEAN", "SIGMA"),
+        help="cars at normal intervals of this mean and standard deviation, in seconds",
+    )
     demand.add_argument("--cars", type=int, default=50, metavar="N", help="number of cars with --random (default: 50)")
     how = run.add_argument_group("how it runs")
     how.add_argument("--seed", type=int, default=1, help="seed of everything that is drawn by chance (default: 1)")
-    how.add_argument("--speed", type=float, metavar="FACTOR", help="simulated seconds a second (default: as fast as "
-                     "possible; 1 with --serve or --bus)")
+    how.add_argument(
+        "--speed",
+        type=float,
+        metavar="FACTOR",
+        help="simulated seconds a second (default: as fast as possible; 1 with --serve or --bus)",
+    )
     how.add_argument("--for", type=float, dest="limit_s", metavar="SECONDS", help="stop after so much simulated time")
-    how.add_argument("--without", action="append", default=[], metavar="MACHINE",
-                     help="leave this machine's controller out; it may join from another process")
-    how.add_argument("--fault", action="append", default=[], metavar="FAULT", help="a fault on the fleet bus, such as "
-                     "omission:receivers=11,probability=0.01,seed=7 (repeatable)")
+    how.add_argument(
+        "--without",
+        action="append",
+        default=[],
+        metavar="MACHINE",
+        help="leave this machine's controller out; it may join from another process",
+    )
+    how.add_argument(
+        "--fault",
+        action="append",
+        default=[],
+        metavar="FAULT",
+        help="a fault on the fleet bus, such as omission:receivers=11,probability=0.01,seed=7 (repeatable)",
+    )
     out = run.add_argument_group("what comes out")
-    out.add_argument("--trace", type=Path, default=Path("trace.log"), metavar="FILE",
-                     help="candump log of the fleet bus (default: trace.log)")
+    out.add_argument(
+        "--trace",
+        type=Path,
+        default=Path("trace.log"),
+        metavar="FILE",
+        help="candump log of the fleet bus (default: trace.log)",
+    )
     out.add_argument("--devices", action="store_true", help="log every machine's device bus as well")
     out.add_argument("--json", type=Path, metavar="FILE", help="write the summary as JSON too")
-    out.add_argument("--serve", nargs="?", const="127.0.0.1:29536", metavar="HOST:PORT",
-                     help="serve the buses in the socketcand protocol (default 127.0.0.1:29536)")
-    out.add_argument("--bus", action="append", default=[], metavar="INTERFACE:CHANNEL",
-                     help="join the fleet bus with a python-can interface (repeatable)")
+    out.add_argument(
+        "--serve",
+        nargs="?",
+        const="127.0.0.1:29536",
+        metavar="HOST:PORT",
+        help="serve the buses in the socketcand protocol (default 127.0.0.1:29536)",
+    )
+    out.add_argument(
+        "--bus",
+        action="append",
+        default=[],
+        metavar="INTERFACE:CHANNEL",
+        help="join the fleet bus with a python-can interface (repeatable)",
+    )
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -101,8 +101,11 @@ async def _play(site: Site, options: DayOptions, demand: Demand, loop: VirtualTi
         without=options.without,
     )
     simulation = build(site, run_options, loop)
-    console.print(f"site {site.name}, {len(demand.stays)} cars, seed {options.seed}, speed {options.speed or 'unlimited'}"
-                  + "".join(f", fault {fault}" for fault in options.faults), highlight=False)
+    console.print(
+        f"site {site.name}, {len(demand.stays)} cars, seed {options.seed}, speed {options.speed or 'unlimited'}"
+        + "".join(f", fault {fault}" for fault in options.faults),
+        highlight=False,
+    )
     simulation.plant.street.add_all(demand, origin_us)
     started_s = time.monotonic()
     async with Outside(simulation, options, console):
@@ -110,10 +113,17 @@ async def _play(site: Site, options: DayOptions, demand: Demand, loop: VirtualTi
         limit_us = round(options.limit_s * 1_000_000) if options.limit_s else last_us + origin_us + PATIENCE_US
         clock = Clock(zero)
         with TerminalShow(site, simulation.view, clock, lambda: _figures(simulation), console) as show:
-            await run_until(simulation, lambda: simulation.plant.street.is_over, limit_us, STEP_US,
-                            lambda: show.update(loop.now_us()))
+            await run_until(
+                simulation,
+                lambda: simulation.plant.street.is_over,
+                limit_us,
+                STEP_US,
+                lambda: show.update(loop.now_us()),
+            )
             if options.limit_s is None:
-                await run_until(simulation, lambda: False, loop.now_us() + TAIL_US, STEP_US, lambda: show.update(loop.now_us()))
+                await run_until(
+                    simulation, lambda: False, loop.now_us() + TAIL_US, STEP_US, lambda: show.update(loop.now_us())
+                )
     simulation.close()
     summary = summarise(simulation, time.monotonic() - started_s)
     for line in summary.lines():
@@ -160,14 +170,16 @@ class Outside:
         bound = await server.start()
         self._server = server
         channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
-        self._console.print(f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False)
+        self._console.print(
+            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False
+        )
 
 
 def _figures(simulation: Simulation) -> str:
     street = simulation.plant.street.summary()
     load = simulation.fleet.statistics()
     return (
-        f"cars in {street.parked}  out {street.served}  inside {street.inside}  waiting {street.queueing + street.asking}"
+        f"cars in {street.parked}  out {street.served}  inside {street.inside}  waiting {unserved(street)}"
         f"  calls {simulation.view.calls_opened}  bids {simulation.view.bids}  bus load {load.mean_load:.2%}"
     )
 

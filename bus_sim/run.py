@@ -8,8 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from onboard.trace.candump import CandumpWriter
-
 from bus_sim.can.faults import Fault
 from bus_sim.can.medium import Medium, Tap
 from bus_sim.journal import SimulatedJournal
@@ -22,6 +20,7 @@ from onboard.core.messages import Message
 from onboard.core.site import Machine, Site
 from onboard.kinds.registry import factory_for
 from onboard.ports.bus import Bus
+from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
 from onboard.wire.codec import device_codec, fleet_codec
 from onboard.wire.decoder import Decoder

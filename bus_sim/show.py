@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from types import TracebackType
+from typing import Self
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -94,7 +95,9 @@ def draw(site: Site, view: SiteView, clock: Clock, line: str) -> Group:
     events = [Text(f"{clock.at(when)}  {text}", overflow="ellipsis") for when, text in list(view.events)[-EVENT_LINES:]]
     events += [Text("")] * (EVENT_LINES - len(events))
     title = f"{site.name}  {clock.at(view.now_us)}"
-    return Group(Panel(Group(*floors, Text(""), states), title=title), Panel(Group(*events), title="on the bus"), Text(line))
+    return Group(
+        Panel(Group(*floors, Text(""), states), title=title), Panel(Group(*events), title="on the bus"), Text(line)
+    )
 
 
 class TerminalShow:
@@ -110,12 +113,14 @@ class TerminalShow:
         self._last_s = 0.0
         self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
 
-    def __enter__(self) -> "TerminalShow":
+    def __enter__(self) -> Self:
         if self._live is not None:
             self._live.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         if self._live is not None:
             self._live.stop()
 
@@ -130,4 +135,3 @@ class TerminalShow:
         if now_s - self._last_s >= 1 / PICTURES_S:
             self._last_s = now_s
             self._live.update(draw(self._site, self._view, self._clock, self._figures()), refresh=True)
-

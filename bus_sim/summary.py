@@ -98,7 +98,9 @@ class RunSummary:
 
 def _clock(seconds: float) -> str:
     whole = round(seconds)
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min" if whole >= 3600 else f"{whole // 60} min {whole % 60:02d} s"
+    return (
+        f"{whole // 3600} h {whole % 3600 // 60:02d} min" if whole >= 3600 else f"{whole // 60} min {whole % 60:02d} s"
+    )
 
 
 def _waiting(waiting: Waiting) -> str:

@@ -76,8 +76,6 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     """
 
     def __init__(self, *, start_us: int = 0, pace: float | None = None) -> None:
-        if pace is not None and not pace > 0:
-            raise ValueError(f"pace {pace}: must be a positive number of virtual seconds a second, or None")
         #: Wall seconds that a paced clock gave up because the machine was too slow for it.
         self.slipped_s = 0.0
         self.pace = pace
@@ -93,6 +91,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         # asyncio's own queue of ready handles: there is no public way to ask whether something is ready.
         self._ready_handles: deque[asyncio.Handle] = vars(self)["_ready"]
         selector.loop = self
+        if pace is not None and not pace > 0:
+            # Only now: asyncio insists on closing a loop, and can close only what it has set up.
+            self.close()
+            raise ValueError(f"pace {pace}: must be a positive number of virtual seconds a second, or None")
 
     # --- the clock ---------------------------------------------------------------------------------------------
 

@@ -1,7 +1,11 @@
-"""Draws docs/level1.svg: the terminal picture of the real day, at a busy moment. Run: python docs/make_picture.py"""
+"""Draws docs/level1.svg, the terminal picture of the real day at a busy moment.
+
+Run: ``python docs/make_picture.py``.
+"""
 
 import asyncio
 from datetime import timedelta
+from io import StringIO
 from pathlib import Path
 
 from rich.console import Console
@@ -26,7 +30,7 @@ async def _picture(loop: VirtualTimeLoop) -> None:
     await asyncio.sleep(MOMENT_S - first_us / 1e6 + LEAD_US / 1e6)
     assert demand.zero is not None
     clock = Clock(demand.zero + timedelta(microseconds=first_us - LEAD_US))
-    console = Console(record=True, width=76, file=Path("/dev/null").open("w"))
+    console = Console(record=True, width=76, file=StringIO())
     street = simulation.plant.street.summary()
     line = (
         f" cars in {street.parked}   out {street.served}   inside {street.inside}   "

@@ -14,10 +14,9 @@ from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon, next_boot
 from onboard.io.console import ConsoleTelemetry
 from onboard.io.journal import FileJournal
-from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.io.watchdog import SystemdWatchdog
 from onboard.kinds.registry import factory_for
-from onboard.ports.bus import Bus
 from onboard.wire.codec import device_codec, fleet_codec
 
 EXIT_STATUS = """\
@@ -79,32 +78,49 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 async def run(config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path) -> int:
-    """Run until stopped: 0 where a signal ended it, 1 where the controller ended itself."""
+    """Run until stopped: 0 where a signal ended it, 1 where the controller or its bus ended it."""
     journal = FileJournal(journal_directory)
     entries = journal.replay()
-    holon = Holon(
-        config.site, config.machine, factory_for(config.machine.kind), boot=next_boot(entries), entries=entries
-    )
-    fleet_bus = await open_bus(fleet_settings)
-    device_bus: Bus = fleet_bus
+    boot = next_boot(entries)
+    holon = Holon(config.site, config.machine, factory_for(config.machine.kind), boot=boot, entries=entries)
+    fleet_bus = device_bus = await open_bus(fleet_settings)
     device_settings = BusSettings.of(config.device_bus)
     if device_settings != fleet_settings:
         device_bus = await open_bus(device_settings)
-    watchdog = SystemdWatchdog()
-    ports = Ports(fleet_bus, device_bus, journal, ConsoleTelemetry(), watchdog)
+    ports = Ports(fleet_bus, device_bus, journal, ConsoleTelemetry(), SystemdWatchdog())
     controller = Controller(holon, ports, fleet_codec(), device_codec())
     controller.start()
-    assert controller.stopped is not None
-    loop = asyncio.get_running_loop()
-    asked = asyncio.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, asked.set)
-    waiting = asyncio.ensure_future(asked.wait())
-    await asyncio.wait([waiting, controller.stopped], return_when=asyncio.FIRST_COMPLETED)
-    ended_itself = controller.stopped.done()
-    waiting.cancel()
+    status, why = await _until_ended(controller, fleet_bus, device_bus)
+    if why:
+        print(f"onboard: {config.machine.name}: {why}", file=sys.stderr)
     await controller.stop()
-    return 1 if ended_itself else 0
+    return status
+
+
+async def _until_ended(controller: Controller, fleet_bus: OpenBus, device_bus: OpenBus) -> tuple[int, str]:
+    """Exit status and reason of whatever happens first: a signal, a halt, or a bus that is gone for good."""
+    loop = asyncio.get_running_loop()
+    ended: asyncio.Future[tuple[int, str]] = loop.create_future()
+
+    def end(status: int, why: str) -> None:
+        if not ended.done():
+            ended.set_result((status, why))
+
+    async def watch(bus: OpenBus, name: str) -> None:
+        end(1, f"the {name} bus is gone: {await bus.wait_lost()}")
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, end, 0, "")
+    assert controller.stopped is not None
+    controller.stopped.add_done_callback(lambda halted: end(1, f"halted: {halted.result()}"))
+    watching = [loop.create_task(watch(fleet_bus, "fleet"))]
+    if device_bus is not fleet_bus:
+        watching.append(loop.create_task(watch(device_bus, "device")))
+    try:
+        return await ended
+    finally:
+        for task in watching:
+            task.cancel()
 
 
 if __name__ == "__main__":

@@ -13,7 +13,9 @@ class SiteNotFoundError(ValueError):
 
 def site_names() -> list[str]:
     """Names of the shipped sites."""
-    return sorted(entry.name.removesuffix(".toml") for entry in files(__name__).iterdir() if entry.name.endswith(".toml"))
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in files(__name__).iterdir() if entry.name.endswith(".toml")
+    )
 
 
 def find_site(name: str) -> Site:
@@ -25,5 +27,7 @@ def find_site(name: str) -> Site:
         file = f"{name}.toml"
         return parse_site(files(__name__).joinpath(file).read_text(encoding="utf-8"), file)
     if not Path(name).exists():
-        raise SiteNotFoundError(f'site "{name}": no such file, and no such shipped site; shipped: {", ".join(site_names())}')
+        raise SiteNotFoundError(
+            f'site "{name}": no such file, and no such shipped site; shipped: {", ".join(site_names())}'
+        )
     return load_site(Path(name))

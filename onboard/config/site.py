@@ -91,13 +91,11 @@ def _check_whole(root: Table, layout: Layout, fleet: Fleet) -> None:
     if not places:
         root.bad("floors", None, "no place for a car", "take entries out of floors.without or add positions")
     for floors in _joined_floors(layout):
-        home_kinds = {
-            machine.kind for machine in fleet.by_node.values() if _floor(layout, machine.home.track) in floors
-        }
-        for kind in (KindCode.COMPARTMENT, KindCode.ROBOT):
-            if kind not in home_kinds:
-                what = f"no {kind.name.lower()} can be reached from floor {min(floors)}"
-                root.bad("lifts", None, what, f"join floor {min(floors)} to the others by a lift")
+        kinds = {machine.kind for machine in fleet.by_node.values() if _floor(layout, machine.home.track) in floors}
+        missing = [kind.name.lower() for kind in (KindCode.COMPARTMENT, KindCode.ROBOT) if kind not in kinds]
+        if missing:
+            what = f"no {' and no '.join(missing)} can be reached from floor {min(floors)}"
+            root.bad("lifts", None, what, f"join floor {min(floors)} to the others by a lift")
 
 
 def _joined_floors(layout: Layout) -> list[set[int]]:

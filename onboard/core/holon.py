@@ -68,7 +68,7 @@ class Holon:
         self.tokens.replay(entries)
         self.mirror = Mirror(site, machine.node_id)
         estimator = factory.estimator(site, machine, self.mirror)
-        self.negotiation = Negotiation(machine.node_id, machine.kind, site.timing, estimator)
+        self.negotiation = Negotiation(machine.node_id, machine.kind, site.timing, estimator, boot=boot)
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self._heartbeat_due_us: int | None = None

@@ -170,7 +170,7 @@ class PythonCanBus:
         """The next message; in the loop or in the reader's thread."""
         try:
             message = self._bus.recv(timeout)
-        except Exception as error:
+        except Exception as error:  # a driver may raise anything, and must not end the thread in silence
             if self._closed:
                 return None
             self._read_errors += 1
@@ -249,7 +249,7 @@ def _open(settings: BusSettings) -> can.BusABC:
             # python-can would try again in a busy loop for ten seconds, with a warning each time.
             socket.create_connection((str(keywords["host"]), int(keywords["port"])), CONNECT_TIMEOUT_S).close()
         return can.Bus(interface=settings.interface, channel=settings.channel, ignore_config=True, **keywords)
-    except Exception as error:
+    except Exception as error:  # a driver may raise anything; it becomes one line for a person
         where = f'interface "{settings.interface}", channel "{settings.channel}"'
         raise BusOpenError(f"{where}: {_first_line(error)}; {_remedy(settings, error)}") from error
 

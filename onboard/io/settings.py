@@ -39,8 +39,8 @@ class BusSettings:
 
     @classmethod
     def of(cls, other: Interface) -> Self:
-        """A copy."""
-        return cls(other.interface, other.channel, other.bitrate, tuple(other.extra))
+        """A copy; the order of further arguments does not matter."""
+        return cls(other.interface, other.channel, other.bitrate, tuple(sorted(other.extra)))
 
     def __str__(self) -> str:
         return f"{self.interface}:{self.channel}"

@@ -94,7 +94,7 @@ class SocketcandBus:
             transport, made = await self._loop.create_connection(connection, *self._address)
             try:
                 await made.ready
-            except BaseException:
+            except BaseException:  # cancelled or not: no socket is left behind
                 transport.abort()
                 raise
         if self._closed:

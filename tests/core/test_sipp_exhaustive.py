@@ -109,3 +109,14 @@ def test_no_plan_of_all_that_there_are_is_better(chunk: int) -> None:
             outcomes["delayed" if route.finish_us > bound_us else "free"] += 1
     # A test that met only easy problems would prove nothing.
     assert min(outcomes["none"], outcomes["delayed"], outcomes["free"]) >= PROBLEMS // CHUNKS // 8, outcomes
+
+
+def test_whoever_ends_the_last_visit_later_may_still_pass_the_first_on_the_way_to_the_refuge() -> None:
+    # Who works at p(1,5) first has to flee to p(1,1), is back in the spur's mouth at 42 and too late: it closes at 45.
+    # Who lets the others pass and works after them is in the mouth at 39.
+    held = (((1, 6), 6, 16), ((1, 5), 14, 30), *(((1, i), 18, 30) for i in (2, 3, 4)), ((1, 6), 45, None))
+    problem = Problem(7, 1, 6, held, (1, 7), 0, (((1, 5), 2, 0),), frozenset({(192, 1)}))
+    assert Exhaustive(problem).solve() == (35, 43)
+    route, _ = plan(problem)
+    assert isinstance(route, Route)
+    assert (route.finish_us, route.legs[-1].end_us) == (35 * TICK_US, 43 * TICK_US)

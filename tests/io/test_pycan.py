@@ -311,6 +311,12 @@ def test_the_command_line_overrides_the_file(line: str, settings: BusSettings) -
     assert bus_settings(parser.parse_args(line.split()), FILE) == settings
 
 
+def test_one_bus_named_twice_is_one_bus() -> None:
+    """A machine file may give fleet and device bus the same interface; it is opened once."""
+    turned = BusSettings("socketcand", "fleet", 250_000, FILE.extra[::-1])
+    assert BusSettings.of(turned) == BusSettings.of(FILE)
+
+
 @pytest.mark.parametrize(
     "line",
     [

@@ -178,6 +178,33 @@ async def test_the_protocol_step_by_step(served: Served) -> None:
     await until(lambda: hub.nodes == [node])
 
 
+async def test_raw_mode_begins_with_an_answer_alone(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    """python-can's client fails where a frame comes in one piece with the answer; the pause ends at its first word."""
+    monkeypatch.setattr(socketcand_session, "HOLD_S", 1_000)
+    node = served.hubs["fleet"].attach("node")
+    client = await served.raw()
+    await say(client, b"", b"< hi >")
+    await say(client, b"< open fleet >", b"< ok >")
+    client[1].write(b"< rawmode >")
+    await until(lambda: served.server.counts["listening"] == 1)
+    node.send(FRAMES[1])
+    await until(lambda: served.server.counts["received"] == 1)
+    async with asyncio.timeout(DEADLINE_S):
+        assert await client[0].read(1_000) == b"< ok >"
+    await say(client, b"< echo >", b"< frame 18FF0201 1795219200.000000 01 >< echo >")
+    client[1].close()
+
+
+async def test_the_pause_of_raw_mode_ends_by_itself(served: Served) -> None:
+    node = served.hubs["fleet"].attach("node")
+    client = await served.raw()
+    await say(client, b"", b"< hi >")
+    await say(client, b"< open fleet >< rawmode >", b"< ok >< ok >")
+    node.send(FRAMES[1])
+    await say(client, b"", b"< frame 18FF0201 1795219200.000000 01 >")
+    client[1].close()
+
+
 async def test_garbage_is_answered_and_counted(served: Served) -> None:
     client = await served.raw()
     await say(client, b"", b"< hi >")
@@ -243,7 +270,7 @@ async def in_thread(work: Callable[[], Result]) -> Result:
 
 
 async def test_python_can_joins_a_busy_bus(served: Served) -> None:
-    """Its client fails where a frame comes together with the answer to rawmode, so the server holds frames back."""
+    """Whatever else is on the bus while it joins, it joins, and both ways work."""
     hub = served.hubs["fleet"]
     node, ears = hub.attach("node"), Ears()
     node.subscribe(ears.on_frame)

@@ -52,7 +52,9 @@ class Scene:
     def assert_sound(self) -> None:
         """Nothing broke in the plant, no controller halted."""
         assert self.simulation.plant.oracle.finish() == []
-        assert {c.holon.machine.name: c.holon.halted for c in self.simulation.controllers.values() if c.holon.halted} == {}
+        assert {
+            c.holon.machine.name: c.holon.halted for c in self.simulation.controllers.values() if c.holon.halted
+        } == {}
 
 
 def car(number: int, *, wheelbase_mm: int = 2700, length_mm: int = 4300, height_mm: int = 1500) -> CarBody:

@@ -1,0 +1,1 @@
+"""Protocols of others, to measure ours against on the same bus."""
