@@ -4,6 +4,7 @@ Run: ``python docs/make_picture.py``.
 """
 
 import asyncio
+import re
 from datetime import timedelta
 from io import StringIO
 from pathlib import Path
@@ -16,11 +17,13 @@ from bus_sim.show import Clock, draw
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
 
-#: 16:18:51 local time: a car is on its way to its place, another waits to come in.
-MOMENT_S = 16 * 3600 + 18 * 60 + 51
+#: 16:16:47 local time: a car is on its way to its place.
+MOMENT_S = 16 * 3600 + 16 * 60 + 47
 
 
-async def _picture(loop: VirtualTimeLoop) -> None:
+async def _picture(target: Path) -> None:
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
     site = find_site("level1")
     demand = choose_demand(DayOptions(stalls=("AG-1F",)))
     first_us = demand.stays[0].arrival_us
@@ -38,14 +41,17 @@ async def _picture(loop: VirtualTimeLoop) -> None:
         f"bus load {simulation.fleet.statistics().mean_load:.2%}"
     )
     console.print(draw(site, simulation.view, clock, line))
-    console.save_svg(str(Path(__file__).parent / "level1.svg"), title="bus-sim run level1")
+    svg = console.export_svg(title="bus-sim run level1")
+    # rich's template asks another host for its font; the reader's own does as well.
+    svg = re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL).replace("Fira Code", "DejaVu Sans Mono")
+    target.write_text(svg, encoding="utf-8")
 
 
 def main() -> None:
     """Draw the picture."""
     loop = VirtualTimeLoop()
     asyncio.set_event_loop(loop)
-    loop.run_until_complete(_picture(loop))
+    loop.run_until_complete(_picture(Path(__file__).parent / "level1.svg"))
     loop.close()
 
 

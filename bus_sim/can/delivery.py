@@ -21,22 +21,26 @@ _ROUTES_LIMIT: Final = 16384
 class Route:
     """Handlers that hear one identifier of one sender, in order of attachment, and how many frames went this way."""
 
-    __slots__ = ("frames", "handlers", "nodes", "owners", "slow")
+    __slots__ = ("_victims", "everybody", "frames", "handlers", "owners", "prompt", "slow")
 
     def __init__(self, nodes: Iterable[SimulatedBus]) -> None:
         self.frames = 0
-        self.nodes: list[SimulatedBus] = []
-        self.slow: list[SimulatedBus] = []
+        self.everybody = list(nodes)
+        self.prompt = [node for node in self.everybody if node.is_prompt]
+        # A busy node's handlers run later anyway; only its queue's turn among the prompt ones is lost.
+        self.slow = [node for node in self.everybody if not node.is_prompt]
         self.handlers: list[FrameHandler] = []
         self.owners: list[SimulatedBus] = []
-        for node in nodes:
-            if node.is_prompt:
-                self.nodes.append(node)
-                self.handlers += node.frame_handlers
-                self.owners += [node] * len(node.frame_handlers)
-            else:
-                # A busy node's handlers run later anyway; only its queue's turn among the prompt ones is lost.
-                self.slow.append(node)
+        for node in self.prompt:
+            self.handlers += node.frame_handlers
+            self.owners += [node] * len(node.frame_handlers)
+        self._victims: dict[FaultInjector, list[SimulatedBus]] = {}
+
+    def victims(self, injector: FaultInjector) -> list[SimulatedBus]:
+        """The nodes on this route that a fault may strike."""
+        if injector not in self._victims:
+            self._victims[injector] = [n for n in self.everybody if injector.chooses(n.name, n.node_id)]
+        return self._victims[injector]
 
 
 def _deaf(_frame: Frame, _time_us: int) -> None:
@@ -58,7 +62,7 @@ class Delivery:
     def forget_routes(self) -> None:
         """Something that routes depend on has changed."""
         for route in self._routed:
-            for node in route.nodes:
+            for node in route.prompt:
                 node.count_received(route.frames)
         self._routed.clear()
         for sender in self._senders:
@@ -76,12 +80,12 @@ class Delivery:
 
     def deliver(self, frame: Frame, key: int, excepted: Sequence[SimulatedBus], now_us: int) -> None:
         """Hand a frame with arbitration field ``key`` to all but ``excepted``, of whom the first sent it."""
-        if self._injectors:
-            struck = [i for i in self._injectors if i.concerns(frame, now_us)]
-            if struck:
-                self._deliver_struck(frame, excepted, now_us, struck)
-                return
         route = self._route(frame, key, excepted)
+        if self._injectors:
+            copies = self._strike(route, frame, now_us)
+            if copies:
+                self._deliver_copies(route, frame, now_us, copies)
+                return
         route.frames += 1
         self._under_way = route
         for handler in route.handlers:
@@ -104,33 +108,33 @@ class Delivery:
                 sender.routes[key] = route
         return route
 
-    def _deliver_struck(
-        self, frame: Frame, excepted: Sequence[SimulatedBus], now_us: int, struck: Sequence[FaultInjector]
-    ) -> None:
-        for node in list(self.listeners):
-            if node in excepted or not node.accepts(frame):
-                continue
-            for delay_us in _copies(node, struck):
+    def _strike(self, route: Route, frame: Frame, now_us: int) -> dict[SimulatedBus, list[int]]:
+        """Let the faults strike: the delays, in microseconds, of each copy that a struck node hears, perhaps none."""
+        copies: dict[SimulatedBus, list[int]] = {}
+        for injector in self._injectors:
+            if injector.concerns(frame, now_us):
+                for node in route.victims(injector):
+                    if injector.strikes():
+                        _change(copies.setdefault(node, [0]), injector)
+        return copies
+
+    def _deliver_copies(self, route: Route, frame: Frame, now_us: int, copies: dict[SimulatedBus, list[int]]) -> None:
+        for node in route.everybody:
+            for delay_us in copies.get(node, (0,)):
                 if delay_us:
                     self._clock.at_us(now_us + delay_us, partial(_receive_late, node, frame))
-                else:
+                elif node.is_open:
                     node.receive(frame, now_us)
 
 
-def _copies(node: SimulatedBus, struck: Sequence[FaultInjector]) -> list[int]:
-    """The delays, in microseconds, of each copy of a frame that a node hears; empty where it hears none."""
-    copies = [0]
-    for injector in struck:
-        if not injector.chooses(node.name, node.node_id) or not injector.strikes():
-            continue
-        match injector.fault.kind:
-            case FaultKind.OMISSION:
-                return []
-            case FaultKind.DUPLICATE:
-                copies.append(copies[0] + injector.fault.delay_us)
-            case FaultKind.DELAY:
-                copies[0] += injector.fault.delay_us
-    return copies
+def _change(delays_us: list[int], injector: FaultInjector) -> None:
+    match injector.fault.kind:
+        case FaultKind.OMISSION:
+            delays_us.clear()
+        case FaultKind.DUPLICATE if delays_us:
+            delays_us.append(delays_us[0] + injector.fault.delay_us)
+        case FaultKind.DELAY if delays_us:
+            delays_us[0] += injector.fault.delay_us
 
 
 def _receive_late(node: SimulatedBus, frame: Frame, now_us: int) -> None:

@@ -140,7 +140,7 @@ class Street:
 
     def _who_may_go(self, node_id: int) -> tuple[Customer, Event] | None:
         compartment = self._compartments[node_id]
-        if not compartment.is_input_open or compartment.body.persons:
+        if not compartment.is_input_open:
             return None
         for customer in self._waiting[node_id]:
             if customer.state is State.AWAITING_DOOR:

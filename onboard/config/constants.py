@@ -82,7 +82,7 @@ def read_timing(table: Table, robots: int, bitrate: int) -> Timing:
     half_ms = table.integer("bid_half_ms", 1, 3_600_000, 10_000)
     guard_ms = table.integer("deadline_guard_ms", 0, 10_000, 20)
     if delay_ms < least_ms:
-        what = f"shorter than 3 times {robots} robots times two frames at {bitrate} bit/s"
+        what = f"shorter than 3 N times two frames at {bitrate} bit/s, N = {robots} robots"
         table.bad("bid_delay_ms", delay_ms, what, f"write at least {least_ms}")
     if delay_ms + guard_ms >= window_ms and not table.wrong:
         name = next((one for one in ("call_window_ms", "bid_delay_ms") if one in table.values), "deadline_guard_ms")

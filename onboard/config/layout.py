@@ -21,9 +21,9 @@ _MOST_POSITIONS = 127
 class Layout:
     """What has been read so far.
 
-    ``known`` is False where number or length of the alleys is mistaken: what refers to them is then not judged. ``lifts``
-    are the tables of the lifts, in the order of their tracks. ``taken`` says what stands at a station that is no place,
-    ``kept`` why nobody may stand for long at a segment.
+    ``known`` is False where number or length of the alleys is mistaken: what refers to them is then not judged.
+    ``lifts`` are the tables of the lifts, in the order of their tracks. ``taken`` says what stands at a station that
+    is no place, ``kept`` why nobody may stand for long at a segment.
     """
 
     tracks: dict[int, Track] = field(default_factory=dict)
@@ -85,10 +85,8 @@ def read_layout(root: Table, floor_height_mm: int) -> Layout:
     layout = Layout()
     floors = root.table("floors", required=True)
     layout.pitch_mm = floors.integer("pitch_mm", 1000, 10_000, layout.pitch_mm)
-    if "floors" in root.wrong:
-        layout.known = False
-    else:
-        _read_alleys(layout, floors)
+    _read_alleys(layout, floors)
+    layout.known = layout.known and "floors" not in root.wrong
     _read_without(layout, floors)
     layout.lifts = root.tables("lifts")
     _read_lifts(layout, floor_height_mm)

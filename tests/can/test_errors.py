@@ -311,3 +311,18 @@ def test_error_frames_reach_nodes_that_asked_for_them(make_rig: MakeRig) -> None
 def test_a_bit_rate_that_can_cannot_have(bit_rate: int) -> None:
     with closing(VirtualTimeLoop()) as loop, pytest.raises(ValueError, match=f"bit rate {bit_rate}"):
         Medium(loop, bit_rate=bit_rate)
+
+
+def test_a_reception_brings_a_passive_receiver_straight_back(make_rig: MakeRig) -> None:
+    rig = make_rig(faults=[every_frame(receivers=("b",), until_us=10_000)])
+    a, b = rig.node("a"), rig.node("b")
+    rig.node("c")
+    for number in range(20):
+        a.send(ext(0x100 + number))
+    rig.run(20_000)
+    assert b.health().rec > 127
+    a.send(FRAME)
+    rig.run(1_000)
+    assert b.health().rec == 127
+    assert b.health().state is ErrorState.ERROR_ACTIVE
+    assert rig.heard["b"][-1][1] == FRAME

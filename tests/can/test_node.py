@@ -146,3 +146,17 @@ def test_load_is_split_where_a_frame_crosses_a_second(rig: Rig) -> None:
     rig.run(3_000_000)
     assert rig.medium.statistics().worst_second_load <= 1.0
     assert rig.medium.statistics().mean_load == pytest.approx(1.0, abs=0.001)
+
+
+def test_a_sender_of_very_many_identifiers_is_counted_right(rig: Rig) -> None:
+    a, b = rig.node("a"), rig.node("b")
+    count = 17_000
+
+    def next_frame(frame: Frame, _time_us: int) -> None:
+        if frame.arbitration_id + 1 < count:
+            a.send(ext(frame.arbitration_id + 1))
+
+    a.subscribe(lambda _frame, _time_us: None, next_frame)
+    a.send(ext(0))
+    rig.run(5_000_000)
+    assert b.health().received == a.health().sent == len(rig.heard["b"]) == count

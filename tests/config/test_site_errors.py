@@ -21,7 +21,8 @@ ONE_MISTAKE = {
     "two lifts at one end": (
         'end = "right"',
         'end = "left"',
-        's.toml:16: lifts[1].end = "left": the sill of lifts[0] is at p(1,1) already; put one lift at each end of an alley',
+        's.toml:16: lifts[1].end = "left": the sill of lifts[0] is at p(1,1) already; '
+        "put one lift at each end of an alley",
     ),
     "home before a compartment": (
         'home = "p(1,2)"',
@@ -106,7 +107,7 @@ ONE_MISTAKE = {
     "bids too late for a slow bus": (
         'name = "two"',
         'name = "two"\nbitrate = 10_000\n[timing]\nbid_delay_ms = 90',
-        "s.toml:5: timing.bid_delay_ms = 90: shorter than 3 times 1 robots times two frames at 10000 bit/s; "
+        "s.toml:5: timing.bid_delay_ms = 90: shorter than 3 N times two frames at 10000 bit/s, N = 1 robots; "
         "write at least 96",
     ),
     "not TOML": (
@@ -151,6 +152,8 @@ def test_an_empty_file_is_told_what_it_lacks() -> None:
         "s.toml: site: missing; add a table [site]",
         "s.toml: site.name: missing; write a text in quotes",
         "s.toml: floors: missing; add a table [floors]",
+        "s.toml: floors.count: missing; write a whole number from 1 to 127",
+        "s.toml: floors.positions: missing; write a whole number from 2 to 127",
         "s.toml: compartments: no compartment; add at least one [[compartments]] table",
         "s.toml: robots: no robot; add at least one [[robots]] table",
     ]

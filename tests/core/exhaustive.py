@@ -7,6 +7,7 @@ departs at ticks. Whole times of departure are bits of an integer; states are st
 """
 
 from dataclasses import dataclass, field
+from itertools import product
 
 from onboard.core.site import Axis
 
@@ -92,11 +93,8 @@ class Exhaustive:
 
     def edges(self, everywhere: list[Place]) -> list[Edge]:
         """All moves."""
-        found = []
-        for origin in everywhere:
-            for goal in everywhere:
-                if origin[0] == goal[0] and origin != goal:
-                    found.append(self.run(origin, goal))
+        pairs = product(everywhere, everywhere)
+        found = [self.run(here, there) for here, there in pairs if here[0] == there[0] and here != there]
         if self.problem.spur_at is not None:
             mouth, inside = (1, self.problem.spur_at), (192, 1)
             windows = tuple((place, 0, 4) for place in self.touched(mouth) + self.touched(inside))

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -43,7 +45,7 @@ def test_safe_intervals_are_the_instants_that_no_other_node_holds(
             assert held != any(gap.from_us <= instant < gap.to_us for gap in gaps)
         assert all(gap.from_us >= from_us for gap in gaps)
         # In order and as long as can be: two gaps never touch.
-        assert all(one.from_us < one.to_us < two.from_us for one, two in zip(gaps, gaps[1:], strict=False))
+        assert all(one.from_us < one.to_us < two.from_us for one, two in pairwise(gaps))
 
 
 @given(PLANS, st.integers(1, 3), st.lists(WINDOWS, max_size=4))

@@ -1,0 +1,156 @@
+"""The two programs as a person meets them: help, mistakes, a real run, a controller in a process of its own."""
+
+import asyncio
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bus_sim.cli import main as bus_sim
+from onboard.cli import main as onboard
+
+DEADLINE_S = 60
+
+
+def run_program(*words: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", *words],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), **environment},
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
+
+
+def test_one_car_by_hand_is_parked_and_fetched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    trace, figures = tmp_path / "trace.log", tmp_path / "figures.json"
+    status = bus_sim(["run", "--one-car", "120", "--trace", str(trace), "--json", str(figures)])
+    shown = capsys.readouterr().out
+    assert status == 0
+    assert "cars         in 1   out 1   inside 0" in shown
+    assert str(trace) in shown.replace("\n", "")
+    lines = trace.read_text().splitlines()
+    assert all(re.fullmatch(r"\(\d{10}\.\d{6}\) fleet [0-9A-F]{8}#[0-9A-F]{16}", line) for line in lines)
+    summary = json.loads(figures.read_text())
+    assert (summary["cars_in"], summary["cars_out"], summary["violations"]) == (1, 1, [])
+    assert summary["frames"] == len(lines)
+
+
+def test_the_real_day_serves_everybody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    status = bus_sim(["run", "--trace", str(tmp_path / "trace.log")])
+    shown = capsys.readouterr().out
+    assert status == 0, shown
+    assert "cars         in 33   out 33   inside 0   refused: full 0, too large 0" in shown
+    assert "calls        66   opened again 0   refused 0" in shown
+    assert "HALTED" not in shown and "VIOLATION" not in shown
+
+
+def test_equal_seeds_give_equal_logs_in_processes_with_different_hash_seeds(tmp_path: Path) -> None:
+    logs = []
+    for hash_seed in ("1", "2"):
+        log = tmp_path / f"{hash_seed}.log"
+        done = run_program(
+            "bus_sim.cli", "run", "--random", "200", "60", "--cars", "4", "--seed", "5", "--devices",
+            "--fault", "omission:receivers=11,probability=0.05,seed=3", "--trace", str(log),
+            cwd=tmp_path, PYTHONHASHSEED=hash_seed,
+        )  # fmt: skip
+        assert done.returncode in (0, 1), done.stderr
+        logs.append(log.read_bytes())
+    assert logs[0] == logs[1] and len(logs[0]) > 100_000
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["run", "no-such-site"], r'site "no-such-site": no such file.*shipped: level1'),
+        (["run", "--day", "24.7.2019"], r"--day 24.7.2019: not a day; write it as 2019-07-24"),
+        (["run", "--sessions", "nowhere.csv"], r"nowhere\.csv"),
+        (["run", "--stalls", "ZZ-9"], r"ZZ-9"),
+        (["run", "--fault", "gremlins"], r"--fault gremlins: "),
+        (["run", "--without", "MR7"], r"--without MR7: no such machine; machines here: IOC1, MR1"),
+        (["run", "--speed", "0"], r"--speed 0.0: must be above 0"),
+        (["run", "--bus", "vcan0"], r'--bus "vcan0": must be INTERFACE:CHANNEL'),
+    ],
+)
+def test_a_persons_mistake_gets_one_clear_line_and_status_2(
+    words: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert bus_sim(words) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert re.search(told, error), error
+    assert list(tmp_path.iterdir()) == [], "nothing half done"
+
+
+@pytest.mark.parametrize("program", ["bus_sim.cli", "onboard"])
+def test_help_teaches_and_the_version_is_told(program: str, tmp_path: Path) -> None:
+    shown = run_program(program, "--help", cwd=tmp_path)
+    assert shown.returncode == 0
+    assert "exit status:" in shown.stdout and "examples:" in shown.stdout
+    assert re.fullmatch(r"(bus-sim|onboard) \d+\.\d+\.\d+\n", run_program(program, "--version", cwd=tmp_path).stdout)
+
+
+def test_a_machine_file_without_its_site_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "mr1.toml"
+    file.write_text('[machine]\nname = "MR1"\nsite = "gone.toml"\n[fleet_bus]\ninterface = "virtual"\nchannel = "x"\n')
+    assert onboard(["--machine", str(file)]) == 2
+    assert "gone.toml" in capsys.readouterr().err
+
+
+async def _first_line(stream: asyncio.StreamReader, wanted: str) -> str:
+    while True:
+        line = (await stream.readline()).decode()
+        if not line:
+            raise AssertionError(f"ended before {wanted!r} was said")
+        if wanted in line:
+            return line
+
+
+async def test_the_robot_joins_from_a_process_of_its_own(tmp_path: Path) -> None:
+    """P58: the controller that ran inside the simulation runs unchanged in its own process over the served buses."""
+    root = Path(__file__).parents[2]
+    site = (root / "bus_sim" / "sites" / "level1.toml").read_text()
+    (tmp_path / "level1.toml").write_text(site)
+    environment = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": "200"}
+    words = ["run", "level1.toml", "--serve", "127.0.0.1:0", "--without", "MR1", "--one-car", "20", "--speed", "15"]
+    simulator = await asyncio.create_subprocess_exec(
+        sys.executable, "-u", "-m", "bus_sim.cli", *words, "--trace", "trace.log", "--json", "figures.json",
+        cwd=tmp_path, env=environment, stdout=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    assert simulator.stdout is not None
+    async with asyncio.timeout(DEADLINE_S):
+        serving = await _first_line(simulator.stdout, "serving at")
+    port = re.search(r"127\.0\.0\.1:(\d+)", serving)
+    assert port is not None
+    bus = f'interface = "socketcand-asyncio"\nhost = "127.0.0.1"\nport = {port[1]}\n'
+    (tmp_path / "mr1.toml").write_text(
+        f'[machine]\nname = "MR1"\nsite = "level1.toml"\n[fleet_bus]\nchannel = "fleet"\n{bus}[device_bus]\n'
+        f'channel = "MR1"\n{bus}'
+    )
+    robot = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "onboard", "--machine", "mr1.toml", cwd=tmp_path, env=environment,
+        stderr=asyncio.subprocess.PIPE,
+    )  # fmt: skip
+    try:
+        async with asyncio.timeout(DEADLINE_S):
+            await simulator.stdout.read()
+            assert await simulator.wait() == 0
+    finally:
+        if simulator.returncode is None:
+            simulator.kill()
+        robot.send_signal(signal.SIGTERM)
+        async with asyncio.timeout(DEADLINE_S):
+            _, errors = await robot.communicate()
+    figures = json.loads((tmp_path / "figures.json").read_text())
+    assert (figures["cars_in"], figures["cars_out"], figures["unserved"]) == (1, 1, 0)
+    assert robot.returncode == 0, errors.decode()
+    assert b"program:" in errors
+    assert (tmp_path / "journal-MR1").exists()
