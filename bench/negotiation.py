@@ -27,7 +27,16 @@ from onboard.core.effects import Effect, Send
 from onboard.core.frame import Frame
 from onboard.core.kinematics import run_duration_us
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Reference, Stamp
-from onboard.core.negotiation import Awarded, CallTerms, Closed, DelayRule, Negotiation, NegotiationEvent, Proposal
+from onboard.core.negotiation import (
+    Awarded,
+    CallTerms,
+    Closed,
+    DelayRule,
+    Negotiation,
+    NegotiationEvent,
+    Proposal,
+    slot_of,
+)
 from onboard.core.negotiation import delay_us as better_bids_sooner
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Segment, Site, Timing
@@ -184,7 +193,8 @@ def mip(silent: bool = False, delay: Callable[[int], DelayRule] | None = None) -
     def make(node_id: int, robot: IdleRobot, site: Site, fleet: frozenset[int]) -> Negotiation:
         kind = KindCode.COMPARTMENT if node_id == INITIATOR else KindCode.ROBOT
         rule = delay(node_id) if delay is not None else better_bids_sooner
-        return Negotiation(node_id, kind, site.timing, robot, silent=silent, delay=rule)
+        slot = slot_of(site, node_id)
+        return Negotiation(node_id, kind, site.timing, robot, silent=silent, delay=rule, slot=slot)
 
     return make
 
@@ -310,7 +320,7 @@ def main() -> None:
     print(
         f"{calls} calls a row, seed {SEED}; idle robots at random among {POSITIONS} places; {PROCESSING_US} us to read "
         f"a frame; 500 kbit/s; W {timing.bid_delay_us / 1e3:g} ms, h {timing.bid_half_us / 1e6:g} s, window "
-        f"{timing.call_window_us / 1e3:g} ms\n"
+        f"{timing.call_window_us / 1e3:g} ms, slots of {slot_of(alley(5), INITIATOR).length_us / 1e3:g} ms\n"
     )
     _print_protocols(calls)
     _print_slower_boards(calls)

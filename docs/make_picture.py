@@ -21,7 +21,7 @@ from bus_sim.virtual_time import VirtualTimeLoop
 MOMENT_S = 16 * 3600 + 16 * 60 + 47
 
 
-async def _picture(target: Path) -> None:
+async def _picture() -> str:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
     site = find_site("level1")
@@ -43,15 +43,15 @@ async def _picture(target: Path) -> None:
     console.print(draw(site, simulation.view, clock, line))
     svg = console.export_svg(title="bus-sim run level1")
     # rich's template asks another host for its font; the reader's own does as well.
-    svg = re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL).replace("Fira Code", "DejaVu Sans Mono")
-    target.write_text(svg, encoding="utf-8")
+    return re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL).replace("Fira Code", "DejaVu Sans Mono")
 
 
 def main() -> None:
     """Draw the picture."""
     loop = VirtualTimeLoop()
     asyncio.set_event_loop(loop)
-    loop.run_until_complete(_picture(Path(__file__).parent / "level1.svg"))
+    svg = loop.run_until_complete(_picture())
+    Path(__file__).with_name("level1.svg").write_text(svg, encoding="utf-8")
     loop.close()
 
 

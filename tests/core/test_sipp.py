@@ -261,7 +261,7 @@ def centres_mm(legs: tuple[RouteLeg, ...]) -> list[float]:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_machines_that_plan_one_after_the_other_never_touch(seed: int) -> None:
-    # Bumper to bumper at first; from right to left each works behind where the one before ends, and ends anywhere there.
+    # Bumper to bumper at first; from right to left each works, and ends, behind where the one before ends.
     rng = random.Random(f"fleet {seed}")
     site = alley(30)
     reservations = Reservations()

@@ -5,12 +5,12 @@ import pytest
 from cantools.database.can import Database
 
 from bus_sim.plant import carrier, compartment, shuttle
-from dbc import device_dbc_path
+from dbc import device_dbc_text
 
 
 @pytest.fixture(scope="module")
 def contract() -> Database:
-    database = cantools.database.load_string(device_dbc_path().read_text(encoding="utf-8"), "dbc")
+    database = cantools.database.load_string(device_dbc_text(), "dbc")
     assert isinstance(database, Database)
     return database
 

@@ -120,7 +120,7 @@ async def test_the_robot_joins_from_a_process_of_its_own(tmp_path: Path) -> None
     site = (root / "bus_sim" / "sites" / "level1.toml").read_text()
     (tmp_path / "level1.toml").write_text(site)
     environment = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": "200"}
-    words = ["run", "level1.toml", "--serve", "127.0.0.1:0", "--without", "MR1", "--one-car", "20", "--speed", "15"]
+    words = ["run", "level1.toml", "--serve", "127.0.0.1:0", "--without", "MR1", "--one-car", "20", "--speed", "20"]
     simulator = await asyncio.create_subprocess_exec(
         sys.executable, "-u", "-m", "bus_sim.cli", *words, "--trace", "trace.log", "--json", "figures.json",
         cwd=tmp_path, env=environment, stdout=asyncio.subprocess.PIPE,

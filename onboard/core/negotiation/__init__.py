@@ -1,6 +1,15 @@
 """The Mechatronics Interaction Protocol (MIP) of Pujo, Ounnar and Zanni: a contract net without a manager."""
 
-from onboard.core.negotiation.bidding import DelayRule, beats, cost_difference, cut_off_us, delay_us, last_bid_us
+from onboard.core.negotiation.bidding import (
+    DelayRule,
+    Slot,
+    beats,
+    cost_difference,
+    cut_off_us,
+    delay_us,
+    last_bid_us,
+    slot_of,
+)
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import (
     EVENT_TYPES,
@@ -36,9 +45,11 @@ __all__ = [
     "Released",
     "RestartPolicy",
     "RestartStep",
+    "Slot",
     "beats",
     "cost_difference",
     "cut_off_us",
     "delay_us",
     "last_bid_us",
+    "slot_of",
 ]

@@ -1,13 +1,21 @@
 """When to speak, until when, and which bid is better: the rules that keep the bus quiet."""
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from onboard.core.codes import Criterion
 from onboard.core.serial import BUS_MS_MODULUS
-from onboard.core.site import Timing
+from onboard.core.site import Site, Timing
 
 #: How long a bidder waits: from its cost, the call's floor, the criterion and the site's times, in us.
 DelayRule = Callable[[int, int, Criterion, Timing], int]
+
+#: Worst-case classic frame of 8 bytes with a 29-bit identifier, in bits (Davis, Burns, Bril, Lukkien 2007).
+_FRAME_BITS = 160
+#: A bid waits at most for a frame on the wire and one of higher priority, then is sent itself: three frames.
+_FRAMES_TO_HEAR = 3
+#: What a controller may take to read a bid, us. Ours.
+_READING_US = 500
 
 _HALF = BUS_MS_MODULUS >> 1
 
@@ -33,6 +41,38 @@ def delay_us(cost: int, floor: int, criterion: Criterion, timing: Timing) -> int
     """
     above = max(0, cost_difference(cost, floor, criterion)) * 1000
     return timing.bid_delay_us * above // (above + timing.bid_half_us)
+
+
+class Slot(NamedTuple):
+    """When in each round of ``count`` slots of ``length_us`` a machine may begin to speak: in slot ``number``, from 0.
+
+    A length of 0 means at any time.
+    """
+
+    number: int
+    count: int
+    length_us: int
+
+
+#: No slots: machines whose delays end within one bus latency then speak all at once.
+ANY_TIME = Slot(0, 1, 0)
+
+
+def slot_of(site: Site, node_id: int) -> Slot:
+    """A machine's slot: its rank by node-ID among all of the site's. Raises ``ValueError`` for a node not of the site.
+
+    One slot is as long as a bid takes to be heard by all, so of two machines that are equally good, or nearly so, the
+    second hears the first and stays silent: a queued frame cannot be recalled. So the bids of a call strictly improve
+    on the wire (row P08), as long as no controller is late.
+    """
+    length_us = _FRAMES_TO_HEAR * _FRAME_BITS * 1_000_000 // site.bitrate + _READING_US
+    return Slot(sorted(site.machines).index(node_id), len(site.machines), length_us)
+
+
+def in_slot(delay_us: int, slot: Slot) -> int:
+    """A delay moved within its round to the machine's own slot; a round is short beside W, so better still is sooner."""
+    round_us = slot.count * slot.length_us
+    return delay_us // round_us * round_us + slot.number * slot.length_us if round_us else delay_us
 
 
 def cut_off_us(deadline_us: int, timing: Timing) -> int:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from onboard.core.codes import KindCode
 from onboard.core.effects import Effect
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
-from onboard.core.negotiation.bidding import DelayRule, delay_us, last_bid_us
+from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import CallKey, CallTerms, Estimator, NegotiationEvent
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy
@@ -28,7 +28,7 @@ class Negotiation:
     """Participants by call, initiators by own call number. ``silent`` is the award-free form, for comparison only.
 
     ``boot``, 0 to 255, begins the call numbers, so that a machine that starts again does not use those of a moment
-    ago. ``delay`` is when to speak.
+    ago. ``delay`` and ``slot`` say when to speak; without a slot, bids that are ready at one moment may cross.
     """
 
     node_id: int
@@ -42,6 +42,7 @@ class Negotiation:
     initiators: list[Initiator] = field(default_factory=list)
     boot: int = 0
     delay: DelayRule = delay_us
+    slot: Slot = ANY_TIME
     _last_call: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -135,7 +136,15 @@ class Negotiation:
         self.participants.pop(key, None)
         outcome += self._make_room(now_us)
         participant = Participant(
-            self.node_id, call, self.timing, self.estimator, self.counters, self.silent, deadline_us, self.delay
+            self.node_id,
+            call,
+            self.timing,
+            self.estimator,
+            self.counters,
+            self.silent,
+            deadline_us,
+            self.delay,
+            self.slot,
         )
         self.participants[key] = participant
         return outcome + participant.open(now_us)

@@ -12,7 +12,16 @@ from enum import Enum
 from onboard.core.codes import CallResult, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Bid, CallForProposals
-from onboard.core.negotiation.bidding import DelayRule, beats, cut_off_us, delay_us, last_bid_us
+from onboard.core.negotiation.bidding import (
+    ANY_TIME,
+    DelayRule,
+    Slot,
+    beats,
+    cut_off_us,
+    delay_us,
+    in_slot,
+    last_bid_us,
+)
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import (
     Awarded,
@@ -70,6 +79,7 @@ class Participant:
     silent: bool
     deadline_us: int
     delay: DelayRule = delay_us
+    slot: Slot = ANY_TIME
     state: State = State.WAITING_BOUND
     due_us: int | None = None
     heard_us: int = 0
@@ -259,7 +269,7 @@ class Participant:
         return not beats(cost, self.node_id, *self.best, self.call.criterion)
 
     def _delay_us(self, cost: int) -> int:
-        return self.delay(cost, self.floor, self.call.criterion, self.timing)
+        return in_slot(self.delay(cost, self.floor, self.call.criterion, self.timing), self.slot)
 
 
 #: The whole protocol of a participant: (state, event) to the next state and what is done on the way.

@@ -69,6 +69,9 @@ class ShuttleWork:
 
     def sense(self, state: ShuttleState) -> None:
         """Take up the shuttle's state."""
+        if self.sensed is None:
+            # The shuttle does nothing on an order that it has had: go on from its number after a restart.
+            self.sequence = state.sequence
         self.sensed = state
         self.fault = state.mode is ShuttleMode.FAULT
 

@@ -70,6 +70,8 @@ class Carriage:
     def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
         before = self.sensed
+        if before is None:
+            self.sequence = state.sequence
         self.sensed = state
         here = self.segment_at(state.position_mm)
         started_or_stopped = before is None or before.mode is not state.mode

@@ -1,0 +1,313 @@
+"""Rows of the systems list that need a whole site, or two machines, to be seen."""
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import pytest
+
+from bus_sim.demand import Demand, Stay
+from bus_sim.run import Simulation
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import (
+    ANY_STATION,
+    CallResult,
+    Criterion,
+    DeskText,
+    Grade,
+    KindCode,
+    LegAction,
+    MachineState,
+    Operation,
+    Reason,
+    TaskPhase,
+)
+from onboard.core.effects import Effect, Report, Send
+from onboard.core.holon import Holon
+from onboard.core.messages import (
+    Award,
+    Bid,
+    BusTime,
+    CallForProposals,
+    DeskOrder,
+    Heartbeat,
+    Itinerary,
+    Message,
+    OperatorOrder,
+    Reference,
+    Stamp,
+    TaskReport,
+)
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
+from onboard.core.serial import to_bus_ms
+from onboard.core.site import Machine, Segment, Site, Station
+from onboard.kinds.car_park.generation import CarParkGeneration
+from onboard.kinds.car_park.program import Handling, Program, Step, Work
+from onboard.wire.codec import fleet_codec
+from tests.sites import one_floor
+from tests.system.scene import Scene, car, play, stays
+
+SITE = one_floor(robots=2)
+BAY = SITE.compartments[1]
+
+
+def a_call(
+    deadline_us: int = 2_000_000, *, to_station: int = ANY_STATION, wheelbase_mm: int = 2700
+) -> CallForProposals:
+    task = Reference(1, 1)
+    return CallForProposals(
+        1, 1, task, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, 1, 0, to_bus_ms(deadline_us), BAY.number,
+        to_station, task, wheelbase_mm,
+    )  # fmt: skip
+
+
+def a_robot(standing: Segment, steps: list[Step] | None = None) -> CarParkGeneration:
+    program = Program(SITE, standing)
+    if steps:
+        program.replace(steps, Stamp(0, 1, 1))
+    return CarParkGeneration(SITE, SITE.machines[11], Mirror(SITE, 11), program)
+
+
+def test_p18_a_busy_robot_bids_a_later_finishing_date_than_its_idle_twin() -> None:
+    call = a_call()
+    work = Work(Handling.LEAVE, Station(1, 8, BAY.side), Reference(1, 9), 2700, call)
+    busy = a_robot(Segment(1, 8), [Step(LegAction.WORK, 1, 8, 8, 0, 30_000_000, work)])
+    idle = a_robot(Segment(1, 8))
+    slow, quick = busy.estimate(call, 1_000_000), idle.estimate(call, 1_000_000)
+    assert slow is not None and quick is not None
+    assert slow.cost >= quick.cost + 25_000
+
+
+def test_p28_a_foreseen_task_of_another_delays_my_bid() -> None:
+    call = a_call(to_station=Station(1, 10, BAY.side).number)
+    alone, crowded = a_robot(Segment(1, 2)), a_robot(Segment(1, 2))
+    step = Step(LegAction.STAND, 1, 7, 7, 0, 60_000_000)
+    away = Step(LegAction.TRAVEL, 1, 7, 12, 60_000_000, 75_000_000)
+    other = Program(SITE, Segment(1, 7))
+    other.replace([step, away], Stamp(0, 1, 2))
+    crowded.mirror.on_itinerary(other.itinerary(12, 0), 0)
+    free, hindered = alone.estimate(call, 1_000_000), crowded.estimate(call, 1_000_000)
+    assert free is not None and hindered is not None
+    assert hindered.cost > free.cost
+    blocking = Program(SITE, Segment(1, 7))
+    blocking.replace([], Stamp(0, 1, 3))
+    crowded.mirror.on_itinerary(dataclasses.replace(blocking.itinerary(12, 0), version=2), 0)
+    assert crowded.estimate(call, 1_000_000) is None, "row P45: who cannot do it has nothing to say"
+
+
+def test_p23_p46_the_program_is_data_and_every_solution_was_looked_at() -> None:
+    proposal = a_robot(Segment(1, 2)).estimate(a_call(), 1_000_000)
+    assert proposal is not None
+    (solution,) = proposal.program
+    assert [str(step).split("] ")[1] for step in solution.steps][:2] == ["travel p(1,2) to p(1,4)", "stand at p(1,4)"]
+    ends = [step.end_us for step in solution.steps]
+    assert ends == sorted(ends) and [step.begin_us for step in solution.steps[1:]] == ends[:-1]
+    best = min(alternative.finish_us for alternative in proposal.alternatives if alternative.finish_us is not None)
+    assert to_bus_ms(best) == proposal.cost
+    assert solution.place in {alternative.station for alternative in proposal.alternatives}
+
+
+@pytest.mark.parametrize("wheelbase_mm", [1600, 3900])
+def test_p33_a_car_that_the_shuttle_cannot_grip_gets_no_bid(wheelbase_mm: int) -> None:
+    assert a_robot(Segment(1, 2)).lower_bound(a_call(wheelbase_mm=wheelbase_mm), 0) is None
+
+
+@pytest.fixture(scope="module")
+def pair() -> Scene:
+    """Two robots on the floor; the one at the far end cannot pass the other."""
+    scene = play(SITE, stays((0, 400), (30, 700)), extra_s=200)
+    scene.assert_sound()
+    return scene
+
+
+def test_p45_who_is_shut_in_stays_silent_and_the_other_does_the_work(pair: Scene) -> None:
+    assert {bid.sender for _, bid in pair.all(Bid)} == {12}
+    done = [report for _, report in pair.all(TaskReport) if report.phase is TaskPhase.DONE]
+    assert [report.sender for report in done] == [12, 12, 12, 12]
+    shut_in = pair.simulation.controllers[11].holon.negotiation.counters
+    assert shut_in.bids_sent == 0 and shut_in.calls_heard == 4
+
+
+def test_p06_other_kinds_spend_nothing_on_a_call(pair: Scene) -> None:
+    robot = pair.simulation.controllers[12].holon.negotiation.counters
+    compartment = pair.simulation.controllers[1].holon.negotiation.counters
+    assert robot.searches == 4
+    assert (compartment.searches, compartment.calls_heard) == (0, 0)
+
+
+def test_p08_bids_of_a_call_strictly_decrease_on_the_wire(pair: Scene) -> None:
+    by_call: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for _, bid in pair.all(Bid):
+        by_call.setdefault((bid.initiator, bid.call), []).append((bid.cost, bid.sender))
+    assert len(by_call) == 4
+    assert all(bids == sorted(bids, reverse=True) for bids in by_call.values())
+
+
+def test_p15_no_plan_reaches_beyond_its_task_and_no_task_is_known_before_its_call(pair: Scene) -> None:
+    called = {call.task: time_us for time_us, call in pair.all(CallForProposals)}
+    for time_us, report in pair.all(TaskReport):
+        assert called[report.task] < time_us
+    for time_us, itinerary in pair.all(Itinerary):
+        if itinerary.grade is Grade.FIRM and itinerary.legs:
+            assert itinerary.legs[-1].end_ms * 1000 < time_us + 180_000_000
+
+
+def test_p19_the_bus_is_the_only_link(pair: Scene) -> None:
+    """Every machine that took part was heard on the bus, and the log of it alone tells the whole story."""
+    assert {beat.sender for _, beat in pair.all(Heartbeat)} == set(SITE.machines)
+    awarded = {award.task for _, award in pair.all(Award) if award.result is CallResult.AWARDED}
+    finished = {report.task for _, report in pair.all(TaskReport) if report.phase is TaskPhase.DONE}
+    assert awarded == finished and len(awarded) == 4
+
+
+def test_p12_nobody_can_so_the_call_is_opened_again_then_refused_and_the_customer_told() -> None:
+    """The only robot stands still with a fault: five attempts, then the car is given back."""
+
+    def stop_the_robot(simulation: Simulation) -> None:
+        simulation.controllers[11].holon.behaviour.state  # noqa: B018  # it exists before it is broken
+        simulation.plant.shuttles[11].fault = ""
+        holon = simulation.controllers[11].holon
+        fail = getattr(holon.behaviour, "_fail")  # noqa: B009  # a failed actuator, as its sensor would tell it
+        simulation.loop.call_at(9.0, fail, Reason.ACTUATOR_FAULT)
+
+    scene = play(one_floor(), stays((0, None)), before=stop_the_robot)
+    calls = [call for _, call in scene.all(CallForProposals)]
+    assert [call.attempt for call in calls] == [1, 2, 3, 4, 5]
+    assert len({call.call for call in calls}) == 5 and len({call.task for call in calls}) == 1
+    awards = [award for _, award in scene.all(Award)]
+    assert [award.result for award in awards] == [CallResult.REOPENED] * 4 + [CallResult.REFUSED]
+    assert {award.reason for award in awards} == {Reason.NO_BID}
+    assert not scene.all(Bid)
+    scene.first(DeskOrder, lambda order: order.text is DeskText.FULL)
+    summary = scene.simulation.plant.street.summary()
+    assert (summary.refused_full, summary.queueing) == (1, 0)
+
+
+def test_p52_an_operators_order_takes_the_same_path_as_a_customers_press() -> None:
+    def gateway(simulation: Simulation) -> None:
+        bus = simulation.fleet.attach("operator", 251)
+        simulation.loop.call_at(200.0, send, bus, simulation)
+
+    def send(bus: object, simulation: Simulation) -> None:
+        (parked,) = simulation.view.cars
+        order = OperatorOrder(251, 1, OperatorAction.INSERT_TICKET, parked)
+        for frame in fleet_codec().encode(order):
+            bus.send(frame)  # type: ignore[attr-defined]  # a SimulatedBus
+
+    from onboard.core.codes import OperatorAction
+
+    scene = play(one_floor(), stays((0, None)), before=gateway, extra_s=400)
+    called = [call.operation for _, call in scene.all(CallForProposals)]
+    assert called == [Operation.PARK, Operation.RETRIEVE]
+    scene.first(DeskOrder, lambda order: order.text is DeskText.CAR_READY)
+
+
+def test_a_full_park_is_told_at_the_desk_and_a_large_car_turned_away() -> None:
+    site = one_floor(positions=5, extra="")
+    demand = stays(*[(100.0 * number, None) for number in range(10)])
+    large = Stay(round(1_200e6), None, car(99, length_mm=6000))
+    scene = play(site, Demand((*demand.stays, large)), limit_s=2_000)
+    scene.assert_sound()
+    summary = scene.simulation.plant.street.summary()
+    assert len(site.places) == 9
+    assert (summary.parked, summary.refused_full, summary.refused_too_large) == (9, 1, 1)
+
+
+# --- row P22: a machine kind that the project does not know, with no line of protocol code ---------------------------
+
+
+@dataclass
+class Crane:
+    """A stationary crane whose task-generation function names a price; it does nothing else."""
+
+    fleet: Fleet
+    price: int
+    kind: KindCode = KindCode.LIFT
+    won: list[CallForProposals] = field(default_factory=list)
+    state: MachineState = MachineState.IDLE
+    itinerary_version: int = 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        return []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        if not isinstance(event, Awarded):
+            return []
+        self.won.append(event.call)
+        return [Report(f"lifts for {self.price}")]
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        return Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def advance(self, now_us: int) -> list[Effect]:
+        return []
+
+    def next_wake(self) -> int | None:
+        return None
+
+    def statements(self, now_us: int) -> list[Effect]:
+        return []
+
+
+@dataclass
+class CraneFactory:
+    price: int
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
+        return CranePrice(self.price)
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Crane:
+        return Crane(fleet, self.price)
+
+
+@dataclass
+class CranePrice:
+    price: int
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        return 0
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        return self.price if call.criterion is Criterion.MONEY else None
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        return Proposal(self.price, None, (), ())
+
+
+def test_p22_a_new_kind_of_machine_bids_and_wins_without_protocol_code() -> None:
+    machines = {node: Machine(node, f"CR{node}", KindCode.LIFT, Segment(1, 1)) for node in (21, 22)}
+    holons = {node: Holon(SITE, machines[node], CraneFactory(price)) for node, price in ((21, 900), (22, 400))}
+    call = dataclasses.replace(a_call(1_500_000), kind=KindCode.LIFT, criterion=Criterion.MONEY)
+    said: list[Message] = []
+
+    def deliver(effects: list[Effect], now_us: int) -> None:
+        for effect in effects:
+            if isinstance(effect, Send):
+                said.append(effect.message)
+                for node, holon in holons.items():
+                    if node != effect.message.sender:
+                        deliver(holon.receive(effect.message, now_us), now_us)
+
+    for holon in holons.values():
+        deliver(holon.start(0), 0)
+        deliver(holon.receive(BusTime(1, 1000), 1000), 1000)
+    for holon in holons.values():
+        deliver(holon.receive(call, 2_000), 2_000)
+    now_us = 0
+    while now_us < 1_480_000:
+        now_us = min(wake for holon in holons.values() if (wake := holon.next_wake()) is not None)
+        for holon in holons.values():
+            deliver(holon.wake(now_us), now_us)
+    assert [(m.sender, m.cost) for m in said if isinstance(m, Bid)] == [(22, 400)], "the dearer one stays silent"
+    award = Award(1, call.call, 22, call.task, 1, CallResult.AWARDED, Reason.NONE)
+    for holon in holons.values():
+        deliver(holon.receive(award, 1_501_000), 1_501_000)
+    won = {node: holon.behaviour.won for node, holon in holons.items() if isinstance(holon.behaviour, Crane)}
+    assert won == {21: [], 22: [call]}
