@@ -225,7 +225,7 @@ def alley(robots: int) -> Site:
     for number in range(robots):
         node, home = FIRST_ROBOT + number, 6 + number
         text += f'[[robots]]\nname = "MR{number + 1}"\nnode = {node}\nhome = "p(1,{home})"\n'
-    return parse_site(text, "bench")
+    return parse_site(text, "bench", crowded=True)  # they negotiate and do not drive
 
 
 async def _measure(maker: Maker, site: Site, calls: int, seed: int, processing_us: int) -> Tally:

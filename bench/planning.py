@@ -1,9 +1,11 @@
-"""Time of one route query with two visits on an alley of 40 segments: free, and around 20 reservations.
+"""Time of one route query with two visits: on one alley, free and around reservations; on several floors with lifts.
 
     python bench/planning.py [--queries N] [--seed S]
 
 Reservations are whole itineraries of other machines (run, work, run, gone) at random times of the next minutes, so each
-is a set of windows as a mirror holds it. Deterministic but for the times measured.
+is a set of windows as a mirror holds it. On several floors they are those of robots that were given tasks one after the
+other within a minute, planned around each other by the same search and ending in refuges, as in a fleet at work.
+Deterministic but for the times measured.
 """
 
 import argparse
@@ -12,14 +14,18 @@ import statistics
 import time
 
 from onboard.config.site import parse_site
+from onboard.core.codes import Grade, KindCode, LegAction, Side
 from onboard.core.kinematics import run_duration_us
-from onboard.core.occupancy import standing_segments, travel_windows
-from onboard.core.refuges import refuges
+from onboard.core.messages import Itinerary, Leg, Stamp
+from onboard.core.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, travel_windows
+from onboard.core.refuges import open_refuges, refuges
 from onboard.core.reservations import Reservations, Window
-from onboard.core.sipp import Route, Visit, free_flow_us, plan_route
+from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Segment, Site
 
 SECOND = 1_000_000
+#: Floors, positions on each, compartments, robots with a plan beside the one that asks.
+FLEETS = ((3, 10, 2, 1), (5, 20, 3, 0), (5, 20, 3, 3), (10, 40, 4, 8))
 SITE = """
 [site]
 name = "bench"
@@ -63,7 +69,10 @@ def measure(length: int, others: int, queries: int, seed: int) -> list[str]:
         reservations = Reservations()
         for node in range(20, 20 + others):
             reservations.reserve(node, pass_by(site, rng))
-        start = Segment(1, rng.randint(1, length))
+        free = [
+            s for i in range(1, length + 1) if not reservations.safe_intervals(s := Segment(1, i), 11, 0)[0].from_us
+        ]
+        start = rng.choice(free)
         visits = tuple(Visit(Segment(1, rng.randint(1, length)), 10 * SECOND) for _ in range(2))
         before = time.perf_counter_ns()
         route = plan_route(site, reservations, 11, start, 0, visits, refuges(site), 4_000)
@@ -75,6 +84,118 @@ def measure(length: int, others: int, queries: int, seed: int) -> list[str]:
     took_us.sort()
     figures = (statistics.median(took_us), took_us[len(took_us) * 99 // 100], took_us[-1])
     row = [length, others, *(f"{figure:.0f}" for figure in figures)]
+    return [str(cell) for cell in (*row, statistics.median(expansions), max(expansions), found, delayed)]
+
+
+FLOORS = """
+[site]
+name = "bench"
+[floors]
+count = {floors}
+positions = {length}
+[[lifts]]
+name = "LL"
+node = 5
+end = "left"
+[[lifts]]
+name = "LR"
+node = 6
+end = "right"
+"""
+IN_OUT = """
+[[compartments]]
+name = "IOC{number}"
+node = {number}
+at = "p(1,{index})"
+"""
+ROBOT = """
+[[robots]]
+name = "MR{number}"
+node = {node}
+home = "p({floor},{index})"
+"""
+#: The planner's bound of expansions: what a machine grants one search.
+MAX_EXPANSIONS = 4_000
+
+
+def park(floors: int, length: int, compartments: int) -> Site:
+    """Floors with a lift at each end, compartments on the lowest, one robot at home on each other floor."""
+    text = FLOORS.format(floors=floors, length=length)
+    for number in range(1, compartments + 1):
+        text += IN_OUT.format(number=number, index=1 + number * length // (compartments + 1))
+    for floor in range(2, floors + 1):
+        text += ROBOT.format(number=floor - 1, node=9 + floor, floor=floor, index=length // 2)
+    return parse_site(text, "bench")
+
+
+class Fleet:
+    """Robots with their plans, made one after the other."""
+
+    def __init__(self, site: Site, rng: random.Random) -> None:
+        self.site, self.rng = site, rng
+        self.reservations = Reservations()
+        self.ends = {node: m.home for node, m in site.machines.items() if m.kind is KindCode.ROBOT}
+        for node, home in self.ends.items():
+            stand = Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, 0)
+            self._tell(Itinerary(node, 1, Grade.FIRM, Stamp(0, 1, 1), (stand,)))
+
+    def _tell(self, itinerary: Itinerary) -> None:
+        self.reservations.release(itinerary.sender)
+        windows, uses = itinerary_windows(self.site, itinerary, 0), lift_uses(self.site, itinerary, 0)
+        self.reservations.reserve(itinerary.sender, windows, uses)
+
+    def query(self, node: int, start_us: int) -> tuple[Route | NoRoute, float]:
+        """A random task for a robot that stands at its end, and the microseconds that its plan took."""
+        ends = (self.rng.choice(list(self.site.compartments.values())), self.rng.choice(self.site.places))
+        visits = tuple(Visit(one.segment, 15 * SECOND) for one in (ends if self.rng.random() < 0.5 else ends[::-1]))
+        standing = [end for other, end in self.ends.items() if other != node]
+        refuges = open_refuges(self.site, standing)
+        before = time.perf_counter_ns()
+        route = plan_route(
+            self.site, self.reservations, node, self.ends[node], start_us, visits, refuges, MAX_EXPANSIONS
+        )
+        took_us = (time.perf_counter_ns() - before) / 1000
+        self.delayed = isinstance(route, Route) and route.finish_us > free_flow_us(
+            self.site, self.ends[node], start_us, visits
+        )
+        return route, took_us
+
+    def take(self, node: int, start_us: int, route: Route) -> None:
+        """Make a plan firm."""
+        home = self.ends[node]
+        legs = [Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, start_us // 1000)]
+        legs += [
+            Leg(one.action, one.track, one.from_index, one.to_index, Side.NEAR, one.end_us // 1000)
+            for one in route.legs
+        ]
+        itinerary = Itinerary(node, 2, Grade.FIRM, Stamp(0, 1, 1), tuple(legs))
+        self.ends[node] = final_position(self.site, itinerary) or home
+        self._tell(itinerary)
+
+
+def measure_floors(floors: int, length: int, compartments: int, busy: int, queries: int, seed: int) -> list[str]:
+    """One row of the second table: plans of one robot around the firm plans of ``busy`` others."""
+    rng = random.Random(f"{seed} {floors} {length} {busy}")
+    site = park(floors, length, compartments)
+    took_us: list[float] = []
+    expansions: list[int] = []
+    found = delayed = 0
+    for _ in range(queries):
+        fleet = Fleet(site, rng)
+        myself, *others = rng.sample(list(fleet.ends), busy + 1)
+        for node in others:
+            start_us = rng.randrange(60_000) * 1000
+            route, _ = fleet.query(node, start_us)
+            if isinstance(route, Route):
+                fleet.take(node, start_us, route)
+        route, one_us = fleet.query(myself, 30 * SECOND)
+        took_us.append(one_us)
+        expansions.append(route.expansions)
+        found += isinstance(route, Route)
+        delayed += fleet.delayed
+    took_us.sort()
+    figures = (statistics.median(took_us), took_us[len(took_us) * 99 // 100], took_us[-1])
+    row = [f"{floors} x {length}", busy, *(f"{figure:.0f}" for figure in figures)]
     return [str(cell) for cell in (*row, statistics.median(expansions), max(expansions), found, delayed)]
 
 
@@ -99,6 +220,11 @@ def main() -> None:
     print("  ".join(f"{head:>11}" for head in heads))
     for length, others in ((20, 0), (40, 0), (20, 5), (40, 5), (40, 20)):
         print("  ".join(f"{cell:>11}" for cell in measure(length, others, options.queries, options.seed)))
+    print()
+    print("  ".join(f"{head:>11}" for head in ("floors", *heads[1:])))
+    for floors, length, compartments, busy in FLEETS:
+        row = measure_floors(floors, length, compartments, busy, options.queries, options.seed)
+        print("  ".join(f"{cell:>11}" for cell in row))
     print(f"free-flow bound, two visits: {measure_bound(40, 20_000):.1f} us")
 
 

@@ -17,8 +17,11 @@ at = "p(1,4)"
 
 
 def one_floor(robots: int = 1, positions: int = 12, extra: str = "") -> Site:
-    """One alley, a compartment at p(1,4), robots MR1.. on nodes 11.. at the highest positions, one apart."""
+    """One alley, a compartment at p(1,4), robots MR1.. on nodes 11.. at the highest positions, one apart.
+
+    Several robots on one alley are more than the loader takes by itself.
+    """
     text = ONE_FLOOR.format(positions=positions)
     for number in range(1, robots + 1):
         text += f'[[robots]]\nname = "MR{number}"\nnode = {10 + number}\nhome = "p(1,{positions + 1 - number})"\n'
-    return parse_site(text + extra, "test.toml")
+    return parse_site(text + extra, "test.toml", crowded=True)

@@ -3,13 +3,13 @@
 from collections.abc import Callable
 
 from bus_sim.plant.link import DeviceLink
-from bus_sim.plant.motion import braking, driving, standing
+from bus_sim.plant.motion import Motion, braking, driving, standing
 from bus_sim.plant.timers import Timer, Timers
-from bus_sim.plant.world import Change, RobotBody, World
+from bus_sim.plant.world import Change, PlatformBody, RobotBody, World
 from onboard.core.codes import DriveMode
 from onboard.core.messages import DriveOrder, DriveState, Message
 from onboard.core.serial import is_newer
-from onboard.core.site import Site
+from onboard.core.site import Axis, Site
 
 #: A moving drive that has heard no order for this long brakes to a stand (dbc/device.dbc).
 DRIVE_TIMEOUT_US = 500_000
@@ -72,13 +72,23 @@ class Carrier:
     def state(self, now_us: int) -> DriveState:
         """What the sensors say now."""
         position_mm, speed_mm_s = self._body.motion.at(now_us)
-        at_mark = self._world.at_mark(self.node_id)
+        at_mark = self._at_mark()
         sequence = self._order.sequence if self._order is not None else 0
         return DriveState(self.node_id, sequence, round(position_mm), round(speed_mm_s), self.mode, at_mark)
 
     @property
-    def _body(self) -> RobotBody:
+    def _body(self) -> RobotBody | PlatformBody:
         return self._world.robots[self.node_id]
+
+    @property
+    def _axis(self) -> Axis:
+        return self._site.carrier
+
+    def _move(self, motion: Motion) -> None:
+        self._world.move_carrier(self.node_id, motion)
+
+    def _at_mark(self) -> bool:
+        return self._world.at_mark(self.node_id)
 
     # --- orders ------------------------------------------------------------------------------------------------
 
@@ -107,23 +117,25 @@ class Carrier:
     def _refusal(self, order: DriveOrder) -> str:
         if not self._shuttle_home():
             return "the shuttle is out"
-        track = self._site.tracks[self._body.track]
-        if not 0 <= order.target_mm <= (track.length - 1) * track.pitch_mm:
-            return f"target {order.target_mm} mm is beyond the end of the track"
+        if self._world.is_riding(self.node_id):
+            return "the platform under the carrier is between two floors"
+        low_mm, high_mm = self._world.limits_mm(self._body.track)
+        if not low_mm <= order.target_mm <= high_mm:
+            return f"target {order.target_mm} mm is beyond the end of the track, and no platform is there"
         return ""
 
     def _carry_out(self, order: DriveOrder, now_us: int) -> None:
         before = self.mode
         self.fault = ""
         position_mm, speed_mm_s = self._body.motion.at(now_us)
-        axis = self._site.carrier
+        axis = self._axis
         limit_mm_s = min(order.speed_limit_mm_s, axis.speed_mm_s)
         if limit_mm_s <= 0:
             self._brake(now_us)
         elif speed_mm_s or abs(order.target_mm - position_mm) > AT_TARGET_MM:
             motion = driving(position_mm, speed_mm_s, order.target_mm, limit_mm_s, axis.acceleration_mm_s2, now_us)
             self._moving, self._is_braking = True, False
-            self._world.move_carrier(self.node_id, motion)
+            self._move(motion)
             self._watch(now_us)
         if self.mode is not before:
             self._say(now_us)
@@ -153,8 +165,8 @@ class Carrier:
             return
         position_mm, speed_mm_s = self._body.motion.at(now_us)
         self._is_braking = True
-        motion = braking(position_mm, speed_mm_s, self._site.carrier.acceleration_mm_s2, now_us)
-        self._world.move_carrier(self.node_id, motion)
+        motion = braking(position_mm, speed_mm_s, self._axis.acceleration_mm_s2, now_us)
+        self._move(motion)
 
     def _fail(self, reason: str, now_us: int) -> None:
         if self.fault == reason:
@@ -182,7 +194,7 @@ class Carrier:
         motion = self._body.motion
         if self._moving and now_us >= motion.end_us:
             self._moving = self._is_braking = False
-            self._world.move_carrier(self.node_id, standing(motion.final_mm, now_us))
+            self._move(standing(motion.final_mm, now_us))
         self._say(now_us)
 
     def _say(self, now_us: int) -> None:

@@ -13,7 +13,7 @@ from bus_sim.plant.bodies import Aboard, Location
 from bus_sim.plant.motion import Motion
 from bus_sim.plant.world import BayBody, Change, RobotBody, World
 from onboard.core.codes import DoorName, DoorPosition
-from onboard.core.site import Station
+from onboard.core.site import Station, TrackKind
 
 #: Overlap below this, mm, is rounding.
 OVERLAP_TOLERANCE_MM = 1e-3
@@ -33,6 +33,8 @@ class Rule(Enum):
     ONE_CAR = "two cars are in one place"
     CARS_CONSERVED = "a car is lost or doubled"
     OWN_CAR = "a customer is given another's car"
+    LIFT_CRUSH = "a lift crushing what overhangs its sill"
+    FALL = "a carrier in a shaft without a platform"
 
 
 class Violation(NamedTuple):
@@ -66,6 +68,8 @@ class Oracle:
         self.take_stock()
         self._overlapping: set[tuple[int, int]] = set()
         self._present: set[tuple[Rule, str]] = set()
+        self._sills: dict[int, int | None] = {}
+        self._alleys = {n for n, t in world.site.tracks.items() if t.kind is not TrackKind.LIFT}
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
             self._spans[node_id] = Span(robot.track, robot.motion, now_us)
@@ -94,10 +98,13 @@ class Oracle:
 
     def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
         if change is Change.CARRIER:
+            self._sills = {lift: self.world.overhang(lift) for lift in self.world.platforms}
             self._judge_track(node_id, now_us)
             self._judge_pairs(now_us, node_id)
             robot = self.world.robots[node_id]
             self._spans[node_id] = Span(robot.track, robot.motion, now_us)
+        if change is Change.PLATFORM:
+            self._judge_platform(node_id, now_us)
         if change is Change.PERSON:
             self._judge_passage(node_id)
         if change is Change.CAR:
@@ -139,6 +146,14 @@ class Oracle:
             yield Rule.ONE_DOOR, f"compartment {node_id}: input {outer.name}, output {inner.name}"
         if bay.persons and inner is not DoorPosition.LOCKED:
             yield Rule.NO_PERSON_TO_MACHINES, f"compartment {node_id}"
+
+    def _judge_platform(self, node_id: int, now_us: int) -> None:
+        """A platform that begins to move must have nothing over its sill."""
+        platform = self.world.platforms[node_id]
+        before = self._sills.get(node_id)
+        if now_us < platform.motion.end_us and before is not None:
+            self.report(Rule.LIFT_CRUSH, f"lift {node_id}, robot {before}")
+        self._sills[node_id] = self.world.overhang(node_id)
 
     def _judge_passage(self, node_id: int) -> None:
         bay = self.world.bays[node_id]
@@ -186,9 +201,13 @@ class Oracle:
         span = self._spans[node_id]
         track = self.world.site.tracks[span.track]
         low, high = span.motion.extremes_mm(span.from_us, now_us)
+        if span.track not in self._alleys:
+            return
         margin = track.pitch_mm / 2
-        if low < -margin or high > (track.length - 1) * track.pitch_mm + margin:
-            self._once(Rule.ON_TRACK, f"robot {node_id} on track {span.track}")
+        bottom, top = self.world.limits_mm(span.track)
+        if low < bottom - margin or high > top + margin:
+            beyond_end = low < -margin - track.pitch_mm or high > track.length * track.pitch_mm + margin
+            self._once(Rule.ON_TRACK if beyond_end else Rule.FALL, f"robot {node_id} on track {span.track}")
 
     def _judge_pairs(self, now_us: int, node_id: int | None = None) -> None:
         """Least distance of every pair (with ``node_id``) since the last time one of them changed its motion."""

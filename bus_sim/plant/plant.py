@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from bus_sim.plant.carrier import Carrier
 from bus_sim.plant.compartment import Compartment
+from bus_sim.plant.lift import LiftDrive
 from bus_sim.plant.link import BusDeviceLink
 from bus_sim.plant.oracle import Oracle
 from bus_sim.plant.shuttle import Shuttle
@@ -28,6 +29,7 @@ class Plant:
         self.carriers: dict[int, Carrier] = {}
         self.shuttles: dict[int, Shuttle] = {}
         self.compartments: dict[int, Compartment] = {}
+        self.lifts: dict[int, LiftDrive] = {}
         for machine in site.machines.values():
             node_id = machine.node_id
             link = BusDeviceLink(buses[node_id], device_codec(), Decoder(device_codec()), node_id)
@@ -35,12 +37,14 @@ class Plant:
                 shuttle = Shuttle(node_id, site, self.world, self.timers, link)
                 self.shuttles[node_id] = shuttle
                 self.carriers[node_id] = Carrier(node_id, site, self.world, self.timers, link, shuttle.is_home)
+            elif machine.kind is KindCode.LIFT:
+                self.lifts[node_id] = LiftDrive(node_id, site, self.world, self.timers, link)
             elif machine.kind is KindCode.COMPARTMENT:
                 self.compartments[node_id] = Compartment(node_id, site, self.world, self.timers, link)
         self.street = Street(self.compartments, self.world, self.oracle, self.timers, seed)
 
     def start(self) -> None:
         """Power on: every device tells how it stands."""
-        for devices in (self.shuttles, self.carriers, self.compartments):
+        for devices in (self.shuttles, self.carriers, self.lifts, self.compartments):
             for device in devices.values():
                 device.start()

@@ -27,6 +27,7 @@ class Change(Enum):
     DOOR = "door"
     PERSON = "person"
     CAR = "car"
+    PLATFORM = "platform"
 
 
 #: Called after a change with its kind, the node-ID of the machine it happened at, and the time in us.
@@ -45,6 +46,15 @@ class RobotBody:
     def is_out(self, now_us: int) -> bool:
         """Whether any part of the shuttle is outside the carrier, or about to be."""
         return now_us < self.extension.end_us or self.extension.final_mm > 0
+
+
+@dataclass
+class PlatformBody:
+    """A lift's platform as it is: its motion along the shaft of ``track``, and the robot that stands on it."""
+
+    track: int
+    motion: Motion
+    robot: int | None = None
 
 
 @dataclass
@@ -67,6 +77,7 @@ class World:
         self.timers = timers
         self.robots: dict[int, RobotBody] = {}
         self.bays: dict[int, BayBody] = {}
+        self.platforms: dict[int, PlatformBody] = {}
         self.cars: dict[str, CarBody] = {}
         self.where: dict[str, Location] = {}
         self._watchers: list[Watcher] = []
@@ -75,6 +86,9 @@ class World:
             if machine.kind is KindCode.ROBOT:
                 home = standing(float(site.position_mm(machine.home)), now_us)
                 self.robots[machine.node_id] = RobotBody(machine.home.track, home, standing(0.0, now_us))
+            elif machine.kind is KindCode.LIFT:
+                start = standing(float(site.position_mm(machine.home)), now_us)
+                self.platforms[machine.node_id] = PlatformBody(machine.home.track, start)
             elif machine.kind is KindCode.COMPARTMENT and machine.station is not None:
                 self.bays[machine.node_id] = BayBody(machine.station)
 
@@ -103,19 +117,111 @@ class World:
         position_mm = robot.motion.at(self.timers.now_us())[0]
         return abs(position_mm - round(position_mm / pitch_mm) * pitch_mm) <= MARK_TOLERANCE_MM
 
-    def standing_segment(self, node_id: int) -> Segment | None:
-        """The segment at whose centre a robot's carrier stands still, within the fine sensor's tolerance."""
+    def standing_position(self, node_id: int) -> Segment | None:
+        """The position at whose mark a robot's carrier stands still; on a platform index 0 or length + 1 of the alley."""
         robot = self.robots[node_id]
         now_us = self.timers.now_us()
         position_mm, speed = robot.motion.at(now_us)
-        if speed or now_us < robot.motion.end_us:
+        if speed or now_us < robot.motion.end_us or robot.track not in self.site.tracks:
             return None
         track = self.site.tracks[robot.track]
         index = round(position_mm / track.pitch_mm) + 1
         off_mm = abs(position_mm - (index - 1) * track.pitch_mm)
-        if off_mm > MARK_TOLERANCE_MM or not 1 <= index <= track.length:
+        if off_mm > MARK_TOLERANCE_MM or not 0 <= index <= track.length + 1:
             return None
         return Segment(robot.track, index)
+
+    def standing_segment(self, node_id: int) -> Segment | None:
+        """The segment at whose centre a robot's carrier stands still, within the fine sensor's tolerance."""
+        position = self.standing_position(node_id)
+        if position is None or not 1 <= position.index <= self.site.tracks[position.track].length:
+            return None
+        return position
+
+    # --- lifts -------------------------------------------------------------------------------------------------
+
+    def platform_floor(self, node_id: int) -> int | None:
+        """The floor at whose mark a lift's platform stands still, None while it is between floors."""
+        platform = self.platforms[node_id]
+        now_us = self.timers.now_us()
+        position_mm, speed = platform.motion.at(now_us)
+        if speed or now_us < platform.motion.end_us:
+            return None
+        track = self.site.tracks[platform.track]
+        index = round(position_mm / track.pitch_mm) + 1
+        if abs(position_mm - (index - 1) * track.pitch_mm) > MARK_TOLERANCE_MM:
+            return None
+        return track.joins[index - 1].track
+
+    def end_mm(self, node_id: int, floor: int) -> float | None:
+        """Centre of a lift's platform on the axis of a floor's alley, None where it does not stop there."""
+        for sill in self.site.tracks[self.platforms[node_id].track].joins:
+            if sill.track == floor:
+                track = self.site.tracks[floor]
+                return float(-track.pitch_mm if sill.index == 1 else track.length * track.pitch_mm)
+        return None
+
+    def limits_mm(self, floor: int) -> tuple[float, float]:
+        """How far a carrier may drive on an alley now: onto a platform only where one stands there."""
+        track = self.site.tracks[floor]
+        low_mm, high_mm = 0.0, float((track.length - 1) * track.pitch_mm)
+        for node_id in self.platforms:
+            end_mm = self.end_mm(node_id, floor)
+            if end_mm is not None and self.platform_floor(node_id) == floor:
+                low_mm, high_mm = min(low_mm, end_mm), max(high_mm, end_mm)
+        return low_mm, high_mm
+
+    def aboard(self, node_id: int) -> int | None:
+        """The robot that stands wholly on a lift's platform."""
+        riding = self.platforms[node_id].robot
+        if riding is not None:
+            return riding
+        floor = self.platform_floor(node_id)
+        if floor is None:
+            return None
+        end_mm = self.end_mm(node_id, floor)
+        for robot_id, robot in self.robots.items():
+            position = self.standing_position(robot_id)
+            if robot.track == floor and position is not None and end_mm is not None:
+                if abs(robot.motion.at(self.timers.now_us())[0] - end_mm) <= MARK_TOLERANCE_MM:
+                    return robot_id
+        return None
+
+    def overhang(self, node_id: int) -> int | None:
+        """The robot whose body is over the sill of a lift at the floor where its platform is."""
+        floor = self.platform_floor(node_id)
+        end_mm = self.end_mm(node_id, floor) if floor is not None else None
+        if floor is None or end_mm is None:
+            return None
+        pitch_mm, half_mm = self.site.tracks[floor].pitch_mm, self.site.carrier_length_mm / 2
+        edge_mm = -pitch_mm / 2 if end_mm < 0 else end_mm - pitch_mm / 2
+        for robot_id, robot in self.robots.items():
+            if robot.track == floor:
+                position_mm = robot.motion.at(self.timers.now_us())[0]
+                if position_mm - half_mm < edge_mm < position_mm + half_mm:
+                    return robot_id
+        return None
+
+    def is_riding(self, robot_id: int) -> bool:
+        """Whether the platform under a carrier is on its way."""
+        return any(platform.robot == robot_id for platform in self.platforms.values())
+
+    def move_platform(self, node_id: int, motion: Motion) -> None:
+        """A platform's motion from now on; whoever stands on it rides, and is on another alley when it stands again."""
+        platform = self.platforms[node_id]
+        robot_id = self.aboard(node_id)
+        platform.motion = motion
+        now_us = self.timers.now_us()
+        moving = now_us < motion.end_us
+        if robot_id is not None:
+            robot = self.robots[robot_id]
+            platform.robot = robot_id if moving else None
+            floor = None if moving else self.platform_floor(node_id)
+            robot.track = platform.track if floor is None else floor
+            if not moving and floor is None:
+                platform.robot = robot_id
+            self._tell(Change.CARRIER, robot_id)
+        self._tell(Change.PLATFORM, node_id)
 
     def station_beside(self, node_id: int, side: Side) -> Station | None:
         """The place or bay that a robot's shuttle would reach on one side; None for a wall, or between marks."""

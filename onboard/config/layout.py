@@ -162,6 +162,10 @@ def _read_lifts(layout: Layout, floor_height_mm: int) -> None:
     for number, table in enumerate(layout.lifts, start=FIRST_LIFT):
         end = table.choice("end", ["left", "right"])
         floors = _read_served(layout, table)
+        if len(floors) == 1 and layout.known and not table.wrong:
+            name = "floors" if "floors" in table.values else "end"
+            what = f"this lift would stop at floor {floors[0]} alone"
+            table.bad(name, table.values[name], what, "a lift joins two floors or more")
         sills = tuple(Segment(floor, 1 if end == "left" else layout.tracks[floor].length) for floor in floors)
         shared = [sill for sill in sills if sill in layout.kept]
         if shared and "end" not in table.wrong:

@@ -18,11 +18,15 @@ _NOWHERE = Segment(0, 0)
 
 @dataclass
 class Fleet:
-    """Machines read so far, by node-ID, and everything that has a name already, mistaken machines included."""
+    """Machines read so far, by node-ID, and everything that has a name already, mistaken machines included.
+
+    ``robots`` are their tables and homes, in the order of the file.
+    """
 
     by_node: dict[int, Machine] = field(default_factory=dict)
     by_name: dict[str, Machine | None] = field(default_factory=dict)
     homes: dict[Segment, str] = field(default_factory=dict)
+    robots: list[tuple[Table, Segment]] = field(default_factory=list)
 
     def add(self, table: Table, kind: KindCode, home: Segment, station: Station | None = None) -> None:
         """Read name and node-ID of one machine; both are its own. A machine with a mistake is named but not added."""
@@ -59,12 +63,14 @@ def read_fleet(root: Table, layout: Layout) -> Fleet:
             layout.kept.setdefault(station.segment, f"the front of {path_text(table.path)} is")
         fleet.add(table, KindCode.COMPARTMENT, station.segment if station is not None else _NOWHERE, station)
     for table in root.tables("robots"):
-        fleet.add(table, KindCode.ROBOT, _read_home(table, layout, fleet))
+        home = _read_home(table, layout, fleet)
+        fleet.robots.append((table, home))
+        fleet.add(table, KindCode.ROBOT, home)
     return fleet
 
 
 def _read_home(table: Table, layout: Layout, fleet: Fleet) -> Segment:
-    """Where a robot stands at first: a refuge of its own, as it may stand there for ever."""
+    """Where a robot stands at first, as it may stand there for ever: on no sill, front or mouth, and by itself."""
     home = layout.find(table, "home", spurs=True)
     if home is None:
         return _NOWHERE

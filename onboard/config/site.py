@@ -13,6 +13,7 @@ from onboard.config.layout import Layout, read_layout
 from onboard.config.machines import Fleet, read_fleet, read_stewards
 from onboard.config.problems import Problems
 from onboard.config.reader import Table
+from onboard.config.room import check_room
 from onboard.core.codes import KindCode
 from onboard.core.site import Site, TrackKind
 
@@ -24,8 +25,12 @@ def load_site(path: Path) -> Site:
     return parse_site(read_text(path, "site"), str(path))
 
 
-def parse_site(text: str, file: str) -> Site:
-    """Check and build a site from TOML text; ``file`` is its name in messages. Raises ``ConfigError``."""
+def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
+    """Check and build a site from TOML text; ``file`` is its name in messages. Raises ``ConfigError``.
+
+    ``crowded`` lets more robots in than can find refuges, and lets them be at home together: for studies of what they
+    do in each other's way.
+    """
     problems = Problems(file)
     root = root_table(text, problems)
     head, lift = root.table("site", required=True), root.table("lift")
@@ -58,6 +63,9 @@ def parse_site(text: str, file: str) -> Site:
         cars=constants.cars,
         timing=timing,
     )
+    if not crowded:
+        check_room(root, site, fleet)
+        problems.raise_if_any()
     return replace(site, digest=site_digest(site))
 
 
@@ -90,12 +98,21 @@ def _check_whole(root: Table, layout: Layout, fleet: Fleet) -> None:
     places = layout.places()
     if not places:
         root.bad("floors", None, "no place for a car", "take entries out of floors.without or add positions")
-    for floors in _joined_floors(layout):
+    _check_joined(root, layout, fleet)
+
+
+def _check_joined(root: Table, layout: Layout, fleet: Fleet) -> None:
+    """That every floor can be reached from every other, so from every compartment and by every robot."""
+    groups = _joined_floors(layout)
+    for floors in groups:
         kinds = {machine.kind for machine in fleet.by_node.values() if _floor(layout, machine.home.track) in floors}
         missing = [kind.name.lower() for kind in (KindCode.COMPARTMENT, KindCode.ROBOT) if kind not in kinds]
         if missing:
             what = f"no {' and no '.join(missing)} can be reached from floor {min(floors)}"
             root.bad("lifts", None, what, f"join floor {min(floors)} to the others by a lift")
+    if len(groups) > 1 and "lifts" not in root.wrong:
+        what = f"no way from floor {min(groups[0])} to floor {min(groups[1])}"
+        root.bad("lifts", None, what, "join them by a lift, or write a site file for each")
 
 
 def _joined_floors(layout: Layout) -> list[set[int]]:

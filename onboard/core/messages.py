@@ -225,12 +225,13 @@ class TaskReport(Message):
 class CarAt(Message):
     """The custodian of ``car`` states the station at which it stands, under the car token's ``version``.
 
-    ``ANY_STATION`` means: aboard the sender.
+    ``ANY_STATION`` means: aboard the sender; ``OUTSIDE``: it has left. ``wheelbase_mm`` is the car's.
     """
 
     car: Reference
     station: int
     version: int
+    wheelbase_mm: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -373,3 +374,12 @@ class BayState(Message):
     wheelbase_mm: int
     person_inside: bool
     carrier_in_front: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PlatformState(Message):
+    """What a lift's platform senses: a carrier wholly aboard at its mark, something over the sill, the weight."""
+
+    carrier_aboard: bool
+    crossing: bool
+    load_kg: int

@@ -6,11 +6,13 @@ A wrong mirror costs time, never safety: what moves is guarded by tokens.
 from dataclasses import dataclass, field
 
 from onboard.core.codes import ANY_STATION, OUTSIDE, Grade, KindCode, MachineState
+from onboard.core.lift_uses import standing_after
+from onboard.core.lifts import lift_tracks
 from onboard.core.messages import CarAt, Heartbeat, Itinerary, Progress, Reference
-from onboard.core.occupancy import itinerary_windows
+from onboard.core.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.core.reservations import Reservations
 from onboard.core.serial import is_newer
-from onboard.core.site import Site, Station
+from onboard.core.site import Segment, Site, Station
 
 #: Heartbeats missed before a node counts as silent.
 MISSED_HEARTBEATS = 3
@@ -33,11 +35,12 @@ class Peer:
 
 @dataclass(frozen=True, slots=True)
 class CarRecord:
-    """Where a car stands, who vouches for it, and under which version of its token."""
+    """Where a car stands, who vouches for it, under which version of its token, and its wheelbase in mm."""
 
     station: int
     custodian: int
     version: int
+    wheelbase_mm: int
 
 
 def _crc16(values: list[int]) -> int:
@@ -84,7 +87,11 @@ class Mirror:
             return False
         self.itineraries[itinerary.sender] = itinerary
         self.reservations.release(itinerary.sender)
-        self.reservations.reserve(itinerary.sender, itinerary_windows(self.site, itinerary, now_us))
+        self.reservations.reserve(
+            itinerary.sender,
+            itinerary_windows(self.site, itinerary, now_us),
+            lift_uses(self.site, itinerary, now_us),
+        )
         self._digest = None
         return True
 
@@ -95,7 +102,7 @@ class Mirror:
     def on_car(self, statement: CarAt) -> bool:
         """Take up a custodian's statement; True where it changed anything."""
         known = self.cars.get(statement.car)
-        record = CarRecord(statement.station, statement.sender, statement.version)
+        record = CarRecord(statement.station, statement.sender, statement.version, statement.wheelbase_mm)
         if known == record:
             return False
         if (
@@ -116,6 +123,25 @@ class Mirror:
         gone = [car for car, record in self.cars.items() if record.station == OUTSIDE]
         for car in gone[: len(gone) - MAX_GONE_CARS]:
             del self.cars[car]
+
+    def others_standing(self) -> list[Segment]:
+        """Where the plans of all other machines end: there they will stand until they plan anew."""
+        found = [
+            final_position(self.site, itinerary)
+            for node, itinerary in sorted(self.itineraries.items())
+            if node != self.node_id
+        ]
+        return [position for position in found if position is not None]
+
+    def lift_floors(self, now_us: int, at_us: int) -> dict[int, int]:
+        """Where each lift (by its track) stands at ``at_us``, by its own word and the rides planned until then."""
+        standing = {}
+        uses = []
+        for track in lift_tracks(self.site):
+            seen = self.progress.get(self.site.stewards[track])
+            standing[track] = seen.index if seen is not None else 1
+            uses += self.reservations.uses(track, excluding=0)
+        return standing_after(uses, standing, now_us, at_us)
 
     def free_places(self) -> list[Station]:
         """Places at which no car is known to stand, in the site's order."""

@@ -1,5 +1,6 @@
 """Where a machine may stand for ever. Compartment fronts, lift platforms and sills never are (design, section 5)."""
 
+from collections.abc import Iterable
 from functools import lru_cache
 
 from onboard.core.site import Segment, Site, TrackKind
@@ -27,3 +28,25 @@ def refuges(site: Site) -> frozenset[Segment]:
             kept.update(track.joins)
     shape = tuple((t.number, t.kind, t.length, t.joins) for t in site.tracks.values())
     return _refuges(shape, frozenset(kept))
+
+
+def open_refuges(site: Site, standing: Iterable[Segment]) -> frozenset[Segment]:
+    """Those refuges in which one more machine may end while others stand for ever at ``standing``.
+
+    Where there are several floors: no alley before compartments, so that the street alley stays free for all, and
+    neither an alley nor a spur in which another stands: at most one in each. One floor has no such choice; there every
+    refuge is open, as the machines can pass each other nowhere.
+    """
+    alleys = [track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
+    if len(alleys) == 1:
+        return refuges(site)
+    street = {station.track for station in site.compartments.values()}
+    # With compartments on all floors, the lowest of them has to be the one that stays free.
+    closed = (street if street < set(alleys) else {min(alleys)}) | {segment.track for segment in standing}
+    return _without(refuges(site), frozenset(closed))
+
+
+@lru_cache(maxsize=256)
+def _without(found: frozenset[Segment], closed: frozenset[int]) -> frozenset[Segment]:
+    """Kept, so that a search meets the same set again and what it has worked out for it."""
+    return frozenset(segment for segment in found if segment.track not in closed)

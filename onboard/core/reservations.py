@@ -1,4 +1,4 @@
-"""Who plans to be on which segment when: half-open windows ``[from, to)`` in bus us, and the gaps between them."""
+"""Who plans to be on which segment, and on which lift, when: half-open windows ``[from, to)`` in bus us."""
 
 from bisect import insort
 from collections.abc import Iterable
@@ -18,6 +18,20 @@ class Window(NamedTuple):
     to_us: int
 
 
+class Use(NamedTuple):
+    """Occupation of a lift's platform by ``owner``, from the body entering it to the body having left it.
+
+    ``board_index`` and ``leave_index`` are the lift's indices (1 to the number of floors served) of the two floors.
+    """
+
+    lift_track: int
+    board_index: int
+    leave_index: int
+    from_us: int
+    to_us: int
+    owner: int
+
+
 class Interval(NamedTuple):
     """A safe interval ``[from_us, to_us)`` of one segment: nobody else plans to be there."""
 
@@ -26,23 +40,33 @@ class Interval(NamedTuple):
 
 
 class Reservations:
-    """Windows by segment, sorted by their start. Windows of different owners may overlap: a mirror can be wrong."""
+    """Windows by segment and uses by lift, sorted by their start. Those of different owners may overlap.
+
+    A mirror can be wrong.
+    """
 
     def __init__(self) -> None:
         self._windows: dict[Segment, list[tuple[int, int, int]]] = {}
         self._segments: dict[int, set[Segment]] = {}
+        self._uses: dict[int, list[Use]] = {}
 
-    def reserve(self, owner: int, windows: Iterable[Window]) -> None:
-        """Add windows of ``owner`` (a node-ID). Raises ``ValueError`` for an empty or reversed window."""
+    def reserve(self, owner: int, windows: Iterable[Window], uses: Iterable[Use] = ()) -> None:
+        """Add windows and lift uses of ``owner`` (a node-ID). Raises ``ValueError`` where one has no length."""
         touched = self._segments.setdefault(owner, set())
         for window in windows:
             if window.from_us >= window.to_us:
                 raise ValueError(f"window {window} of node {owner} has no length")
             insort(self._windows.setdefault(window.segment, []), (window.from_us, window.to_us, owner))
             touched.add(window.segment)
+        for use in uses:
+            if use.from_us >= use.to_us or use.owner != owner:
+                raise ValueError(f"use {use} has no length, or is not of node {owner}")
+            insort(self._uses.setdefault(use.lift_track, []), use, key=_begin)
 
     def release(self, owner: int) -> None:
-        """Remove all windows of ``owner``."""
+        """Remove all windows and uses of ``owner``."""
+        for lift_track, uses in self._uses.items():
+            self._uses[lift_track] = [use for use in uses if use.owner != owner]
         for segment in self._segments.pop(owner, ()):
             kept = [window for window in self._windows[segment] if window[2] != owner]
             if kept:
@@ -63,6 +87,10 @@ class Reservations:
         if free_us < FOREVER:
             gaps.append(Interval(free_us, FOREVER))
         return gaps
+
+    def uses(self, lift_track: int, excluding: int) -> list[Use]:
+        """Uses of one lift by all but ``excluding``, sorted by begin, end and owner."""
+        return [use for use in self._uses.get(lift_track, ()) if use.owner != excluding]
 
     def conflicts(self, owner: int, windows: Iterable[Window]) -> list[tuple[Window, int]]:
         """Each of ``windows`` that overlaps one of another node, with that node."""
@@ -86,3 +114,7 @@ class Reservations:
     def is_free(self, segment: Segment, now_us: int, *, excluding: int) -> bool:
         """Whether nobody but ``excluding`` has a window on a segment that is not over at ``now_us``."""
         return self.earliest_other_start(excluding, segment, now_us) is None
+
+
+def _begin(use: Use) -> tuple[int, int, int]:
+    return use.from_us, use.to_us, use.owner

@@ -5,11 +5,15 @@ is free. A move departs as early as every window that the body sweeps lies in a 
 machine with a headway comes out by itself. Phases count the visits made; after the last one the route must end in a
 refuge that is safe for ever.
 
-Best first by (end of the last visit, time, travel, moves), the first a lower bound until the visits are made. A move is
-queued under the time that it takes with nobody in the way, and its windows are looked at only when its turn comes (lazy
+Lifts are moves too: a platform has safe intervals for each floor, and a ride is possible within one gap of the others'
+uses.
+
+Best first by (end of the last visit, arrival in a refuge, effort), bounds as long as they lie ahead. A move is
+queued under a bound from the first segments that it sweeps, and the rest is looked at only when its turn comes (lazy
 evaluation of edges; Cohen, Phillips and Likhachev 2014): most never do.
 """
 
+from collections.abc import Mapping
 from heapq import heappop, heappush
 from typing import NamedTuple
 
@@ -19,6 +23,7 @@ from onboard.core.kinematics import ceil_ms
 from onboard.core.reservations import FOREVER, Interval, Reservations
 from onboard.core.roads import Move, Roads, roads_of
 from onboard.core.site import Segment, Site
+from onboard.core.stops import Stops
 
 
 class Visit(NamedTuple):
@@ -32,7 +37,8 @@ class Visit(NamedTuple):
 class RouteLeg(NamedTuple):
     """One leg ``[begin_us, end_us)``, both whole milliseconds; WORK is a visit's dwell, STAND a wait.
 
-    TRAVEL with equal indices is the hop from the segment before it through a junction onto this track.
+    TRAVEL with equal indices is the hop from the segment before it through a junction onto this track. RIDE is on a
+    lift's track between two of the lift's indices, from the platform of one alley to that of another.
     """
 
     action: LegAction
@@ -63,7 +69,10 @@ class NoRoute(NamedTuple):
 
 
 def free_flow_us(site: Site, start: Segment, start_us: int, visits: tuple[Visit, ...]) -> int:
-    """When the last visit would end with nobody in the way: the least of all routes. FOREVER where out of reach."""
+    """When the last visit would end with nobody in the way and every lift at hand: the least of all routes.
+
+    It depends on nothing but site and arguments. FOREVER where a visit is out of reach.
+    """
     roads = roads_of(site)
     time_us, here = ceil_ms(start_us), start
     for visit in visits:
@@ -86,22 +95,29 @@ def plan_route(
     visits: tuple[Visit, ...],
     refuges: frozenset[Segment],
     max_expansions: int,
+    lift_floors: Mapping[int, int] | None = None,
 ) -> Route | NoRoute:
     """The route with the earliest end of the last visit, from standing at ``start`` at bus time ``start_us``.
 
-    Equal ends go to the earlier arrival in a refuge, then to less travel and fewer moves among those that come to the
-    same states at the same times. Windows of ``owner`` itself are no obstacle. Bounded by ``max_expansions``, never by
-    wall time; what is still equal is taken in the order of discovery, which is fixed.
+    Equal ends go to the earlier arrival in a refuge, then to less time on platforms, less travel, fewer moves and waits
+    nearer to where it goes next, among those that come to the same states at the same times. Windows of ``owner``
+    itself are no obstacle. Bounded by ``max_expansions``, never by wall time; what is still equal is taken in the order
+    of discovery, which is fixed.
+
+    ``lift_floors`` tells where each lift (by its track) stands at ``start_us`` unless somebody uses it then: the lift's
+    index of the floor, 1 where it is not named; one on whose platform the route starts is there.
     """
     start_us = ceil_ms(start_us)
     roads = roads_of(site)
+    aboard = roads.lift_at(start)
+    floors = dict(lift_floors or {}) | (dict((aboard,)) if aboard is not None else {})
     if not roads.knows(start) or free_flow_us(site, start, start_us, visits) >= FOREVER:
         return NoRoute("a visit is out of reach of the start", 0)
-    departures = Departures(roads, reservations, owner, start_us)
+    departures = Departures(roads, reservations, owner, start_us, floors)
     interval = departures.standing_at(start, start_us)
     if interval is None:
         return NoRoute(f"the start {start} is reserved by another machine", 0)
-    root = _Node(0, start, interval, start_us, None, LegAction.STAND, start_us, (), 0, 0)
+    root = _Node(0, start, interval, start_us, None, LegAction.STAND, start_us, (), _Effort(0, 0, 0))
     return _Search(roads, departures, visits, refuges).run(root, max_expansions)
 
 
@@ -116,12 +132,30 @@ class _Node(NamedTuple):
     action: LegAction
     begin_us: int
     visit_ends_us: tuple[int, ...]
+    effort: "_Effort"
+
+
+class _Effort(NamedTuple):
+    """What breaks ties: time standing or riding on platforms, which others may want, then distance, then moves."""
+
+    aboard_us: int
     travel_mm: int
     moves: int
 
 
-#: (end of the last visit, time, travel, moves, order of discovery): the last is unique.
-_Key = tuple[int, int, int, int, int]
+class _Untried(NamedTuple):
+    """A move to a safe interval of its destination, not before ``arrival_us``, with departures to choose from."""
+
+    move: Move
+    interval: Interval
+    arrival_us: int
+    choice: list[Interval]
+
+
+#: (end of the last visit, arrival in a refuge, effort, minus the last move's beginning, order of discovery).
+_Key = tuple[int, int, _Effort, int, int]
+#: In a key, of a move that is still to be tried: it comes before all states that are as good.
+_UNTRIED = -FOREVER
 
 
 class _Search:
@@ -132,15 +166,22 @@ class _Search:
     """
 
     def __init__(
-        self, roads: Roads, departures: Departures, visits: tuple[Visit, ...], refuges: frozenset[Segment]
+        self,
+        roads: Roads,
+        departures: Departures,
+        visits: tuple[Visit, ...],
+        refuges: frozenset[Segment],
     ) -> None:
         self.roads = roads
         self.departures = departures
         self.visits = visits
         self.refuges = refuges
+        targets = [frozenset((visit.segment,)) for visit in visits]
+        self._stops = [Stops(roads, departures, goals) for goals in (*targets, refuges)]
+        self._targets = (*targets, refuges)
+        self._way_us: list[dict[Segment, int]] = [{} for _ in self._targets]
         self._tails = _tails(roads, visits)
-        self._way_us: list[dict[Segment, int]] = [{} for _ in visits]
-        self._queue: list[tuple[_Key, _Node, Move | None]] = []
+        self._queue: list[tuple[_Key, _Node, _Untried | None]] = []
         self._pushed = 0
         self._closed: dict[tuple[int, Segment, Interval], int] = {}
 
@@ -149,15 +190,15 @@ class _Search:
         self._push(root)
         expansions = 0
         while self._queue:
-            _, node, move = heappop(self._queue)
-            if move is not None:
-                self._try(node, move)
+            _, node, untried = heappop(self._queue)
+            if untried is not None:
+                self._try(node, untried)
                 continue
             if self._is_beaten(node):
                 continue
             if self._is_goal(node):
                 finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
-                return Route(tuple(_legs(node)), node.visit_ends_us, finish_us, expansions)
+                return Route(tuple(_legs(self.roads, node)), node.visit_ends_us, finish_us, expansions)
             if expansions >= max_expansions:
                 return NoRoute("the search's bound of expansions is reached", expansions)
             expansions += 1
@@ -177,15 +218,42 @@ class _Search:
         return node.phase == len(self.visits) and node.segment in self.refuges and node.interval.to_us >= FOREVER
 
     def _expand(self, node: _Node) -> None:
-        """Queue the dwell of the next visit, if it is here, and every move under its least time."""
+        """Queue the dwell of the next visit, if it is here, and every move under the least time that it takes."""
         if node.phase < len(self.visits) and self.visits[node.phase].segment == node.segment:
             self._push_dwell(node, self.visits[node.phase])
-        for move in self.roads.moves(node.segment):
-            arrival_us = node.time_us + move.duration_us
-            finish_us = self._finish_us(node, move.destination, arrival_us)
-            self._pushed += 1
-            key = (finish_us, arrival_us, node.travel_mm + move.distance_mm, node.moves + 1, self._pushed)
-            heappush(self._queue, (key, node, move))
+        within = Interval(node.time_us, node.interval.to_us)
+        moves = self._stops[node.phase].moves(node.segment, node.time_us)
+        for move, choice in self.departures.moves(node.segment, moves, within):
+            first_us, last_us = choice[0].from_us + move.duration_us, choice[-1].to_us + move.duration_us
+            for interval in self.departures.standing(move.destination):
+                if interval.from_us >= last_us:
+                    break
+                if interval.to_us > first_us:
+                    self._queue_move(node, _Untried(move, interval, max(first_us, interval.from_us), choice))
+
+    def _queue_move(self, node: _Node, untried: "_Untried") -> None:
+        move = untried.move
+        if self._is_known(node, untried):
+            return
+        ends = self._ends_us(node, move.destination, untried.arrival_us)
+        if max(ends) >= FOREVER:
+            return
+        self._pushed += 1
+        effort = self._effort(node, move, untried.arrival_us)
+        heappush(self._queue, ((*ends, effort, _UNTRIED, self._pushed), node, untried))
+
+    def _effort(self, node: _Node, move: Move, arrival_us: int) -> _Effort:
+        aboard_us, travel_mm, moves = node.effort
+        if self.roads.lift_at(node.segment) is not None:
+            aboard_us += arrival_us - node.time_us
+            if move.lift_track is None:
+                aboard_us -= move.duration_us
+        return _Effort(aboard_us, travel_mm + move.distance_mm, moves + 1)
+
+    def _is_known(self, node: _Node, untried: "_Untried") -> bool:
+        """Whether the state to which a move leads was left no later than the move could come to it."""
+        closed_us = self._closed.get((node.phase, untried.move.destination, untried.interval))
+        return closed_us is not None and closed_us <= untried.arrival_us
 
     def _push_dwell(self, node: _Node, visit: Visit) -> None:
         begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
@@ -202,55 +270,50 @@ class _Search:
                 )
             )
 
-    def _try(self, node: _Node, move: Move) -> None:
-        """Queue the earliest arrival of a move in each safe interval of its destination."""
-        reached: Interval | None = None
-        for from_us, to_us in self.departures.safe(node.segment, move):
-            depart_us = max(from_us, node.time_us)
-            if depart_us >= node.interval.to_us:
-                return
-            if depart_us >= to_us:
-                continue
-            arrival_us = depart_us + move.duration_us
-            interval = self.departures.standing_at(move.destination, arrival_us)
-            if interval is None or interval == reached:
-                continue
-            reached = interval
-            self._push(
-                _Node(
-                    node.phase,
-                    move.destination,
-                    interval,
-                    arrival_us,
-                    node,
-                    LegAction.TRAVEL,
-                    depart_us,
-                    node.visit_ends_us,
-                    node.travel_mm + move.distance_mm,
-                    node.moves + 1,
-                )
+    def _try(self, node: _Node, untried: "_Untried") -> None:
+        """Queue the earliest arrival of a move in a safe interval of its destination."""
+        if self._is_known(node, untried):
+            return
+        move, interval = untried.move, untried.interval
+        depart_us = self.departures.first(node.segment, move, untried.choice, interval)
+        if depart_us is None:
+            return
+        self._push(
+            _Node(
+                node.phase,
+                move.destination,
+                interval,
+                depart_us + move.duration_us,
+                node,
+                LegAction.TRAVEL if move.lift_track is None else LegAction.RIDE,
+                depart_us,
+                node.visit_ends_us,
+                self._effort(node, move, depart_us + move.duration_us),
             )
+        )
 
     def _push(self, node: _Node) -> None:
         if self._is_beaten(node):
             return
         self._pushed += 1
-        finish_us = self._finish_us(node, node.segment, node.time_us)
-        heappush(self._queue, ((finish_us, node.time_us, node.travel_mm, node.moves, self._pushed), node, None))
+        ends = self._ends_us(node, node.segment, node.time_us)
+        if max(ends) < FOREVER:
+            heappush(self._queue, ((*ends, node.effort, -node.begin_us, self._pushed), node, None))
 
-    def _finish_us(self, node: _Node, segment: Segment, time_us: int) -> int:
-        """Earliest end of the last visit that is still possible from standing at ``segment`` at ``time_us``.
+    def _ends_us(self, node: _Node, segment: Segment, time_us: int) -> tuple[int, int]:
+        """Earliest end of the last visit, and then arrival in a refuge, from standing at ``segment`` at ``time_us``.
 
-        Without visits all routes are equal.
+        Before the last visit is over the second is the time itself: the same end leads to the same refuge. Without
+        visits all ends are equal.
         """
-        if node.phase == len(self.visits):
-            return node.visit_ends_us[-1] if node.visit_ends_us else 0
         ways = self._way_us[node.phase]
         way_us = ways.get(segment)
         if way_us is None:
-            way_us = ways[segment] = self.roads.shortest_us(segment, self.visits[node.phase].segment)
+            way_us = ways[segment] = self.roads.nearest_us(segment, self._targets[node.phase])
+        if node.phase == len(self.visits):
+            return (node.visit_ends_us[-1] if node.visit_ends_us else 0), time_us + way_us
         work_us, floor_us = self._tails[node.phase]
-        return max(time_us + way_us + work_us, floor_us)
+        return max(time_us + way_us + work_us, floor_us), time_us
 
 
 def _tails(roads: Roads, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
@@ -267,7 +330,7 @@ def _tails(roads: Roads, visits: tuple[Visit, ...]) -> list[tuple[int, int]]:
     return tails[::-1]
 
 
-def _legs(node: _Node) -> list[RouteLeg]:
+def _legs(roads: Roads, node: _Node) -> list[RouteLeg]:
     """The legs from the start to ``node``, waits made explicit.
 
     A route that sets off with a hop gets a first leg of no length, so that it tells where the hop begins.
@@ -277,9 +340,19 @@ def _legs(node: _Node) -> list[RouteLeg]:
         before = node.parent
         here, there = before.segment, node.segment
         hops = here.track != there.track
-        from_index = there.index if hops else here.index
-        legs.append(RouteLeg(node.action, there.track, from_index, there.index, node.begin_us, node.time_us))
+        if node.action is LegAction.RIDE:
+            legs.append(_ride(roads, node, here))
+        else:
+            from_index = there.index if hops else here.index
+            legs.append(RouteLeg(node.action, there.track, from_index, there.index, node.begin_us, node.time_us))
         if node.begin_us > before.time_us or (hops and before.parent is None):
             legs.append(RouteLeg(LegAction.STAND, here.track, here.index, here.index, before.time_us, node.begin_us))
         node = before
     return legs[::-1]
+
+
+def _ride(roads: Roads, node: _Node, here: Segment) -> RouteLeg:
+    stops = roads.lift_at(here), roads.lift_at(node.segment)
+    if stops[0] is None or stops[1] is None:
+        raise AssertionError(f"a ride from {here} to {node.segment}, which are no platforms")
+    return RouteLeg(LegAction.RIDE, stops[0][0], stops[0][1], stops[1][1], node.begin_us, node.time_us)

@@ -3,11 +3,13 @@
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
 from onboard.kinds.car_park.compartment import CompartmentFactory
+from onboard.kinds.car_park.lift import LiftFactory
 from onboard.kinds.car_park.robot import RobotFactory
 
 _FACTORIES: dict[KindCode, BehaviourFactory] = {
     KindCode.ROBOT: RobotFactory(),
     KindCode.COMPARTMENT: CompartmentFactory(),
+    KindCode.LIFT: LiftFactory(),
 }
 
 

@@ -153,6 +153,9 @@ class SiteView:
         self.calls_closed[award.result] += 1
         task = self.tasks[record.call.task]
         if award.result is CallResult.AWARDED:
+            if record.call.operation is not task.operation:
+                self._say(time_us, f"{self.name(award.winner)} takes {self.name(award.sender)} along")
+                return
             task.owner = award.winner
             task.promised_ms = next((cost for _, node, cost in reversed(record.bids) if node == award.winner), None)
             self._say(time_us, f"{self.name(award.winner)} wins car {record.call.car.number}")

@@ -13,13 +13,13 @@ from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, f
 #: Senders of the fleet contract and of the device contract that each kind of machine stands for.
 _ROLES: dict[KindCode, frozenset[str]] = {
     KindCode.ROBOT: frozenset({"Robot", "Controller", "Drive", "Shuttle"}),
-    KindCode.LIFT: frozenset({"Lift", "Controller", "Drive"}),
+    KindCode.LIFT: frozenset({"Lift", "Controller", "Drive", "Platform"}),
     KindCode.COMPARTMENT: frozenset({"Compartment", "Controller", "Doors", "Desk", "Bay"}),
 }
 #: Device messages by the roles of both ends: a robot's controller sends nothing to doors.
 _ENDS: dict[KindCode, frozenset[str]] = {
     KindCode.ROBOT: frozenset({"Controller", "Drive", "Shuttle"}),
-    KindCode.LIFT: frozenset({"Controller", "Drive"}),
+    KindCode.LIFT: frozenset({"Controller", "Drive", "Platform"}),
     KindCode.COMPARTMENT: frozenset({"Controller", "Doors", "Desk", "Bay"}),
 }
 _EXTENDED = 1 << 31

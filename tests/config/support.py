@@ -39,7 +39,7 @@ at = "p(1,4)"
 [[robots]]
 name = "MR1"
 node = 11
-home = "p(1,2)"
+home = "p(2,3)"
 """
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import pytest
 
 from onboard.config.machine import load_machine
+from onboard.config.problems import ConfigError
 from onboard.config.reader import Table
 from onboard.config.site import parse_site
 from onboard.core.site import Segment
@@ -103,6 +104,14 @@ def test_the_line_of_a_mistake_on_the_site_page_is_what_is_printed() -> None:
     text = (ROOT / "bus_sim" / "sites" / "level1.toml").read_text(encoding="utf-8")
     with pytest.raises(Exception, match="no such segment") as caught:
         parse_site(text.replace('home = "p(1,2)"', 'home = "p(1,99)"'), "level1.toml")
+    assert f"```\n{caught.value}\n```" in SITE_PAGE.read_text(encoding="utf-8")
+
+
+def test_the_line_of_too_few_refuges_on_the_site_page_is_what_is_printed() -> None:
+    text = (ROOT / "bus_sim" / "sites" / "standard.toml").read_text(encoding="utf-8")
+    more = "".join(f'[[robots]]\nname = "MR{n}"\nnode = {n + 10}\nhome = "p({n - 3},5)"\n' for n in (5, 6))
+    with pytest.raises(ConfigError) as caught:
+        parse_site(text + more, "standard.toml")
     assert f"```\n{caught.value}\n```" in SITE_PAGE.read_text(encoding="utf-8")
 
 

@@ -44,7 +44,7 @@ def test_p30_p31_floors_lifts_compartments_and_spurs_become_tracks_and_stations(
         1: ("IOC1", KindCode.COMPARTMENT, Segment(1, 4)),
         2: ("LL", KindCode.LIFT, Segment(128, 1)),
         3: ("LR", KindCode.LIFT, Segment(129, 1)),
-        11: ("MR1", KindCode.ROBOT, Segment(1, 2)),
+        11: ("MR1", KindCode.ROBOT, Segment(2, 3)),
     }
     assert site.compartments == {1: Station(1, 4, Side.NEAR)}
     assert len(site.places) == 2 * 2 * 8 - 2
@@ -100,12 +100,12 @@ def test_defaults_of_speeds_lengths_and_times() -> None:
 def test_the_bidding_delay_grows_with_robots_on_a_slow_bus() -> None:
     robots = "".join(f'[[robots]]\nname = "MR{n}"\nnode = {n + 10}\nhome = "p(1,{n + 10})"\n' for n in range(2, 21))
     text = changed("positions = 3", "positions = 40", SMALLEST) + robots + "[timing]\ncall_window_ms = 5_000\n"
-    site = parse_site(changed('name = "smallest"', 'name = "smallest"\nbitrate = 20_000', text), "s.toml")
+    site = parse_site(changed('name = "smallest"', 'name = "smallest"\nbitrate = 20_000', text), "s.toml", crowded=True)
     assert site.timing.bid_delay_us == 3 * 20 * 2 * 160 * 1_000_000 // 20_000
 
 
 def test_a_robot_may_be_at_home_in_a_spur() -> None:
-    site = parse_site(changed('home = "p(1,2)"', 'home = "p(192,1)"'), "s.toml")
+    site = parse_site(changed('home = "p(2,3)"', 'home = "p(192,1)"'), "s.toml")
     assert site.machines[11].home == Segment(192, 1)
 
 
@@ -125,7 +125,7 @@ def test_ten_floors_of_forty_positions_fit_in_a_few_lines() -> None:
 def test_two_texts_that_mean_the_same_have_the_same_digest() -> None:
     first = parse_site(TWO_FLOORS, "s.toml")
     head, robots = TWO_FLOORS.split("[[robots]]")
-    inline = 'robots = [{node = 0xB, home = "p( 1 , 2 )", name = "MR1"}]  # the same robot\n'
+    inline = 'robots = [{node = 0xB, home = "p( 2 , 3 )", name = "MR1"}]  # the same robot\n'
     second = parse_site(inline + head + "[carrier]\nspeed_mm_s = 1_500\n", "other.toml")
     assert robots
     assert second == first
@@ -135,7 +135,7 @@ CHANGES = {
     "name": ('name = "two"', 'name = "three"'),
     "bitrate": ('name = "two"', 'name = "two"\nbitrate = 250_000'),
     "gap": ("count = 2", 'count = 2\nwithout = ["p(1,7)N"]'),
-    "home": ('home = "p(1,2)"', 'home = "p(1,3)"'),
+    "home": ('home = "p(2,3)"', 'home = "p(2,4)"'),
     "node": ("node = 11", "node = 12"),
     "speed": ("[[spurs]]", "[carrier]\nspeed_mm_s = 1_501\n[[spurs]]"),
     "timing": ("[[spurs]]", "[timing]\ngrip_ms = 2_001\n[[spurs]]"),

@@ -25,35 +25,35 @@ ONE_MISTAKE = {
         "put one lift at each end of an alley",
     ),
     "home before a compartment": (
-        'home = "p(1,2)"',
+        'home = "p(2,3)"',
         'home = "p(1,4)"',
         's.toml:29: robots[0].home = "p(1,4)": the front of compartments[0] is there; '
         "choose a segment where a robot may stand for ever",
     ),
     "home on a sill": (
-        'home = "p(1,2)"',
+        'home = "p(2,3)"',
         'home = "p(2,8)"',
         's.toml:29: robots[0].home = "p(2,8)": the sill of lifts[1] is there; '
         "choose a segment where a robot may stand for ever",
     ),
     "home at the mouth of a spur": (
-        'home = "p(1,2)"',
+        'home = "p(2,3)"',
         'home = "p(2,5)"',
         's.toml:29: robots[0].home = "p(2,5)": the mouth of spurs[0] is there; '
         "choose a segment where a robot may stand for ever",
     ),
     "home in a lift": (
-        'home = "p(1,2)"',
+        'home = "p(2,3)"',
         'home = "p(128,1)"',
         's.toml:29: robots[0].home = "p(128,1)": no such segment; floors here: 1 to 2',
     ),
     "home beyond the end of a spur": (
-        'home = "p(1,2)"',
+        'home = "p(2,3)"',
         'home = "p(192,2)"',
         's.toml:29: robots[0].home = "p(192,2)": no such segment; spur 192 has 1 to 1',
     ),
     "home of two robots": (
-        'home = "p(1,2)"',
+        'home = "p(2,3)"',
         'home = "p(1,2)"\n[[robots]]\nname = "MR2"\nnode = 12\nhome = "p(1, 2)"',
         's.toml:33: robots[1].home = "p(1, 2)": home of robots[0] already; give each robot a segment of its own',
     ),
@@ -84,7 +84,7 @@ ONE_MISTAKE = {
         "s.toml:4: floors: no place for a car; take entries out of floors.without or add positions",
     ),
     "no robot": (
-        '[[robots]]\nname = "MR1"\nnode = 11\nhome = "p(1,2)"\n',
+        '[[robots]]\nname = "MR1"\nnode = 11\nhome = "p(2,3)"\n',
         "",
         "s.toml: robots: no robot; add at least one [[robots]] table",
     ),
@@ -121,7 +121,7 @@ ONE_MISTAKE = {
         "s.toml:6: not TOML: Cannot overwrite a value; correct the syntax there (https://toml.io)",
     ),
     "value that would break the line": (
-        'home = "p(1,2)"',
+        'home = "p(2,3)"',
         'home = "a\\nb"',
         's.toml:29: robots[0].home = "a\\nb": not a position; '
         'write a position such as "p(1,4)", which is floor 1, index 4',

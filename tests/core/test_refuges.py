@@ -1,9 +1,12 @@
 """Where a machine may stand for ever."""
 
-from onboard.config.site import parse_site
-from onboard.core.refuges import refuges
-from onboard.core.site import Segment
-from tests.config.support import TWO_FLOORS
+from dataclasses import replace
+
+from onboard.core.codes import KindCode, Side
+from onboard.core.refuges import open_refuges, refuges
+from onboard.core.site import Axis, Machine, Segment, Site, Station, Track, TrackKind
+from tests.core.buildings import building
+from tests.core.lines import SPUR
 from tests.sites import one_floor
 
 
@@ -11,7 +14,37 @@ def test_on_one_floor_everywhere_but_before_the_compartment() -> None:
     assert refuges(one_floor()) == {Segment(1, index) for index in range(1, 13) if index != 4}
 
 
+def park(compartment_floors: tuple[int, ...] = (1,)) -> Site:
+    """Three floors of six places with lifts; a spur joins p(2,3)."""
+    site = building(3, 6, Axis(1_500, 500), pitch_mm=2_400, floor_mm=2_500, carrier_length_mm=2_300)
+    tracks = site.tracks | {SPUR: Track(SPUR, TrackKind.SPUR, 1, 2_400, (Segment(2, 3),))}
+    machines = {
+        floor: Machine(floor, f"IOC{floor}", KindCode.COMPARTMENT, Segment(floor, 4), Station(floor, 4, Side.NEAR))
+        for floor in compartment_floors
+    }
+    return replace(site, tracks=tracks, machines=machines)
+
+
+def alley(floor: int, *indices: int) -> set[Segment]:
+    return {Segment(floor, index) for index in indices}
+
+
 def test_neither_sills_nor_platforms_nor_the_mouth_of_a_spur_but_the_spur() -> None:
-    first = {Segment(1, index) for index in (2, 3, 5, 6, 7)}
-    second = {Segment(2, index) for index in (2, 3, 4, 6, 7)}
-    assert refuges(parse_site(TWO_FLOORS, "two.toml")) == first | second | {Segment(192, 1)}
+    assert refuges(park()) == alley(1, 2, 3, 5) | alley(2, 2, 4, 5) | alley(3, 2, 3, 4, 5) | {Segment(SPUR, 1)}
+
+
+def test_open_are_alleys_above_the_street_and_spurs_in_which_nobody_stands() -> None:
+    site, spur = park(), {Segment(SPUR, 1)}
+    second, third = alley(2, 2, 4, 5), alley(3, 2, 3, 4, 5)
+    assert open_refuges(site, ()) == second | third | spur
+    assert open_refuges(site, [Segment(3, 5), Segment(1, 2)]) == second | spur
+    assert open_refuges(site, [Segment(SPUR, 1), Segment(2, 5)]) == third
+    assert open_refuges(site, [Segment(SPUR, 1), Segment(2, 5), Segment(3, 0)]) == frozenset()
+
+
+def test_with_compartments_on_all_floors_the_lowest_alley_stays_free() -> None:
+    assert {segment.track for segment in open_refuges(park((1, 2, 3)), ())} == {2, 3, SPUR}
+
+
+def test_on_one_floor_every_refuge_is_open() -> None:
+    assert open_refuges(one_floor(), [Segment(1, 7)]) == refuges(one_floor())

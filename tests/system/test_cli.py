@@ -69,7 +69,7 @@ def test_equal_seeds_give_equal_logs_in_processes_with_different_hash_seeds(tmp_
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["run", "no-such-site"], r'site "no-such-site": no such file.*shipped: level1'),
+        (["run", "no-such-site"], r'site "no-such-site": no such file.*shipped: .*level1'),
         (["run", "--day", "24.7.2019"], r"--day 24.7.2019: not a day; write it as 2019-07-24"),
         (["run", "--sessions", "nowhere.csv"], r"nowhere\.csv"),
         (["run", "--stalls", "ZZ-9"], r"ZZ-9"),

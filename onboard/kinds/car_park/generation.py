@@ -14,10 +14,10 @@ from onboard.core.kinematics import run_duration_us
 from onboard.core.messages import CallForProposals, Stamp
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Proposal
-from onboard.core.refuges import refuges
+from onboard.core.refuges import open_refuges
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
-from onboard.core.site import Machine, Segment, Site, Station
+from onboard.core.site import Machine, Segment, Site, Station, TrackKind
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work, to_itinerary
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens. Ours, measured in tests.
@@ -76,7 +76,8 @@ class CarParkGeneration:
         if self.program.standing is None or len(self.program.remaining) + 4 > MAX_STEPS:
             return None
         limits = self.site.cars
-        if not limits.min_wheelbase_mm <= call.wheelbase_mm <= limits.max_wheelbase_mm:
+        # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
+        if not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
             return None
         _, segment, start_us = self._start(call, now_us)
         ends = [self._lower_us(call, place, segment, start_us) for place in self._candidates(call, now_us)]
@@ -112,7 +113,7 @@ class CarParkGeneration:
         for bound_us, _, place in bounds:
             if best is not None and bound_us >= best.finish_us:
                 break
-            route = self._route(call, place, segment, start_us)
+            route = self._route(call, place, segment, start_us, now_us)
             if route is None:
                 alternatives.append(Alternative(place, None))
                 continue
@@ -131,7 +132,9 @@ class CarParkGeneration:
         earliest_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US
         return kept, segment, max(start_us, earliest_us)
 
-    def _route(self, call: CallForProposals, place: Station, origin: Segment, start_us: int) -> Route | None:
+    def _route(
+        self, call: CallForProposals, place: Station, origin: Segment, start_us: int, now_us: int
+    ) -> Route | None:
         route = plan_route(
             self.site,
             self.mirror.reservations,
@@ -139,10 +142,16 @@ class CarParkGeneration:
             origin,
             start_us,
             self._visits(call, place, start_us),
-            refuges(self.site),
+            self._refuges(),
             MAX_EXPANSIONS,
+            self.mirror.lift_floors(now_us, start_us),
         )
         return None if isinstance(route, NoRoute) else route
+
+    def _refuges(self) -> frozenset[Segment]:
+        """Where this robot may end. Spurs are left out: its carrier cannot turn into one yet."""
+        found = open_refuges(self.site, self.mirror.others_standing())
+        return frozenset(one for one in found if self.site.tracks[one.track].kind is not TrackKind.SPUR)
 
     def _lower_us(self, call: CallForProposals, place: Station, origin: Segment, start_us: int) -> int:
         return free_flow_us(self.site, origin, start_us, self._visits(call, place, start_us))

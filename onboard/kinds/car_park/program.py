@@ -9,6 +9,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from onboard.core.codes import Grade, LegAction, Side
+from onboard.core.lifts import lift_at
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Site, Station
@@ -60,6 +61,8 @@ class Step(NamedTuple):
         start, end = self.begin_us / 1e6, self.end_us / 1e6
         if self.work is not None:
             text = f"{self.work.handling.value} car {self.work.car.number} at {self.work.station}"
+        elif self.action is LegAction.RIDE:
+            text = f"ride lift {self.track} from {self.from_index} to {self.to_index}"
         elif self.action is LegAction.TRAVEL:
             text = f"travel {Segment(self.track, self.from_index)} to {self.destination}"
         else:
@@ -108,13 +111,19 @@ class Program:
         for number, step in enumerate(remaining, start=1):
             if step.work is not None:
                 kept = number
-        if kept == 0 and remaining and remaining[0].action is LegAction.TRAVEL:
+        if kept == 0 and remaining and remaining[0].action in (LegAction.TRAVEL, LegAction.RIDE):
             kept = 1
+        while 0 < kept < len(remaining) and self._is_on_platform(remaining[kept - 1]):
+            kept += 1
         if kept == 0:
             where = Segment(remaining[0].track, remaining[0].from_index) if remaining else self.standing
             return 0, where, now_us
         last = remaining[kept - 1]
         return kept, last.destination, max(last.end_us, now_us)
+
+    def _is_on_platform(self, step: Step) -> bool:
+        """Whether a step ends aboard a lift: nobody changes plans there."""
+        return step.action is LegAction.RIDE or lift_at(self.site, step.destination) is not None
 
     def replace(self, steps: list[Step], stamp: Stamp) -> None:
         """Take up a new programme of remaining ``steps`` under the next version."""
@@ -126,8 +135,18 @@ class Program:
             self.standing = steps[-1].destination
 
     def shift(self, by_us: int) -> None:
-        """Delay (or advance) all remaining steps; stamp and order stay, the version grows."""
-        self.steps = [step.shifted(by_us) for step in self.remaining]
+        """Delay (or advance) the remaining steps; stamp and order stay, the version grows.
+
+        A planned wait keeps its end, as it waits for something else: it takes up a delay as far as it is long enough.
+        """
+        shifted: list[Step] = []
+        for step in self.remaining:
+            moved = step.shifted(by_us)
+            if step.action is LegAction.STAND:
+                moved = moved._replace(end_us=max(moved.begin_us, step.end_us))
+                by_us = moved.end_us - step.end_us
+            shifted.append(moved)
+        self.steps = shifted
         self.current = 0
         self.version = successor(self.version, 8)
 

@@ -5,14 +5,17 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
+    Criterion,
     Grade,
     KindCode,
     LegAction,
     MachineState,
+    Operation,
     Reason,
     TaskPhase,
 )
 from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.lifts import sill
 from onboard.core.messages import (
     CallForProposals,
     DriveState,
@@ -23,16 +26,19 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.negotiation import Awarded, CallTerms, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
-from onboard.kinds.car_park.program import Handling, Program, Step, Work
+from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
+from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.travel import Carriage
 
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
 REPLAN_TOLERANCE_US = 500_000
+#: A step that is not over this long after its planned end is told to be late, by as much again. Ours.
+OVERDUE_US = 2_000_000
 
 
 class RobotFactory:
@@ -58,12 +64,14 @@ class Robot:
     kind: KindCode = KindCode.ROBOT
     carriage: Carriage = field(init=False)
     shuttle: ShuttleWork = field(init=False)
+    riding: Riding = field(init=False)
     _begun: bool = False
     _fault: Reason = Reason.NONE
 
     def __post_init__(self) -> None:
         self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
         self.shuttle = ShuttleWork(self.fleet)
+        self.riding = Riding(self.fleet)
 
     @property
     def program(self) -> Program:
@@ -131,23 +139,28 @@ class Robot:
         """Carry on with the step in hand."""
         if self.program.standing is None or self._fault is not Reason.NONE:
             return []
-        step = self.program.step
-        if step is None:
-            return self.carriage.advance(now_us)
-        if not self._begun:
-            self._begun = True
-            return self._begin(step, now_us)
-        effects = self._carry_on(step, now_us)
-        if self._is_done(step, now_us):
-            return effects + self._end(step, now_us)
+        effects: list[Effect] = []
+        # A step can end without a word on any bus, and the next is to begin in the same moment.
+        for _ in range(MAX_STEPS):
+            step = self.program.step
+            if step is None:
+                return effects + self.carriage.advance(now_us)
+            if not self._begun:
+                self._begun = True
+                effects += self._begin(step, now_us)
+            effects += self._carry_on(step, now_us)
+            if not self._is_done(step, now_us):
+                effects += self._tell_delay(step, now_us)
+                break
+            effects += self._end(step, now_us)
         return effects
 
     def next_wake(self) -> int | None:
         """The drive's next order, or the end of a planned wait."""
         times = [self.carriage.next_wake()]
         step = self.program.step
-        if step is not None and step.action is LegAction.STAND and self._begun:
-            times.append(step.end_us)
+        if step is not None and self._begun:
+            times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
         due = [time for time in times if time is not None]
         return min(due) if due else None
 
@@ -182,14 +195,36 @@ class Robot:
         ]
         effects += self._publish(now_us)
         effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
+        return effects + self._call_lifts(call, solution, now_us)
+
+    def _call_lifts(self, call: CallForProposals, solution: Solution, now_us: int) -> list[Effect]:
+        """Each ride is a call of its own, made after winning, as the mirror told enough before (step 15)."""
+        effects: list[Effect] = []
+        site = self.fleet.site
+        rides = [step for step in solution.steps if step.action is LegAction.RIDE]
+        for number, step in enumerate(rides, start=1):
+            terms = CallTerms(
+                task=call.task,
+                operation=Operation.RIDE,
+                kind=KindCode.LIFT,
+                criterion=Criterion.FINISH_TIME,
+                from_station=sill(site, step.track, step.from_index).number,
+                to_station=sill(site, step.track, step.to_index).number,
+                car=call.car,
+                wheelbase_mm=call.wheelbase_mm,
+                depth=number,
+            )
+            effects += self.fleet.negotiation.open(terms, now_us)
         return effects
 
     def _begin(self, step: Step, now_us: int) -> list[Effect]:
         if step.action is LegAction.TRAVEL:
             self.carriage.go(step.destination)
+        elif step.action is LegAction.RIDE:
+            return self.riding.begin(step.track, step.to_index)
         elif step.work is not None:
             return self.shuttle.begin(step.work) + self._announce_start(step.work)
-        return self._carry_on(step, now_us)
+        return []
 
     def _announce_start(self, work: Work) -> list[Effect]:
         if work.handling is Handling.LEAVE:
@@ -197,6 +232,8 @@ class Robot:
         return [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
 
     def _carry_on(self, step: Step, now_us: int) -> list[Effect]:
+        if step.action is LegAction.RIDE:
+            return self.riding.advance(now_us)
         if step.work is not None:
             return self.carriage.advance(now_us) + self.shuttle.advance(now_us)
         if self.shuttle.is_out:
@@ -206,9 +243,23 @@ class Robot:
     def _is_done(self, step: Step, now_us: int) -> bool:
         if step.action is LegAction.TRAVEL:
             return self.carriage.standing_at == step.destination
+        if step.action is LegAction.RIDE:
+            return self.riding.done
         if step.work is not None:
             return self.shuttle.phase is Phase.DONE
         return now_us >= step.end_us
+
+    def _tell_delay(self, step: Step, now_us: int) -> list[Effect]:
+        """A step that takes longer than planned moves the rest of the plan while it still lasts, so others can plan."""
+        late_us = now_us - step.end_us
+        if late_us < OVERDUE_US:
+            return []
+        # The run in hand began where it began: only its end and what follows are later.
+        by_us = late_us + OVERDUE_US
+        self.program.shift(by_us)
+        first = self.program.steps[0]
+        self.program.steps[0] = first._replace(begin_us=first.begin_us - by_us)
+        return self._publish(now_us)
 
     def _end(self, step: Step, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -216,6 +267,8 @@ class Robot:
             taken = step.work.handling is Handling.TAKE
             phase = TaskPhase.LOADED if taken else TaskPhase.DONE
             effects.append(self._report(step.work.call.task, phase, step.work.station.number))
+        if step.action is LegAction.RIDE:
+            self.carriage.ride_to(sill(self.fleet.site, step.track, step.to_index).track)
         self._begun = False
         self.program.current += 1
         late_us = now_us - step.end_us

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import OUTSIDE, CallResult, Reason, TokenKind
+from onboard.core.codes import OUTSIDE, CallResult, Operation, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TokenGrant
 from onboard.core.site import Segment
@@ -24,7 +24,7 @@ class Stewardship:
     def hear(self, message: Message) -> list[Effect]:
         """Learn from calls and awards; state a car anew when its token has come to me."""
         match message:
-            case CallForProposals():
+            case CallForProposals() if message.operation in (Operation.PARK, Operation.RETRIEVE):
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
                     del self._cars_of_calls[next(iter(self._cars_of_calls))]
@@ -48,7 +48,7 @@ class Stewardship:
     def car_statements(self) -> list[Effect]:
         """Where each car in my custody stands."""
         return [
-            Send(CarAt(self.fleet.node_id, car, record.station, record.version))
+            Send(CarAt(self.fleet.node_id, car, record.station, record.version, record.wheelbase_mm))
             for car, record in self.fleet.mirror.cars.items()
             if record.custodian == self.fleet.node_id and record.station != OUTSIDE
         ]
@@ -58,7 +58,7 @@ class Stewardship:
         if record is None or not self.fleet.tokens.holds(car_token(*car)):
             return []
         self.winners.pop(car, None)
-        statement = CarAt(self.fleet.node_id, car, record.station, version)
+        statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
         return [Send(statement)] if self.fleet.mirror.on_car(statement) else []
 
     def _passing_order(self, segment: Segment, requester: int, now_us: int) -> Reason:

@@ -14,6 +14,7 @@ from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.serial import successor
 from onboard.core.site import Segment
+from onboard.kinds.car_park.axis import AlleyAxis
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
 #: journal writes and frames. Ours.
@@ -31,41 +32,49 @@ class Carriage:
     sensed: DriveState | None = None
     goal: Segment | None = None
     sequence: int = 0
-    target: Segment | None = None
+    target: int | None = None
     refresh_at_us: int | None = None
     blocked: Segment | None = None
     stopped: bool = False
     _reported: Segment | None = None
 
     @property
+    def axis(self) -> AlleyAxis:
+        """The alley that the carrier is on."""
+        return AlleyAxis(self.fleet.site, self.track)
+
+    @property
     def standing_at(self) -> Segment | None:
-        """The segment at whose mark the carrier stands still, or None while it moves or stands between marks."""
+        """The position at whose mark the carrier stands still, or None while it moves or stands between marks.
+
+        On a lift's platform it is index 0 or length + 1 of the alley.
+        """
         state = self.sensed
         if state is None or state.mode is not DriveMode.STANDING:
             return None
-        segment = self.segment_at(state.position_mm)
-        off_mm = abs(state.position_mm - self.fleet.site.position_mm(segment))
-        return segment if off_mm <= MARK_TOLERANCE_MM else None
+        index = self.axis.index_at(state.position_mm)
+        off_mm = abs(state.position_mm - self.axis.position_mm(index))
+        return Segment(self.track, index) if off_mm <= MARK_TOLERANCE_MM else None
 
     @property
     def arrived(self) -> bool:
         """Whether the carrier stands at its goal."""
         return self.goal is not None and self.standing_at == self.goal
 
-    def segment_at(self, position_mm: int) -> Segment:
-        """The segment whose span holds a position along the track."""
-        track = self.fleet.site.tracks[self.track]
-        index = (position_mm + track.pitch_mm // 2) // track.pitch_mm + 1
-        return Segment(self.track, max(1, min(track.length, index)))
+    def ride_to(self, floor: int) -> None:
+        """The platform under the carrier has come to another floor: the same position on another alley."""
+        self.track = floor
+        self.goal = None
+        self.target = None
+        self._reported = None
 
     def occupied(self) -> list[Segment]:
-        """Segments that the body overlaps now, by the sensed position; empty where it is unknown."""
+        """Slots that the body is in now, with the gate where it is across a sill; empty where it is unknown."""
         if self.sensed is None:
             return []
         half_mm = self.fleet.site.carrier_length_mm // 2
-        first = self.segment_at(self.sensed.position_mm - half_mm)
-        last = self.segment_at(self.sensed.position_mm + half_mm)
-        return [Segment(self.track, index) for index in range(first.index, last.index + 1)]
+        position_mm = self.sensed.position_mm
+        return self.axis.overlapped(position_mm - half_mm, position_mm + half_mm)
 
     def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
@@ -73,12 +82,12 @@ class Carriage:
         if before is None:
             self.sequence = state.sequence
         self.sensed = state
-        here = self.segment_at(state.position_mm)
+        here = Segment(self.track, self.axis.index_at(state.position_mm))
         started_or_stopped = before is None or before.mode is not state.mode
         if here == self._reported and not started_or_stopped:
             return []
         self._reported = here
-        offset_mm = state.position_mm - self.fleet.site.position_mm(here)
+        offset_mm = state.position_mm - self.axis.position_mm(here.index)
         progress = Progress(
             self.fleet.node_id, itinerary_version, leg, here.track, here.index, offset_mm, state.speed_mm_s
         )
@@ -97,8 +106,9 @@ class Carriage:
             return self._rest(now_us)
         ahead = self._ahead()
         effects: list[Effect] = []
-        for segment in ahead[: self._lookahead_segments()]:
-            effects += self.fleet.tokens.want(segment_token(segment), now_us)
+        for slots in self.axis.rights(ahead)[: self._lookahead_segments()]:
+            for slot in slots:
+                effects += self.fleet.tokens.want(segment_token(slot), now_us)
         reach, reason = self._reach(ahead)
         if reach is None:
             return effects + self._hold(ahead, reason)
@@ -125,12 +135,12 @@ class Carriage:
             effects += self.fleet.tokens.want(segment_token(segment), now_us)
         return effects + self._give_back(now_us)
 
-    def _ahead(self) -> list[Segment]:
-        """Segments from where the body is to the goal, the goal included, in the order of travel."""
+    def _ahead(self) -> list[int]:
+        """Indices from where the body is to the goal, the goal included, in the order of travel."""
         assert self.goal is not None and self.sensed is not None
-        here = self.segment_at(self.sensed.position_mm)
-        step = 1 if self.goal.index >= here.index else -1
-        return [Segment(self.track, index) for index in range(here.index, self.goal.index + step, step)]
+        here = self.axis.index_at(self.sensed.position_mm)
+        step = 1 if self.goal.index >= here else -1
+        return list(range(here, self.goal.index + step, step))
 
     def _lookahead_segments(self) -> int:
         axis = self.fleet.site.carrier
@@ -138,30 +148,33 @@ class Carriage:
         ahead_mm = braking_mm + axis.speed_mm_s * LOOKAHEAD_US // 1_000_000
         return 2 + -(-ahead_mm // self.fleet.site.tracks[self.track].pitch_mm)
 
-    def _reach(self, ahead: list[Segment]) -> tuple[Segment | None, Reason]:
-        """The last segment of the unbroken authorised line, or None and why not even the first step is allowed."""
+    def _reach(self, ahead: list[int]) -> tuple[int | None, Reason]:
+        """The last index of the unbroken authorised line, or None and why not even the first step is allowed."""
         state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped)
-        for segment in self.occupied():
-            allowed, reason = authorised(state, segment)
+        for slot in self.occupied():
+            allowed, reason = authorised(state, slot)
             if not allowed:
                 return None, reason
         reach = None
         reason = Reason.NONE
-        for segment in ahead:
-            allowed, reason = authorised(state, segment)
-            if not allowed:
+        for index, slots in zip(ahead, self.axis.rights(ahead), strict=True):
+            verdicts = [authorised(state, slot) for slot in slots]
+            reason = next((why for allowed, why in verdicts if not allowed), Reason.NONE)
+            if reason is not Reason.NONE:
                 break
-            reach = segment
-        if reach == self.standing_at and reach != self.goal:
+            reach = index
+        standing = self.standing_at
+        if reach is None or (standing is not None and reach == standing.index and standing != self.goal):
             return None, reason
         return reach, reason
 
-    def _hold(self, ahead: list[Segment], reason: Reason) -> list[Effect]:
+    def _hold(self, ahead: list[int], reason: Reason) -> list[Effect]:
         """Say once for what the machine waits, for whom and why; no order is repeated, so the drive brakes."""
         self.refresh_at_us = None
         self.target = None
         tokens = self.fleet.tokens
-        waits_for = next((s for s in ahead if not tokens.holds(segment_token(s))), ahead[0])
+        line = [slot for slots in self.axis.rights(ahead) for slot in slots]
+        waits_for = next((slot for slot in line if not tokens.holds(segment_token(slot))), line[0])
         refused = segment_token(waits_for) in tokens.refused
         if self.blocked == waits_for or not refused:
             return []
@@ -172,14 +185,14 @@ class Carriage:
     def _order(self, now_us: int) -> Effect:
         assert self.target is not None
         self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
-        position_mm = self.fleet.site.position_mm(self.target)
+        position_mm = self.axis.position_mm(self.target)
         return Actuate(DriveOrder(self.fleet.node_id, self.sequence, position_mm, self.fleet.site.carrier.speed_mm_s))
 
     def _give_back(self, now_us: int) -> list[Effect]:
         """Return segments that the body has left and does not need again before its goal."""
         needed = set(self.occupied())
         if self.goal is not None and not self.arrived:
-            needed.update(self._ahead())
+            needed.update(slot for slots in self.axis.rights(self._ahead()) for slot in slots)
         effects: list[Effect] = []
         tokens = self.fleet.tokens
         for key in [key for key in tokens.wanted if key.kind is TokenKind.SEGMENT]:

@@ -1,0 +1,57 @@
+"""Lifts as the planner and the tokens see them: sills, platforms, gates.
+
+The platform of a lift is one body slot with one token. Its gate is a second token: a robot crosses the sill only while
+it holds the gate, and the lift moves only while it holds it itself, so nothing is ever between floor and platform when
+the platform moves. On an alley's axis the platform is the position before index 1 or behind the last.
+"""
+
+from onboard.core.site import Segment, Site, TrackKind
+
+#: Index of the platform's token on a lift's track, and of its gate's.
+PLATFORM_INDEX = 0
+GATE_INDEX = 255
+
+
+def platform(lift_track: int) -> Segment:
+    """The platform as a body slot."""
+    return Segment(lift_track, PLATFORM_INDEX)
+
+
+def gate(lift_track: int) -> Segment:
+    """The right to cross the sill, or to move the platform."""
+    return Segment(lift_track, GATE_INDEX)
+
+
+def lift_tracks(site: Site) -> list[int]:
+    """All lifts of a site by their track numbers."""
+    return [number for number, track in site.tracks.items() if track.kind is TrackKind.LIFT]
+
+
+def sill(site: Site, lift_track: int, lift_index: int) -> Segment:
+    """The alley segment before a lift's platform at its floor ``lift_index``, 1 to the number of floors served."""
+    return site.tracks[lift_track].joins[lift_index - 1]
+
+
+def lift_index_of(site: Site, lift_track: int, floor: int) -> int | None:
+    """The lift's index of a floor (an alley's track number), or None where it does not stop there."""
+    for index, segment in enumerate(site.tracks[lift_track].joins, start=1):
+        if segment.track == floor:
+            return index
+    return None
+
+
+def platform_on(site: Site, lift_track: int, floor: int) -> Segment | None:
+    """The platform as a position on a floor's alley: index 0 at the left end, length + 1 at the right; None: none."""
+    lift_index = lift_index_of(site, lift_track, floor)
+    if lift_index is None:
+        return None
+    at = sill(site, lift_track, lift_index)
+    return Segment(floor, 0 if at.index == 1 else site.tracks[floor].length + 1)
+
+
+def lift_at(site: Site, position: Segment) -> int | None:
+    """The lift whose platform is meant by an alley position before index 1 or behind the last; None for all others."""
+    for lift_track in lift_tracks(site):
+        if platform_on(site, lift_track, position.track) == position:
+            return lift_track
+    return None

@@ -1,0 +1,323 @@
+"""The elevator robot (ER): a platform that serves rides in the order of everybody's plans, one at a time.
+
+It schedules its future from the robots' itineraries and is never locked for a session: it goes ahead to the floor of the
+next ride, grants platform and gate there, moves when the gate is back and its sensor sees the carrier wholly aboard,
+and grants the gate again on the floor of arrival. It moves only while it holds the gate itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.lifts import gate, platform
+from onboard.core.messages import DriveOrder, DriveState, Itinerary, Leg, Message, PlatformState, Progress, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent
+from onboard.core.serial import from_bus_ms, successor
+from onboard.core.site import Machine, Site
+from onboard.kinds.car_park.lift_generation import LiftGeneration
+from onboard.kinds.car_park.stewardship import Stewardship
+
+#: The platform stands at a floor's mark within this, mm (fine sensor, dbc/device.dbc).
+MARK_TOLERANCE_MM = 5
+
+
+class LiftPhase(Enum):
+    """What the lift is doing for its present ride."""
+
+    STARTING = "starting"
+    FREE = "free"
+    BOARDING = "boarding"
+    RIDING = "riding"
+    LEAVING = "leaving"
+
+
+@dataclass(frozen=True, slots=True)
+class Ride:
+    """One ride as its robot planned it; ``board`` and ``leave`` are lift indices, ``begin_us`` the RIDE leg's begin."""
+
+    robot: int
+    board: int
+    leave: int
+    begin_us: int
+
+
+class LiftFactory:
+    """Makes lifts."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LiftGeneration:
+        """The lift's task-generation function."""
+        return LiftGeneration(site, machine, mirror)
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Lift":
+        """The lift's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, LiftGeneration):
+            raise TypeError("a lift needs its own task-generation function")
+        return Lift(fleet)
+
+
+@dataclass
+class Lift:
+    """One elevator. ``ride`` is the ride in hand, from the grant of the platform until it is back."""
+
+    fleet: Fleet
+    kind: KindCode = KindCode.LIFT
+    phase: LiftPhase = LiftPhase.STARTING
+    ride: Ride | None = None
+    drive: DriveState | None = None
+    platform: PlatformState | None = None
+    stewardship: Stewardship = field(init=False)
+    _sequence: int = 0
+    _target: int | None = None
+    _refresh_at_us: int | None = None
+    _told: tuple[int, DriveMode] | None = None
+    _gate_was_out: bool = False
+    _made: dict[int, int] = field(default_factory=dict)
+    _table: dict[LiftPhase, Callable[[int], list[Effect]]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.stewardship = Stewardship(self.fleet)
+        self._table = {
+            LiftPhase.STARTING: self._when_starting,
+            LiftPhase.FREE: self._when_free,
+            LiftPhase.BOARDING: self._when_boarding,
+            LiftPhase.RIDING: self._when_riding,
+            LiftPhase.LEAVING: self._when_leaving,
+        }
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def track(self) -> int:
+        """The lift's shaft."""
+        return self.fleet.machine.home.track
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        if self.phase is LiftPhase.STARTING:
+            return MachineState.STARTING
+        return MachineState.IDLE if self.phase is LiftPhase.FREE else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """A lift's future is in the robots' itineraries."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Nothing moves before the position is sensed."""
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Drive and platform sensors; every floor that is passed or reached is told to the fleet."""
+        if isinstance(message, PlatformState):
+            self.platform = message
+            return []
+        if not isinstance(message, DriveState):
+            return []
+        if self.drive is None:
+            self._sequence = message.sequence
+        self.drive = message
+        told = (self._index(), message.mode)
+        if told == self._told:
+            return []
+        self._told = told
+        offset_mm = message.position_mm - self._position_mm(told[0])
+        return [Send(Progress(self.fleet.node_id, 0, 0, self.track, told[0], offset_mm, message.speed_mm_s))]
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """As steward of alleys: awards tell who may fetch a stored car, and a car given to me is stated anew."""
+        return self.stewardship.hear(message)
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """A ride that was awarded stands in the robot's itinerary already; a word ends the award's repeats."""
+        if not isinstance(event, Awarded):
+            return []
+        call = event.call
+        return [Send(TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE))]
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Platform: to the robot of the next ride, at its floor. Gate: to the robot of the ride, at its floor."""
+        if key == segment_token(platform(self.track)):
+            return self._may_have_platform(requester, now_us)
+        if key == segment_token(gate(self.track)):
+            return self._may_have_gate(requester)
+        return self.stewardship.may_grant(key, requester, now_us)
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """One step of the phase table."""
+        if self.drive is None or self.platform is None:
+            return []
+        return self._table[self.phase](now_us)
+
+    def next_wake(self) -> int | None:
+        """When the drive's order is to be repeated."""
+        return self._refresh_at_us
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Where the platform is, and the tokens that this node holds."""
+        effects = self.stewardship.car_statements() + self.fleet.tokens.statements()
+        if self.drive is not None and self.drive.mode is DriveMode.STANDING:
+            index = self._index()
+            offset_mm = self.drive.position_mm - self._position_mm(index)
+            effects.append(Send(Progress(self.fleet.node_id, 0, 0, self.track, index, offset_mm, 0)))
+        return effects
+
+    # --- grants ------------------------------------------------------------------------------------------------
+
+    def _may_have_platform(self, requester: int, now_us: int) -> Reason:
+        if self.phase is not LiftPhase.FREE:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        following = self.next_ride(now_us)
+        if following is None or following.robot != requester:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        if not self._stands_at(following.board):
+            return Reason.DOOR_NOT_READY
+        self.ride = following
+        self.phase = LiftPhase.BOARDING
+        self._gate_was_out = False
+        return Reason.NONE
+
+    def _may_have_gate(self, requester: int) -> Reason:
+        ride = self.ride
+        if ride is None or ride.robot != requester:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        if self.phase is LiftPhase.BOARDING and not self._gate_was_out and self._stands_at(ride.board):
+            self._gate_was_out = True
+            return Reason.NONE
+        if self.phase is LiftPhase.LEAVING and not self._gate_was_out and self._stands_at(ride.leave):
+            self._gate_was_out = True
+            return Reason.NONE
+        return Reason.DOOR_NOT_READY
+
+    def next_ride(self, now_us: int) -> Ride | None:
+        """The ride that the robots' firm itineraries plan first among those not yet made."""
+        rides = [
+            ride
+            for node, itinerary in self.fleet.mirror.itineraries.items()
+            for ride in rides_of(self.track, node, itinerary, now_us)
+        ]
+        rides = [ride for ride in rides if self._made.get(ride.robot) != ride.begin_us]
+        return min(rides, key=lambda ride: (ride.begin_us, ride.robot), default=None)
+
+    # --- the phases --------------------------------------------------------------------------------------------
+
+    def _when_starting(self, now_us: int) -> list[Effect]:
+        assert self.platform is not None and self.drive is not None
+        if self.platform.crossing or self.platform.carrier_aboard or self.drive.mode is not DriveMode.STANDING:
+            return []
+        self.phase = LiftPhase.FREE
+        return self.statements(now_us)
+
+    def _when_free(self, now_us: int) -> list[Effect]:
+        following = self.next_ride(now_us)
+        if following is None:
+            return self._stand()
+        return self._go(following.board, now_us)
+
+    def _when_boarding(self, now_us: int) -> list[Effect]:
+        assert self.platform is not None and self.ride is not None
+        aboard = self.platform.carrier_aboard and not self.platform.crossing
+        if self._gate_was_out and self._holds_gate() and aboard:
+            self.phase = LiftPhase.RIDING
+            ride: dict[str, str | int] = {"record": "ride", "robot": self.ride.robot}
+            ride |= {"board": self.ride.board, "leave": self.ride.leave}
+            return [Record(ride), *self._go(self.ride.leave, now_us)]
+        if self._holds_platform():
+            # The robot gave the platform back without boarding: its plan has changed.
+            return self._end_ride(now_us)
+        return self._stand()
+
+    def _when_riding(self, now_us: int) -> list[Effect]:
+        assert self.ride is not None
+        if not self._stands_at(self.ride.leave):
+            return self._go(self.ride.leave, now_us)
+        self.phase = LiftPhase.LEAVING
+        self._gate_was_out = False
+        return self._stand()
+
+    def _when_leaving(self, now_us: int) -> list[Effect]:
+        if self._holds_platform() and self._holds_gate():
+            return self._end_ride(now_us)
+        return self._stand()
+
+    def _end_ride(self, now_us: int) -> list[Effect]:
+        assert self.ride is not None
+        # The robot need not tell its plan anew after a ride: it is remembered as made.
+        self._made[self.ride.robot] = self.ride.begin_us
+        self.ride = None
+        self.phase = LiftPhase.FREE
+        return self._when_free(now_us)
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _holds_gate(self) -> bool:
+        return self.fleet.tokens.holds(segment_token(gate(self.track)))
+
+    def _holds_platform(self) -> bool:
+        return self.fleet.tokens.holds(segment_token(platform(self.track)))
+
+    def _position_mm(self, index: int) -> int:
+        return (index - 1) * self.fleet.site.tracks[self.track].pitch_mm
+
+    def _index(self) -> int:
+        assert self.drive is not None
+        track = self.fleet.site.tracks[self.track]
+        index = (self.drive.position_mm + track.pitch_mm // 2) // track.pitch_mm + 1
+        return max(1, min(track.length, index))
+
+    def _stands_at(self, index: int) -> bool:
+        drive = self.drive
+        if drive is None or drive.mode is not DriveMode.STANDING:
+            return False
+        return abs(drive.position_mm - self._position_mm(index)) <= MARK_TOLERANCE_MM
+
+    def _stand(self) -> list[Effect]:
+        self._refresh_at_us = None
+        self._target = None
+        return []
+
+    def _go(self, index: int, now_us: int) -> list[Effect]:
+        """Order the drive to a floor and keep the order fresh, under the authority of the gate."""
+        if self._stands_at(index):
+            return self._stand()
+        state = MotionState(self.fleet.tokens, position_known=True, stopped=False)
+        allowed, _ = authorised(state, gate(self.track))
+        if not allowed or self.platform is None or self.platform.crossing:
+            return self._stand()
+        if index != self._target:
+            self._target = index
+            self._sequence = successor(self._sequence, 8)
+        elif self._refresh_at_us is not None and self._refresh_at_us > now_us:
+            return []
+        site = self.fleet.site
+        self._refresh_at_us = now_us + site.timing.drive_refresh_us
+        order = DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s)
+        return [Actuate(order)]
+
+
+def rides_of(track: int, robot: int, itinerary: Itinerary, now_us: int) -> list[Ride]:
+    """Rides on one lift that an itinerary still plans: those whose robot has not left the platform by its own account."""
+    if itinerary.grade is not Grade.FIRM:
+        return []
+    rides = []
+    begin_us = from_bus_ms(itinerary.stamp.award_ms, now_us)
+    for leg in itinerary.legs:
+        end_us = from_bus_ms(leg.end_ms, now_us)
+        if leg.action is LegAction.RIDE and leg.track == track and not _is_over(leg, itinerary, end_us, now_us):
+            rides.append(Ride(robot, leg.from_index, leg.to_index, begin_us))
+        begin_us = end_us
+    return rides
+
+
+def _is_over(leg: Leg, itinerary: Itinerary, end_us: int, now_us: int) -> bool:
+    """A ride whose planned end is long past was made, or given up; a late robot tells its plan anew before that."""
+    return end_us + RIDE_GRACE_US < now_us
+
+
+#: How long after its planned end a ride that was not told anew counts as over, us. Ours.
+RIDE_GRACE_US = 5_000_000
