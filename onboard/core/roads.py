@@ -9,20 +9,12 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 from onboard.core.kinematics import run_duration_us
-from onboard.core.occupancy import junction_segments, leg_sweeps
+from onboard.core.occupancy import Sweep, leg_sweeps
 from onboard.core.reservations import FOREVER
 from onboard.core.site import Segment, Site, TrackKind
 
 #: Sites whose tables are kept in one process: one in a machine, some in a test run.
 _MAX_KEPT = 16
-
-
-class Swept(NamedTuple):
-    """``segment`` is occupied during ``[enter_us, leave_us)`` of a move."""
-
-    segment: Segment
-    enter_us: int
-    leave_us: int
 
 
 class Move(NamedTuple):
@@ -43,6 +35,7 @@ class Roads:
         self._hops: dict[Segment, list[Move]] = {}
         self._junctions: dict[int, list[Segment]] = {}
         self._moves: dict[Segment, tuple[Move, ...]] = {}
+        self._alike: dict[tuple[int, int], int] = {}
         self._to_goal: dict[Segment, dict[Segment, int]] = {}
         for track in site.tracks.values():
             if track.kind is not TrackKind.LIFT:
@@ -65,6 +58,11 @@ class Roads:
         """Whether a carrier can be at a segment: it is on an alley or a spur of the site."""
         return 1 <= segment.index <= len(self._segments.get(segment.track, ()))
 
+    def segment(self, track: int, index: int) -> Segment | None:
+        """The segment of a track, or None beyond its ends."""
+        segments = self._segments[track]
+        return segments[index - 1] if 0 < index <= len(segments) else None
+
     def moves(self, here: Segment) -> tuple[Move, ...]:
         """All moves from a segment: runs by growing index, then hops in the order of the site's tracks."""
         found = self._moves.get(here)
@@ -79,18 +77,19 @@ class Roads:
             if count:
                 yield Move(there, durations[count], count * pitch_mm)
 
-    def swept(self, here: Segment, there: Segment) -> list[Swept]:
-        """Every segment that the body touches during the move between two segments, in the order of the move."""
-        if here.track != there.track:
-            hop_us = next(hop.duration_us for hop in self._hops[here] if hop.destination == there)
-            return [Swept(segment, 0, hop_us) for segment in junction_segments(self.site, here, there)]
-        step = 1 if there.index > here.index else -1
-        segments = self._segments[here.track]
-        return [
-            Swept(segments[index - 1], enter_us, leave_us)
-            for offset, enter_us, leave_us in leg_sweeps(self.site, here.track, abs(there.index - here.index))
-            if 0 < (index := here.index + step * offset) <= len(segments)
-        ]
+    def longest(self, track: int) -> tuple[Sweep, ...]:
+        """Sweeps of a run from one end of a track of two or more segments to the other."""
+        return leg_sweeps(self.site, track, len(self._segments[track]) - 1)
+
+    def alike(self, track: int, count: int) -> int:
+        """How many of its first sweeps a run over ``count`` steps shares with the longest one of the track."""
+        found = self._alike.get((track, count))
+        if found is None:
+            sweeps = leg_sweeps(self.site, track, count)
+            pairs = zip(sweeps, self.longest(track), strict=False)
+            found = next((n for n, (one, other) in enumerate(pairs) if one != other), len(sweeps))
+            self._alike[track, count] = found
+        return found
 
     def shortest_us(self, origin: Segment, goal: Segment) -> int:
         """Least time between two segments of the roads with nobody in the way; FOREVER where there is no way."""

@@ -14,7 +14,7 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 from onboard.core.codes import LegAction
-from onboard.core.departures import Departures
+from onboard.core.departures import Departures, first_ms
 from onboard.core.kinematics import ceil_ms
 from onboard.core.reservations import FOREVER, Interval, Reservations
 from onboard.core.roads import Move, Roads, roads_of
@@ -205,11 +205,11 @@ class _Search:
     def _try(self, node: _Node, move: Move) -> None:
         """Queue the earliest arrival of a move in each safe interval of its destination."""
         reached: Interval | None = None
-        for from_us, to_us in self.departures.safe(node.segment, move):
-            depart_us = max(from_us, node.time_us)
-            if depart_us >= node.interval.to_us:
+        for departures in self.departures.safe(node.segment, move):
+            if departures.from_us >= node.interval.to_us:
                 return
-            if depart_us >= to_us:
+            depart_us = first_ms(departures, node.time_us)
+            if depart_us is None or depart_us >= node.interval.to_us:
                 continue
             arrival_us = depart_us + move.duration_us
             interval = self.departures.standing_at(move.destination, arrival_us)

@@ -44,13 +44,13 @@ def delay_us(cost: int, floor: int, criterion: Criterion, timing: Timing) -> int
 
 
 class Slot(NamedTuple):
-    """When in each round of ``count`` slots of ``length_us`` a machine may begin to speak: in slot ``number``, from 0.
+    """When in each round of ``slots`` times ``length_us`` a machine may begin to speak: in slot ``number``, from 0.
 
     A length of 0 means at any time.
     """
 
     number: int
-    count: int
+    slots: int
     length_us: int
 
 
@@ -70,8 +70,8 @@ def slot_of(site: Site, node_id: int) -> Slot:
 
 
 def in_slot(delay_us: int, slot: Slot) -> int:
-    """A delay moved within its round to the machine's own slot; a round is short beside W, so better still is sooner."""
-    round_us = slot.count * slot.length_us
+    """A delay moved within its round to the machine's own slot; rounds are short beside W: better is still sooner."""
+    round_us = slot.slots * slot.length_us
     return delay_us // round_us * round_us + slot.number * slot.length_us if round_us else delay_us
 
 

@@ -22,12 +22,16 @@ from onboard.core.negotiation import (
     PreAssigned,
     Proposal,
     Released,
+    Slot,
 )
+from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Timing
 
 START_US = (BUS_MS_MODULUS - 1_000) * 1_000
 CALLER = 1
+#: Most events at one moment before the fleet counts as running away.
+MAX_TURNS = 2_000
 TIMING = Timing(
     call_window_us=1_000_000,
     bid_delay_us=300_000,
@@ -118,10 +122,18 @@ class Machine:
 
     RESTATE_US = 1_000_000
 
-    def __init__(self, node_id: int, costs: Costs, *, kind: KindCode = KindCode.ROBOT, silent: bool = False) -> None:
+    def __init__(
+        self,
+        node_id: int,
+        costs: Costs,
+        *,
+        kind: KindCode = KindCode.ROBOT,
+        silent: bool = False,
+        slot: Slot = ANY_TIME,
+    ) -> None:
         costs.node = node_id
         self.node_id = node_id
-        self.negotiation = Negotiation(node_id, kind, TIMING, costs, silent=silent)
+        self.negotiation = Negotiation(node_id, kind, TIMING, costs, silent=silent, slot=slot)
         self.committed: set[CallKey] = set()
         self.assigned: list[CallForProposals] = []
         self.released: list[Reason] = []
@@ -215,7 +227,10 @@ class Bus:
     def run(self, seconds: float) -> None:
         """Go on for so long; arrivals before timers of the same moment, timers in order of node-ID."""
         end_us = self.now_us + round(seconds * 1e6)
+        turns = 0
         while (due_us := self._next_us()) is not None and due_us <= end_us:
+            turns = 0 if due_us > self.now_us else turns + 1
+            assert turns < MAX_TURNS, "somebody asks to be woken again and again for something that is not done"
             self.now_us = max(self.now_us, due_us)
             if self._arrivals and self._arrivals[0][0] <= self.now_us:
                 self._deliver(heapq.heappop(self._arrivals)[2])
