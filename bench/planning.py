@@ -63,7 +63,10 @@ def measure(length: int, others: int, queries: int, seed: int) -> list[str]:
         reservations = Reservations()
         for node in range(20, 20 + others):
             reservations.reserve(node, pass_by(site, rng))
-        start = Segment(1, rng.randint(1, length))
+        free = [
+            s for i in range(1, length + 1) if not reservations.safe_intervals(s := Segment(1, i), 11, 0)[0].from_us
+        ]
+        start = rng.choice(free)
         visits = tuple(Visit(Segment(1, rng.randint(1, length)), 10 * SECOND) for _ in range(2))
         before = time.perf_counter_ns()
         route = plan_route(site, reservations, 11, start, 0, visits, refuges(site), 4_000)

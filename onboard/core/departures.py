@@ -1,15 +1,16 @@
-"""When each move can depart around everybody's reservations: what one route search knows, looked up once.
+"""When moves can depart around everybody's reservations: what one route search asks, segments looked up once.
 
 A window that the body sweeps ``[enter, leave)`` after the departure and a reservation ``[from, to)`` of the same
 segment forbid the departures between ``from - leave`` and ``to - enter``, both excluded. What no pair of them forbids
-is a safe departure; it is the same for every state that stands at the origin. Runs in one direction sweep their first
-segments alike, however far they go, so those are worked out once for all of them.
+is a safe departure. Runs in one direction sweep their first segments alike, however far they go: so these are taken
+one after the other, and where they leave no departure all longer runs are out of the question too.
 """
 
 from bisect import bisect_right
+from collections.abc import Iterator
 
 from onboard.core.kinematics import ceil_ms
-from onboard.core.occupancy import Sweep, junction_segments, leg_sweeps, standing_segments
+from onboard.core.occupancy import Sweep, junction_segments, leg_sweeps
 from onboard.core.reservations import FOREVER, Interval, Reservations
 from onboard.core.roads import Move, Roads
 from onboard.core.site import Segment
@@ -29,14 +30,12 @@ class Departures:
         self._free: dict[Segment, list[Interval]] = {}
         self._held: dict[Segment, list[Interval]] = {}
         self._standing: dict[Segment, list[Interval]] = {}
-        self._safe: dict[tuple[Segment, Segment], list[Interval]] = {}
-        self._begun: dict[tuple[Segment, int], list[list[Interval]]] = {}
 
     def standing(self, segment: Segment) -> list[Interval]:
         """When a body may stand at a segment: all that it touches there must be free."""
         found = self._standing.get(segment)
         if found is None:
-            touched = standing_segments(self._roads.site, segment)
+            touched = self._roads.touched(segment)
             found = self._free_intervals(touched[0])
             for other in touched[1:]:
                 found = _without(found, self._held_windows(other), 0, 1)
@@ -49,40 +48,46 @@ class Departures:
         place = bisect_right(intervals, time_us, key=_from_us) - 1
         return intervals[place] if place >= 0 and time_us < intervals[place].to_us else None
 
-    def safe(self, here: Segment, move: Move) -> list[Interval]:
-        """All departures from which every swept window and the arrival are free, in order; take the next whole ms."""
-        pair = (here, move.destination)
-        found = self._safe.get(pair)
-        if found is None:
-            found = self._safe[pair] = self._find(here, move)
-        return found
+    def moves(self, here: Segment, within: Interval) -> Iterator[tuple[Move, list[Interval]]]:
+        """Each move that may be possible from standing at ``here`` during ``within``, with departures to choose from.
 
-    def _find(self, here: Segment, move: Move) -> list[Interval]:
+        Of runs only what they sweep alike is taken into account yet; ``safe`` settles the rest.
+        """
+        begun: dict[int, list[list[Interval]]] = {1: [[within]], -1: [[within]]}
+        longest = self._roads.longest(here.track)
+        for move in self._roads.moves(here):
+            there = move.destination
+            if here.track != there.track:
+                yield move, [within]
+                continue
+            step = 1 if there.index > here.index else -1
+            alike = self._roads.alike(here.track, abs(there.index - here.index))
+            safe = self._begin(begun[step], here, step, longest[:alike])
+            if safe:
+                yield move, safe
+
+    def safe(self, here: Segment, move: Move, choice: list[Interval]) -> list[Interval]:
+        """Those of the departures from ``moves`` that are safe all the way, the arrival included, in order."""
         there, duration_us = move.destination, move.duration_us
-        safe = self._run(here, there) if here.track == there.track else self._hop(here, move)
+        safe = choice
+        if here.track != there.track:
+            for segment in junction_segments(self._roads.site, here, there):
+                safe = _without(safe, self._held_windows(segment), 0, duration_us)
+        else:
+            count, step = abs(there.index - here.index), 1 if there.index > here.index else -1
+            alike = self._roads.alike(here.track, count)
+            for sweep in leg_sweeps(self._roads.site, here.track, count)[alike:]:
+                safe = self._swept(safe, here, step, sweep)
         # To arrive is to stand for an instant at least.
-        for segment in standing_segments(self._roads.site, there) if safe else ():
+        for segment in self._roads.touched(there):
             safe = _without(safe, self._held_windows(segment), duration_us, duration_us + 1)
         return safe
 
-    def _hop(self, here: Segment, move: Move) -> list[Interval]:
-        safe = [Interval(self._start_us, FOREVER)]
-        for segment in junction_segments(self._roads.site, here, move.destination):
-            safe = _without(safe, self._held_windows(segment), 0, move.duration_us)
-        return safe
-
-    def _run(self, here: Segment, there: Segment) -> list[Interval]:
-        step = 1 if there.index > here.index else -1
-        count = abs(there.index - here.index)
-        alike = self._roads.alike(here.track, count)
-        begun = self._begun.setdefault((here, step), [[Interval(self._start_us, FOREVER)]])
-        longest = self._roads.longest(here.track)
-        while len(begun) <= alike and begun[-1]:
-            begun.append(self._swept(begun[-1], here, step, longest[len(begun) - 1]))
-        safe = begun[min(alike, len(begun) - 1)]
-        for sweep in leg_sweeps(self._roads.site, here.track, count)[alike:] if safe else ():
-            safe = self._swept(safe, here, step, sweep)
-        return safe
+    def _begin(self, begun: list[list[Interval]], here: Segment, step: int, alike: tuple[Sweep, ...]) -> list[Interval]:
+        """What these first sweeps leave over; ``begun`` holds that for each lower number of them and grows."""
+        while len(begun) <= len(alike) and begun[-1]:
+            begun.append(self._swept(begun[-1], here, step, alike[len(begun) - 1]))
+        return begun[len(alike)] if len(alike) < len(begun) else []
 
     def _swept(self, safe: list[Interval], here: Segment, step: int, sweep: Sweep) -> list[Interval]:
         segment = self._roads.segment(here.track, here.index + step * sweep.offset)
@@ -111,10 +116,12 @@ class Departures:
         return found
 
 
-def first_ms(interval: Interval, not_before_us: int) -> int | None:
-    """The first whole millisecond of an interval that is not before a time, or None."""
-    time_us = ceil_ms(max(interval.from_us, not_before_us))
-    return time_us if time_us < interval.to_us else None
+def first_ms(departures: list[Interval]) -> Iterator[int]:
+    """The first whole millisecond of each interval that has one."""
+    for from_us, to_us in departures:
+        time_us = ceil_ms(from_us)
+        if time_us < to_us:
+            yield time_us
 
 
 def _without(safe: list[Interval], held: list[Interval], enter_us: int, leave_us: int) -> list[Interval]:
@@ -127,13 +134,14 @@ def _without(safe: list[Interval], held: list[Interval], enter_us: int, leave_us
         begin_us = from_us
         while first < len(held) and held[first].to_us - enter_us <= from_us:
             first += 1
-        for held_from_us, held_to_us in held[first:]:
+        for place in range(first, len(held)):
+            held_from_us, held_to_us = held[place]
             forbidden_us = held_from_us - leave_us + 1
             if forbidden_us >= to_us:
                 break
             if forbidden_us > begin_us:
                 left.append(Interval(begin_us, forbidden_us))
-            begin_us = max(begin_us, held_to_us - enter_us)
+            begin_us = held_to_us - enter_us
         if begin_us < to_us:
             left.append(Interval(begin_us, to_us))
     return left

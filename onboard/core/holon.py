@@ -32,7 +32,7 @@ from onboard.core.messages import (
     TokenRequest,
 )
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent
+from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
 
@@ -68,12 +68,20 @@ class Holon:
         self.tokens.replay(entries)
         self.mirror = Mirror(site, machine.node_id)
         estimator = factory.estimator(site, machine, self.mirror)
-        self.negotiation = Negotiation(machine.node_id, machine.kind, site.timing, estimator, boot=boot)
+        self.negotiation = Negotiation(
+            machine.node_id,
+            machine.kind,
+            site.timing,
+            estimator,
+            boot=boot,
+            slot=slot_of(site, machine.node_id),
+        )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
         self._mismatches: Counter[int] = Counter()
+        self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes exactly the message class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
@@ -133,7 +141,8 @@ class Holon:
         self._elect_time_source(local_us)
         now_us = self.clock.bus_us(local_us)
         effects = self.tokens.wake(now_us, self.behaviour.itinerary_version)
-        if not self.clock.is_lost(local_us):
+        self._bus_time_lost = self.clock.is_lost(local_us)
+        if not self._bus_time_lost:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self._beat(now_us)
         return self._settle(effects, now_us)
@@ -144,7 +153,7 @@ class Holon:
             self._heartbeat_due_us,
             self._bus_time_due_us,
             self.tokens.next_wake(),
-            self.negotiation.next_wake(),
+            self._negotiation_due(),
             self.behaviour.next_wake(),
         ]
         due = [time for time in times if time is not None]
@@ -154,6 +163,7 @@ class Holon:
         if message.sender == self.node_id:
             return self._halt("another node sends under this node-ID")
         first = not self.clock.is_set
+        self._bus_time_lost = False
         self.clock.heard(message.bus_time_us, local_us)
         effects: list[Effect] = []
         if first:
@@ -163,6 +173,11 @@ class Holon:
                 effects += self._settle(self.behaviour.sense(early, now_us), now_us)
             self._sensed_early.clear()
         return effects
+
+    def _negotiation_due(self) -> int | None:
+        """Nothing is due in the negotiation while bus time is lost: its deadlines mean nothing then."""
+        # The last loop time is not known here; what ``wake`` found holds until the next time message.
+        return None if self._bus_time_lost else self.negotiation.next_wake()
 
     # --- handlers ----------------------------------------------------------------------------------------------
 

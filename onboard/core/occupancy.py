@@ -24,42 +24,40 @@ class Sweep(NamedTuple):
     leave_us: int
 
 
-def half_body_mm(site: Site) -> int:
-    """From the carrier's centre to the end of its clearance, rounded up."""
-    return -(-site.carrier_length_mm // 2) + site.carrier_clearance_mm
+def body_mm(site: Site) -> int:
+    """Length of the body: the carrier with its clearance in front and behind."""
+    return site.carrier_length_mm + 2 * site.carrier_clearance_mm
 
 
 def reach_segments(site: Site, track: int) -> int:
-    """How many segments beyond its own the body, with its clearance, touches on either side while it stands."""
-    return _reach(site.tracks[track].pitch_mm, half_body_mm(site))
+    """How many segments beyond its own the body touches on either side while it stands."""
+    return _reach(site.tracks[track].pitch_mm, body_mm(site))
 
 
-def _reach(pitch_mm: int, half_mm: int) -> int:
-    over_mm = half_mm - pitch_mm // 2
-    return max(0, -(-over_mm // pitch_mm))
+def _reach(pitch_mm: int, length_mm: int) -> int:
+    return max(0, -(-(length_mm - pitch_mm) // (2 * pitch_mm)))
 
 
 @lru_cache(maxsize=4096)
-def run_sweeps(segments: int, pitch_mm: int, half_mm: int, axis: Axis) -> tuple[Sweep, ...]:
-    """Sweeps of a run over ``segments`` >= 1 steps, for a body of ``half_mm`` (clearance included) each way.
+def run_sweeps(segments: int, pitch_mm: int, length_mm: int, axis: Axis) -> tuple[Sweep, ...]:
+    """Sweeps of a run over ``segments`` >= 1 steps, for a body of ``length_mm`` (clearance included).
 
     Ordered by offset, which goes from ``-reach`` to ``segments + reach``; sweeps at the start begin with the run and
     those at the destination end with it.
     """
     run = Run(segments * pitch_mm, axis)
-    border_mm = -(-pitch_mm // 2) + half_mm
-    reach = _reach(pitch_mm, half_mm)
+    reach = _reach(pitch_mm, length_mm)
     sweeps = []
     for offset in range(-reach, segments + reach + 1):
-        centre_mm = offset * pitch_mm
-        enter_us = time_at_us(run, centre_mm - border_mm)
-        sweeps.append(Sweep(offset, enter_us, cleared_at_us(run, centre_mm + border_mm)))
+        near_mm = (2 * offset * pitch_mm - pitch_mm - length_mm) // 2
+        far_mm = -(-(2 * offset * pitch_mm + pitch_mm + length_mm) // 2)
+        sweeps.append(Sweep(offset, time_at_us(run, near_mm), cleared_at_us(run, far_mm)))
     return tuple(sweeps)
 
 
 def leg_sweeps(site: Site, track: int, segments: int) -> tuple[Sweep, ...]:
     """Sweeps of the carrier of ``site`` for a run over ``segments`` steps of a track."""
-    return run_sweeps(segments, site.tracks[track].pitch_mm, half_body_mm(site), site.carrier)
+    return run_sweeps(segments, site.tracks[track].pitch_mm, body_mm(site), site.carrier)
 
 
 def standing_segments(site: Site, segment: Segment) -> list[Segment]:

@@ -9,7 +9,7 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 from onboard.core.kinematics import run_duration_us
-from onboard.core.occupancy import Sweep, leg_sweeps
+from onboard.core.occupancy import Sweep, leg_sweeps, standing_segments
 from onboard.core.reservations import FOREVER
 from onboard.core.site import Segment, Site, TrackKind
 
@@ -35,6 +35,8 @@ class Roads:
         self._hops: dict[Segment, list[Move]] = {}
         self._junctions: dict[int, list[Segment]] = {}
         self._moves: dict[Segment, tuple[Move, ...]] = {}
+        self._touched: dict[Segment, list[Segment]] = {}
+        self._longest: dict[int, tuple[Sweep, ...]] = {}
         self._alike: dict[tuple[int, int], int] = {}
         self._to_goal: dict[Segment, dict[Segment, int]] = {}
         for track in site.tracks.values():
@@ -63,6 +65,13 @@ class Roads:
         segments = self._segments[track]
         return segments[index - 1] if 0 < index <= len(segments) else None
 
+    def touched(self, segment: Segment) -> list[Segment]:
+        """Segments that a carrier standing at ``segment`` occupies."""
+        found = self._touched.get(segment)
+        if found is None:
+            found = self._touched[segment] = standing_segments(self.site, segment)
+        return found
+
     def moves(self, here: Segment) -> tuple[Move, ...]:
         """All moves from a segment: runs by growing index, then hops in the order of the site's tracks."""
         found = self._moves.get(here)
@@ -78,8 +87,12 @@ class Roads:
                 yield Move(there, durations[count], count * pitch_mm)
 
     def longest(self, track: int) -> tuple[Sweep, ...]:
-        """Sweeps of a run from one end of a track of two or more segments to the other."""
-        return leg_sweeps(self.site, track, len(self._segments[track]) - 1)
+        """Sweeps of a run from one end of a track to the other; none where it has but one segment."""
+        found = self._longest.get(track)
+        if found is None:
+            count = len(self._segments[track]) - 1
+            found = self._longest[track] = leg_sweeps(self.site, track, count) if count else ()
+        return found
 
     def alike(self, track: int, count: int) -> int:
         """How many of its first sweeps a run over ``count`` steps shares with the longest one of the track."""

@@ -6,7 +6,7 @@ machine with a headway comes out by itself. Phases count the visits made; after 
 refuge that is safe for ever.
 
 Best first by (end of the last visit, time, travel, moves), the first a lower bound until the visits are made. A move is
-queued under the time that it takes with nobody in the way, and its windows are looked at only when its turn comes (lazy
+queued under a bound from the first segments that it sweeps, and the rest is looked at only when its turn comes (lazy
 evaluation of edges; Cohen, Phillips and Likhachev 2014): most never do.
 """
 
@@ -140,7 +140,7 @@ class _Search:
         self.refuges = refuges
         self._tails = _tails(roads, visits)
         self._way_us: list[dict[Segment, int]] = [{} for _ in visits]
-        self._queue: list[tuple[_Key, _Node, Move | None]] = []
+        self._queue: list[tuple[_Key, _Node, tuple[Move, list[Interval]] | None]] = []
         self._pushed = 0
         self._closed: dict[tuple[int, Segment, Interval], int] = {}
 
@@ -149,9 +149,9 @@ class _Search:
         self._push(root)
         expansions = 0
         while self._queue:
-            _, node, move = heappop(self._queue)
-            if move is not None:
-                self._try(node, move)
+            _, node, untried = heappop(self._queue)
+            if untried is not None:
+                self._try(node, *untried)
                 continue
             if self._is_beaten(node):
                 continue
@@ -177,15 +177,16 @@ class _Search:
         return node.phase == len(self.visits) and node.segment in self.refuges and node.interval.to_us >= FOREVER
 
     def _expand(self, node: _Node) -> None:
-        """Queue the dwell of the next visit, if it is here, and every move under its least time."""
+        """Queue the dwell of the next visit, if it is here, and every move under the least time that it takes."""
         if node.phase < len(self.visits) and self.visits[node.phase].segment == node.segment:
             self._push_dwell(node, self.visits[node.phase])
-        for move in self.roads.moves(node.segment):
-            arrival_us = node.time_us + move.duration_us
+        within = Interval(node.time_us, node.interval.to_us)
+        for move, choice in self.departures.moves(node.segment, within):
+            arrival_us = choice[0].from_us + move.duration_us
             finish_us = self._finish_us(node, move.destination, arrival_us)
             self._pushed += 1
             key = (finish_us, arrival_us, node.travel_mm + move.distance_mm, node.moves + 1, self._pushed)
-            heappush(self._queue, (key, node, move))
+            heappush(self._queue, (key, node, (move, choice)))
 
     def _push_dwell(self, node: _Node, visit: Visit) -> None:
         begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
@@ -202,15 +203,10 @@ class _Search:
                 )
             )
 
-    def _try(self, node: _Node, move: Move) -> None:
+    def _try(self, node: _Node, move: Move, choice: list[Interval]) -> None:
         """Queue the earliest arrival of a move in each safe interval of its destination."""
         reached: Interval | None = None
-        for departures in self.departures.safe(node.segment, move):
-            if departures.from_us >= node.interval.to_us:
-                return
-            depart_us = first_ms(departures, node.time_us)
-            if depart_us is None or depart_us >= node.interval.to_us:
-                continue
+        for depart_us in first_ms(self.departures.safe(node.segment, move, choice)):
             arrival_us = depart_us + move.duration_us
             interval = self.departures.standing_at(move.destination, arrival_us)
             if interval is None or interval == reached:

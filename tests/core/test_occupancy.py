@@ -39,6 +39,18 @@ def test_a_body_as_long_as_a_segment_holds_two_of_them_while_it_crosses() -> Non
     ]
 
 
+def test_half_millimetres_are_rounded_to_the_longer_window() -> None:
+    # A body of 10 mm on segments of 11 mm: its front is half a millimetre from the border, 0.5 mm take 0.5 ms.
+    site = line_site(6, 11, QUICK, 8, 1)
+    assert [(s.offset, s.enter_us, s.leave_us) for s in leg_sweeps(site, ALLEY, 3)] == [
+        (0, 0, 16_000),  # 10.5 mm
+        (1, 0, 27_000),  # 0.5 mm and 21.5 mm
+        (2, 16_000, 43_000),  # 11.5 mm and 32.5 mm, the end
+        (3, 27_000, 43_000),
+    ]
+    assert standing_segments(line_site(6, 11, QUICK, 11), Segment(ALLEY, 3)) == [Segment(ALLEY, 3)]
+
+
 @pytest.mark.parametrize(
     ("carrier_length_mm", "clearance_mm", "held"),
     [(10, 0, [3]), (8, 1, [3]), (9, 0, [3]), (11, 0, [2, 3, 4]), (10, 10, [2, 3, 4]), (10, 11, [1, 2, 3, 4, 5])],

@@ -264,18 +264,33 @@ def test_machines_that_plan_one_after_the_other_never_touch(seed: int) -> None:
     # Bumper to bumper at first; from right to left each works, and ends, behind where the one before ends.
     rng = random.Random(f"fleet {seed}")
     site = alley(30)
+    homes = {14: p(9), 13: p(8), 12: p(7), 11: p(6)}
     reservations = Reservations()
+    for node, home in homes.items():
+        reservations.reserve(node, [Window(home, 0, FOREVER)])
     paths: list[list[float]] = []
     limit, waited = 31, 0
-    for node, home in ((14, 9), (13, 8), (12, 7), (11, 6)):
-        last = rng.randint(home, limit - 1)
+    for node, home in homes.items():
+        last = rng.randint(home.index + 2, limit - 1)
         visits = (Visit(p(limit - 1), rng.randrange(10) * SECOND), Visit(p(last), rng.randrange(10) * SECOND))
-        route = planned(site, reservations, p(home), *visits, owner=node, refuges=frozenset({p(last)}))
-        reservations.reserve(node, windows_of(site, route, p(home)))
+        route = planned(site, reservations, home, *visits, owner=node, refuges=frozenset({p(last)}))
+        reservations.release(node)
+        reservations.reserve(node, windows_of(site, route, home))
         paths.append(centres_mm(route.legs))
-        waited += route.finish_us > free_flow_us(site, p(home), 0, visits)
+        waited += route.finish_us > free_flow_us(site, home, 0, visits)
         limit = last
     assert waited >= 1
     for ahead, behind in pairwise(paths):
         gap_mm = min(one - other for one, other in zip(ahead, behind, strict=True))
         assert gap_mm >= 2_300 + 2 * 50 - 0.01
+
+
+def test_a_run_up_may_be_faster_than_a_standing_start() -> None:
+    # What the exhaustive search finds too: from one segment back one passes the former start at speed.
+    reservations = Reservations()
+    reservations.reserve(OTHER, [occupied(p(4), 0, 30)])
+    route = planned(alley(), reservations, p(3), Visit(p(9), SECOND))
+    waits_at = route.legs[-2].from_index
+    assert waits_at < 3
+    standing_start_us = 30 * SECOND + run_us(6) + SECOND
+    assert route.finish_us < standing_start_us

@@ -104,7 +104,6 @@ class Initiator:
     def open(self, now_us: int) -> Outcome:
         """Send the call for the next attempt."""
         self.attempt += 1
-        self.best = None
         terms = self.policy.step(self.attempt).changed(self.terms)
         deadline_us = now_us + self.policy.window_us(self.attempt, self.timing)
         self.call = CallForProposals(

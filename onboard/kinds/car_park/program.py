@@ -126,8 +126,18 @@ class Program:
             self.standing = steps[-1].destination
 
     def shift(self, by_us: int) -> None:
-        """Delay (or advance) all remaining steps; stamp and order stay, the version grows."""
-        self.steps = [step.shifted(by_us) for step in self.remaining]
+        """Delay (or advance) the remaining steps; stamp and order stay, the version grows.
+
+        A planned wait keeps its end, as it waits for something else: it takes up a delay as far as it is long enough.
+        """
+        shifted: list[Step] = []
+        for step in self.remaining:
+            moved = step.shifted(by_us)
+            if step.action is LegAction.STAND:
+                moved = moved._replace(end_us=max(moved.begin_us, step.end_us))
+                by_us = moved.end_us - step.end_us
+            shifted.append(moved)
+        self.steps = shifted
         self.current = 0
         self.version = successor(self.version, 8)
 

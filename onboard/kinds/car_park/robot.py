@@ -28,7 +28,7 @@ from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
-from onboard.kinds.car_park.program import Handling, Program, Step, Work
+from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
 from onboard.kinds.car_park.travel import Carriage
 
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
@@ -131,15 +131,19 @@ class Robot:
         """Carry on with the step in hand."""
         if self.program.standing is None or self._fault is not Reason.NONE:
             return []
-        step = self.program.step
-        if step is None:
-            return self.carriage.advance(now_us)
-        if not self._begun:
-            self._begun = True
-            return self._begin(step, now_us)
-        effects = self._carry_on(step, now_us)
-        if self._is_done(step, now_us):
-            return effects + self._end(step, now_us)
+        effects: list[Effect] = []
+        # A step can end without a word on any bus, and the next is to begin in the same moment.
+        for _ in range(MAX_STEPS):
+            step = self.program.step
+            if step is None:
+                return effects + self.carriage.advance(now_us)
+            if not self._begun:
+                self._begun = True
+                effects += self._begin(step, now_us)
+            effects += self._carry_on(step, now_us)
+            if not self._is_done(step, now_us):
+                break
+            effects += self._end(step, now_us)
         return effects
 
     def next_wake(self) -> int | None:
@@ -189,7 +193,7 @@ class Robot:
             self.carriage.go(step.destination)
         elif step.work is not None:
             return self.shuttle.begin(step.work) + self._announce_start(step.work)
-        return self._carry_on(step, now_us)
+        return []
 
     def _announce_start(self, work: Work) -> list[Effect]:
         if work.handling is Handling.LEAVE:

@@ -83,6 +83,10 @@ def test_p13_twenty_idle_robots_send_at_most_1_6_bids_a_call_and_twenty_in_a_con
     assert mip.best_won == classic.best_won == CALLS
 
 
+def test_p08_bids_strictly_improve_on_the_can_bus() -> None:
+    assert measure(PROTOCOLS["MIP"], 50, CALLS).crossed == 0
+
+
 def test_p17_in_random_order_bids_follow_the_harmonic_number() -> None:
     """The systems list's arithmetic (2.5): a new best among n in random order comes H_n times; H_20 is 3.598."""
     tally = measure(PROTOCOLS["MIP, random order"], 20, CALLS)

@@ -1,14 +1,14 @@
 """The two transition tables as data, and what each of their rarer entries does."""
 
-import itertools
 from collections.abc import Iterable
 from dataclasses import replace
 from enum import Enum
+from itertools import pairwise
 
 import pytest
 
-from onboard.core.codes import NOBODY, CallResult, Criterion, Reason, TaskPhase
-from onboard.core.messages import Award, Bid, Reference, TaskReport
+from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Reason, TaskPhase
+from onboard.core.messages import Award, Bid, Itinerary, Reference, Stamp, TaskReport
 from onboard.core.negotiation import CallKey, delay_us, initiator, participant
 from onboard.core.negotiation.bidding import Slot, in_slot, slot_of
 from onboard.core.negotiation.negotiation import FORGET_US, MAX_CALLS
@@ -95,10 +95,13 @@ def test_an_award_counts_before_the_deadline_has_passed_here() -> None:
 
 
 def test_an_award_for_a_call_in_which_nothing_was_bid_is_not_taken() -> None:
-    robot = Machine(11, Costs({1: 1_000}))
+    robot = Machine(11, Costs({1: 60_000}, slack_ms=60_000))
     robot.receive(a_call(), START_US)
-    robot.receive(award(11), START_US + 1)
-    assert robot.assigned == []
+    robot.wake(START_US)
+    assert robot.negotiation.counters.searches == 1
+    robot.receive(Bid(12, CALLER, 1, a_call().deadline_ms, 0), START_US + 1)
+    robot.receive(award(11), START_US + 2)
+    assert robot.assigned == [], "it searched, but it never bid"
 
 
 def test_an_outbid_machine_takes_an_award_all_the_same() -> None:
@@ -125,6 +128,15 @@ def test_a_stale_attempt_changes_nothing() -> None:
     robot.wake(START_US + 400_000)
     assert robot.committed == {CallKey(CALLER, 2)}
     assert robot.negotiation.counters.calls_stale == 1
+
+
+def test_a_call_made_anew_after_a_withdrawal_may_end_sooner() -> None:
+    robot = Machine(11, Costs({1: 1_000}))
+    robot.receive(a_call(1, START_US + 3_000_000, attempt=4), START_US)
+    robot.receive(award(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED), START_US + 1_000)
+    robot.receive(a_call(2, START_US + 1_100_000), START_US + 2_000)
+    robot.wake(START_US + 400_000)
+    assert robot.committed == {CallKey(CALLER, 2)}
 
 
 def test_calls_for_parts_of_one_task_stand_side_by_side() -> None:
@@ -194,13 +206,47 @@ def test_an_award_under_way_is_not_withdrawn() -> None:
     assert [(one.winner, one.result) for one in machines[0].closed] == [(11, CallResult.AWARDED)]
 
 
-def test_a_report_of_the_winner_on_the_task_ends_the_award() -> None:
+def awarding() -> tuple[Bus, Machine]:
+    """A compartment that says its award to node 11 again and again."""
     compartment = caller()
     bus = Bus([compartment, Machine(11, Costs({1: 1_000}))])
     bus.call(terms())
     bus.run(0.5)
-    bus.lose = lambda message, receiver: message.sender == 11
+    bus.lose = lambda message, receiver: True
     bus.run(1)
+    assert bus.awards()
+    return bus, compartment
+
+
+def test_an_award_that_is_not_heard_is_said_ten_times_quickly_then_at_a_tenth_of_the_pace() -> None:
+    bus, _ = awarding()
+    bus.run(20)
+    sent_us = [time_us for time_us, message in bus.wire if isinstance(message, Award)]
+    gaps = [later - earlier for earlier, later in pairwise(sent_us)]
+    assert gaps[:10] == [TIMING.award_repeat_us] * 10
+    assert set(gaps[10:]) == {10 * TIMING.award_repeat_us}
+
+
+def test_only_the_winners_firm_plan_for_this_call_ends_the_award() -> None:
+    bus, compartment = awarding()
+    (call,) = bus.calls()
+    stamp = Stamp(call.deadline_ms, CALLER, call.call)
+    right = Itinerary(11, 8, Grade.FIRM, stamp, ())
+    wrong = [
+        replace(right, sender=12),
+        replace(right, grade=Grade.TENTATIVE),
+        replace(right, stamp=stamp._replace(initiator=2)),
+        replace(right, stamp=stamp._replace(call=call.call + 1)),
+    ]
+    for itinerary in wrong:
+        compartment.receive(itinerary, bus.now_us)
+        assert compartment.closed == []
+    compartment.receive(right, bus.now_us)
+    assert [one.winner for one in compartment.closed] == [11]
+
+
+def test_a_report_of_the_winner_on_the_task_ends_the_award() -> None:
+    bus, compartment = awarding()
     report = TaskReport(12, terms().task, TaskPhase.STARTED, 0x104, Reason.NONE)
     compartment.receive(report, bus.now_us)
     compartment.receive(replace(report, sender=11, task=Reference(CALLER, 9)), bus.now_us)
@@ -227,7 +273,7 @@ def test_slots_keep_machines_a_bus_latency_apart() -> None:
     assert length_us == 1_460, "three frames of 160 bits at 500 kbit/s, and 500 us to read them"
     for delay in (0, 5_000, 123_456):
         moments = [in_slot(delay, slot) for slot in slots]
-        assert [later - earlier for earlier, later in itertools.pairwise(moments)] == [length_us] * 3
+        assert [later - earlier for earlier, later in pairwise(moments)] == [length_us] * 3
     assert in_slot(123_456, Slot(0, 1, 0)) == 123_456
     with pytest.raises(ValueError, match="99"):
         slot_of(site, 99)
