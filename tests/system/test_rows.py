@@ -283,7 +283,8 @@ class CranePrice:
 
 def test_p22_a_new_kind_of_machine_bids_and_wins_without_protocol_code() -> None:
     machines = {node: Machine(node, f"CR{node}", KindCode.LIFT, Segment(1, 1)) for node in (21, 22)}
-    holons = {node: Holon(SITE, machines[node], CraneFactory(price)) for node, price in ((21, 900), (22, 400))}
+    site = dataclasses.replace(SITE, machines={**SITE.machines, **machines})
+    holons = {node: Holon(site, machines[node], CraneFactory(price)) for node, price in ((21, 900), (22, 400))}
     call = dataclasses.replace(a_call(1_500_000), kind=KindCode.LIFT, criterion=Criterion.MONEY)
     said: list[Message] = []
 
