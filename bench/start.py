@@ -132,7 +132,12 @@ async def measure(runs: int) -> None:
     print(f"median of {runs} runs, worst in brackets; aims {AIM_S} s and {AIM_MB:.0f} MB")
     print("| process | wall s | peak MB |")
     print("|---|---|---|")
-    scripts = {"bare interpreter": "", "asyncio": "import asyncio", "python-can": "import can", "cantools": "import cantools"}
+    scripts = {
+        "bare interpreter": "",
+        "asyncio": "import asyncio",
+        "python-can": "import can",
+        "cantools": "import cantools",
+    }
     for name, script in scripts.items():
         print(_row(f"{name}, imported", [await start_script(script) for _ in range(runs + 1)]), flush=True)
     for interface in ("socketcand-asyncio", "socketcand"):

@@ -9,7 +9,8 @@ from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, f
 _HEAD = """\
 # The network
 
-Generated from `dbc/fleet.dbc` and `dbc/device.dbc` by `make docs`; the DBC files are the contract, this page only shows them.
+Generated from `dbc/fleet.dbc` and `dbc/device.dbc` by `make docs`; the DBC files are the contract, this page only shows
+them.
 
 Classic CAN 2.0B, 29-bit identifiers, 8 data bytes, little-endian signals. An identifier is
 
@@ -17,8 +18,8 @@ Classic CAN 2.0B, 29-bit identifiers, 8 data bytes, little-endian signals. An id
 |---|---|---|---|
 | priority, 0 highest | message type | zero | node-ID of the sending machine |
 
-so two nodes never send one identifier with different data. On a device bus the lowest byte is the machine's node-ID in both
-directions. `bus-sim dbc SITE` prints a DBC with one message for each machine of a site, which stock tools use without a mask.
+so two nodes never send one identifier with different data. On a device bus the lowest byte is the machine's node-ID in
+both directions. `bus-sim dbc SITE` prints a DBC with one message for each machine of a site, for tools without a mask.
 """
 
 

@@ -14,6 +14,17 @@ from onboard.core.site import Machine, Site
 
 #: A driver gets in and drives out within this, us: 10 to 30 s (constants of the SimPy study in the systems list).
 DRIVER_US = 20_000_000
+#: The operating sequence for a car that is to be given out, in the order of its steps.
+PROGRAM = (
+    "turn the light red",
+    "lock the input door",
+    "call for a robot",
+    "open the output door",
+    "receive the car",
+    "lock the output door",
+    "open the input door",
+    "show whose car is ready",
+)
 
 
 @dataclass
@@ -38,9 +49,9 @@ class BayGeneration:
         return to_bus_ms(ready_us + cycles * self._cycle_us())
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """The same as the bound: nothing that others plan changes it."""
+        """The same as the bound: nothing that others plan changes it. The program is what the bay will do."""
         cost = self.lower_bound(call, now_us)
-        return None if cost is None else Proposal(cost, None, (), ())
+        return None if cost is None else Proposal(cost, None, PROGRAM, ())
 
     def _cycle_us(self) -> int:
         """One customer served: both doors twice, the shuttle's stroke twice, grip, and the driver."""

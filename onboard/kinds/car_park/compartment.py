@@ -45,7 +45,7 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import CallTerms, Closed, Estimator, NegotiationEvent
+from onboard.core.negotiation import Awarded, CallTerms, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site, Station
 from onboard.kinds.car_park.bay_generation import BayGeneration
@@ -174,7 +174,13 @@ class Compartment:
         return self.stewardship.hear(message)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
-        """An own call closed: note the winner, or tell the customer why not."""
+        """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
+        if isinstance(event, Awarded):
+            steps = Report("program: " + "; ".join(event.proposal.program))
+            accepted = TaskReport(
+                self.fleet.node_id, event.call.task, TaskPhase.AWARDED, self.station.number, Reason.NONE
+            )
+            return [steps, Send(accepted), *self._take_ticket(event.call.car)]
         if not isinstance(event, Closed) or self.job is None or event.call.task != self.job.task:
             return []
         if event.result is CallResult.AWARDED:
