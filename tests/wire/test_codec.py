@@ -138,7 +138,7 @@ def test_no_frame_raises(data: bytes, identifier: int, extended: bool, remote: b
 
 
 def test_our_own_mistake_names_the_signal() -> None:
-    with pytest.raises(ValueError, match=r"TokenGrant.holder = 251: outside 1 to 250"):
-        fleet_codec().encode(TokenGrant(1, TokenKind.SEGMENT, 3, 1, 251))
+    with pytest.raises(ValueError, match=r"TokenGrant.holder = 256: outside 1 to 255"):
+        fleet_codec().encode(TokenGrant(1, TokenKind.SEGMENT, 3, 1, 256))
     with pytest.raises(ValueError, match="no node-ID"):
         fleet_codec().encode(Heartbeat(0, 1, 1, 1, 1, KindCode.ROBOT, MachineState.IDLE))
