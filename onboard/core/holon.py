@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.authority import TokenBook, TokenKey, genesis_holder
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BusClock
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, KindCode, MachineState, Reason
@@ -40,6 +40,8 @@ from onboard.core.site import Machine, Site
 DIGEST_PATIENCE = 2
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
+#: Bus time on the wire has 48 bits of microseconds: 8.9 years.
+BUS_TIME_MODULUS = 1 << 48
 
 
 class Holon:
@@ -86,7 +88,7 @@ class Holon:
         # Each handler takes exactly the message class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             TokenRequest: self._on_token_request,
-            TokenGrant: self.tokens.on_grant,
+            TokenGrant: self._on_token_grant,
             TokenHeld: lambda message, now_us: self.tokens.on_held(message),
             TokenRefusal: self._on_token_refusal,
             CallForProposals: self._negotiate,
@@ -162,6 +164,9 @@ class Holon:
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
         if message.sender == self.node_id:
             return self._halt("another node sends under this node-ID")
+        if not self._is_time_source(message.sender):
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
         first = not self.clock.is_set
         self._bus_time_lost = False
         self.clock.heard(message.bus_time_us, local_us)
@@ -179,6 +184,13 @@ class Holon:
         # The last loop time is not known here; what ``wake`` found holds until the next time message.
         return None if self._bus_time_lost else self.negotiation.next_wake()
 
+    def _is_time_source(self, sender: int) -> bool:
+        """Whether bus time from ``sender`` counts: a fixed machine of the site, below me if I am one myself."""
+        machine = self.site.machines.get(sender)
+        if machine is None or machine.kind is KindCode.ROBOT:
+            return False
+        return self.machine.kind is KindCode.ROBOT or sender < self.node_id
+
     # --- handlers ----------------------------------------------------------------------------------------------
 
     def _on_token_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
@@ -188,6 +200,12 @@ class Holon:
         else:
             verdict = Reason.TOKEN_HELD_BY_OTHER
         return self.tokens.on_request(request, verdict, now_us)
+
+    def _on_token_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
+        if genesis_holder(self.site, TokenKey(grant.token_kind, grant.token)) == NOBODY:
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
+        return self.tokens.on_grant(grant, now_us)
 
     def _on_token_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
         self.tokens.on_refusal(refusal)
@@ -239,7 +257,7 @@ class Holon:
         effects = self.behaviour.statements(now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
-            effects = [Send(BusTime(self.node_id, now_us)), *effects]
+            effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
         return effects
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
@@ -275,7 +293,7 @@ class Holon:
             effects += self._diagnostics()
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
-            effects.append(Send(BusTime(self.node_id, now_us)))
+            effects.append(Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)))
         return effects
 
     def _heartbeat(self) -> Heartbeat:
