@@ -107,7 +107,7 @@ async def start_script(script: str) -> Start:
     await process.stdout.readline()
     heard_s = time.perf_counter()
     peak_mb = _peak_mb(process.pid)
-    await process.communicate()
+    await process.communicate(b"\n")
     return Start(heard_s - begun_s, peak_mb)
 
 
