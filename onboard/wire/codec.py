@@ -18,7 +18,6 @@ from onboard.core.messages import Leg, Message, Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts
 
-_TYPE_MASK = 0x1FFFFF00
 _NODE_MASK = 0xFF
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
 _MEMORY = 4096
@@ -261,7 +260,7 @@ class Codec:
             if value < minimum or value > maximum:
                 name = next(field.name for field in layout.fields if field.shift == shift)
                 raise ValueError(f"{layout.name}.{name} = {value}: outside {minimum} to {maximum}")
-            raw = value if scale == 1 else value // scale - offset // scale
+            raw = value if scale == 1 else (value - offset) // scale
             word |= (raw & mask) << shift
         return Frame(layout.frame_id | sender, word.to_bytes(layout.length, "little"))
 
@@ -275,11 +274,11 @@ class Codec:
 
     def name_of(self, frame: Frame) -> str | None:
         """The DBC name of a frame's message, or None."""
-        layout = self._by_id.get(frame.arbitration_id & _TYPE_MASK) if frame.is_extended else None
+        layout = self._by_id.get(frame.arbitration_id & ~_NODE_MASK) if frame.is_extended else None
         return layout.name if layout is not None else None
 
     def _decode(self, arbitration_id: int, data: bytes) -> Message | Part | Reason:
-        layout = self._by_id.get(arbitration_id & _TYPE_MASK)
+        layout = self._by_id.get(arbitration_id & ~_NODE_MASK)
         sender = arbitration_id & _NODE_MASK
         if layout is None or sender == 0:
             return Reason.UNKNOWN_IDENTIFIER

@@ -3,7 +3,6 @@
 import dataclasses
 import random
 
-import cantools
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -25,12 +24,12 @@ from onboard.core.messages import CallForProposals, Heartbeat, Itinerary, Leg, M
 from onboard.wire.codec import Codec, Part, device_codec, fleet_codec
 from onboard.wire.dbc_file import fleet_layouts
 from onboard.wire.decoder import MAX_SETS, SET_TIMEOUT_US, Decoder
-from tests.wire.samples import layouts, random_frames
+from tests.wire.samples import judge_of, layouts, random_frames, signal_values
 
 FLEET_NAMES = {layout.name for layout in fleet_layouts()}
 JUDGES = {
-    True: cantools.database.load_string(fleet_dbc_text(), "dbc"),
-    False: cantools.database.load_string(device_dbc_text(), "dbc"),
+    True: judge_of(fleet_dbc_text()),
+    False: judge_of(device_dbc_text()),
 }
 
 CALL = CallForProposals(
@@ -54,12 +53,13 @@ def test_every_message_is_packed_and_read_as_cantools_does() -> None:
         part = codec.decode_part(frame)
         assert not isinstance(part, Reason), (layout.name, part, values)
         assert (part.sender, codec.name_of(frame)) == (node, layout.name)
+        decoded = judge.decode(frame.data, decode_choices=False, scaling=True)
+        assert decoded == values
         if isinstance(part, Message):
-            (again,) = codec.encode(part)
-            assert again == frame
+            assert signal_values(part) == decoded
+            assert codec.encode(part) == (frame,)
         else:
             assert isinstance(part, Part)
-            decoded = judge.decode(frame.data, decode_choices=False, scaling=True)
             assert {n: int(v) for n, v in zip(codec.field_names(part.name), part.values, strict=True)} == decoded
 
 

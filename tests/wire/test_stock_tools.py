@@ -17,10 +17,12 @@ import pytest
 from bus_sim.cli import main as bus_sim
 from bus_sim.sites import find_site
 from onboard.core.frame import Frame
+from onboard.core.messages import Message
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import Part, fleet_codec
 from onboard.wire.site_dbc import site_dbc
 from tests.tools import require_tool, run_tool
+from tests.wire.samples import signal_values
 
 ROOT = Path(__file__).parents[2]
 DEADLINE_S = 60
@@ -58,6 +60,9 @@ def test_cantools_decodes_every_line_from_a_pipe_to_our_values(folder: Path, fra
         part = codec.decode_part(frame)
         if isinstance(part, Part):
             assert told == {key: int(v) for key, v in zip(codec.field_names(part.name), part.values, strict=True)}
+        else:
+            assert isinstance(part, Message), (part, line)
+            assert told == signal_values(part)
 
 
 def test_wireshark_reads_every_frame(folder: Path, frames: list[tuple[int, Frame]]) -> None:
@@ -77,6 +82,20 @@ def test_can_utils_and_python_can_read_every_frame(folder: Path, frames: list[tu
     with can.LogReader(folder / "trace.asc", relative_timestamp=True) as reader:
         found = [(message.arbitration_id, message.is_extended_id, bytes(message.data)) for message in reader]
     assert found == [(frame.arbitration_id, True, frame.data) for _, frame in frames]
+
+
+def test_can_utils_gives_our_log_back(folder: Path, frames: list[tuple[int, Frame]]) -> None:
+    """To Vector's format and back: identifiers, data and times to the 100 us that the format keeps."""
+    log2asc, asc2log = require_tool("log2asc"), require_tool("asc2log")
+    asc = run_tool(log2asc, "-I", str(folder / "trace.log"), "fleet")
+    again = CandumpReader(run_tool(asc2log, stdin=asc.encode()).encode().splitlines(keepends=True))
+    found = list(again)
+    assert not again.faults
+    assert [record.frame for record in found] == [frame for _, frame in frames]
+    shift_us = found[0].time_us - frames[0][0]
+    assert (
+        max(abs(record.time_us - time_us - shift_us) for record, (time_us, _) in zip(found, frames, strict=True)) <= 100
+    )
 
 
 async def test_canplayer_takes_the_log_and_stops_only_for_want_of_socketcan(folder: Path) -> None:
