@@ -5,7 +5,7 @@
 Each run is a new process with an empty journal; the bus is served over loopback in the socketcand protocol by this one.
 Wall time counts from just before the process is made to the arrival of the heartbeat; memory is the process's highest
 resident set by then (``VmHWM`` of proc(5), so Linux only). One run that is not counted fills the caches. For comparison
-the table begins with an interpreter that does nothing but say that it runs, and ends with what each library costs.
+the table begins with an interpreter that does nothing but say that it runs, alone and with each library imported.
 """
 
 import argparse
@@ -133,13 +133,13 @@ async def measure(runs: int) -> None:
     print("| process | wall s | peak MB |")
     print("|---|---|---|")
     scripts = {
-        "bare interpreter": "",
-        "asyncio": "import asyncio",
-        "python-can": "import can",
-        "cantools": "import cantools",
+        "an interpreter that does nothing": "",
+        "with asyncio imported": "import asyncio",
+        "with python-can imported": "import can",
+        "with cantools imported": "import cantools",
     }
     for name, script in scripts.items():
-        print(_row(f"{name}, imported", [await start_script(script) for _ in range(runs + 1)]), flush=True)
+        print(_row(name, [await start_script(script) for _ in range(runs + 1)]), flush=True)
     for interface in ("socketcand-asyncio", "socketcand"):
         print(_row(f"onboard on {interface}", [await start_onboard(interface) for _ in range(runs + 1)]), flush=True)
 

@@ -4,6 +4,7 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 (rows P21, P22). A new kind is a new ``Behaviour``; no protocol code changes for it.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -18,13 +19,14 @@ from onboard.core.site import Machine, Site
 
 @dataclass
 class Fleet:
-    """What the core lends to a behaviour: identity, tokens, mirror and negotiation of the same node."""
+    """What the core lends to a behaviour of the same node; ``entries`` are the journal's, oldest first."""
 
     site: Site
     machine: Machine
     tokens: TokenBook
     mirror: Mirror
     negotiation: Negotiation
+    entries: tuple[Mapping[str, str | int], ...] = ()
 
     @property
     def node_id(self) -> int:

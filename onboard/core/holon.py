@@ -68,6 +68,7 @@ class Holon:
         self._told_drops: Counter[Reason] = Counter()
         self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
+        entries = tuple(entries)
         self.tokens.replay(entries)
         self.mirror = Mirror(site, machine.node_id)
         estimator = factory.estimator(site, machine, self.mirror)
@@ -79,7 +80,7 @@ class Holon:
             boot=boot,
             slot=slot_of(site, machine.node_id),
         )
-        self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation)
+        self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None

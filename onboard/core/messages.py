@@ -225,12 +225,13 @@ class TaskReport(Message):
 class CarAt(Message):
     """The custodian of ``car`` states the station at which it stands, under the car token's ``version``.
 
-    ``ANY_STATION`` means: aboard the sender.
+    ``ANY_STATION`` means: aboard the sender; ``OUTSIDE``: it has left. ``wheelbase_mm`` is the car's.
     """
 
     car: Reference
     station: int
     version: int
+    wheelbase_mm: int
 
 
 @dataclass(frozen=True, slots=True)

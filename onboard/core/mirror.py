@@ -33,11 +33,12 @@ class Peer:
 
 @dataclass(frozen=True, slots=True)
 class CarRecord:
-    """Where a car stands, who vouches for it, and under which version of its token."""
+    """Where a car stands, who vouches for it, under which version of its token, and its wheelbase in mm."""
 
     station: int
     custodian: int
     version: int
+    wheelbase_mm: int
 
 
 def _crc16(values: list[int]) -> int:
@@ -95,7 +96,7 @@ class Mirror:
     def on_car(self, statement: CarAt) -> bool:
         """Take up a custodian's statement; True where it changed anything."""
         known = self.cars.get(statement.car)
-        record = CarRecord(statement.station, statement.sender, statement.version)
+        record = CarRecord(statement.station, statement.sender, statement.version, statement.wheelbase_mm)
         if known == record:
             return False
         if (

@@ -44,6 +44,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site, Station
+from onboard.kinds.car_park.compartment import Compartment, CompartmentFactory
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.program import Handling, Program, Step, Work
 from onboard.wire.codec import fleet_codec
@@ -276,6 +277,14 @@ def test_a_drive_without_fresh_orders_stops_inside_its_machines_authority(under_
     assert position_mm < home_mm, "it was on its way"
     assert all(tokens.holds(segment_token(Segment(1, index))) for index in reached)
     assert scene.simulation.plant.oracle.finish() == []
+
+
+def test_a_restarted_compartment_never_names_two_cars_alike() -> None:
+    site = one_floor()
+    entries: list[dict[str, str | int]] = [{"record": "boot", "boot": 3}, {"record": "number", "number": 7}]
+    behaviour = Holon(site, site.machines[1], CompartmentFactory(), entries=entries).behaviour
+    assert isinstance(behaviour, Compartment)
+    assert behaviour._number == 7
 
 
 # --- row P22: a machine kind that the project does not know, with no line of protocol code ---------------------------

@@ -175,7 +175,7 @@ def test_lost_and_reordered_frames_never_make_a_message_that_nobody_sent(
 
 @pytest.mark.parametrize("lost", [1, 2])
 def test_a_number_used_again_never_takes_frames_of_the_call_before(lost: int) -> None:
-    """A sender that was restarted at once without its journal: its first call was cut short, its second has its number."""
+    """A sender restarted at once without its journal: its first call was cut short, its second has the same number."""
     old, new = a_call(1, 5), dataclasses.replace(a_call(1, 6), call=5)
     decoder = Decoder(fleet_codec())
     remains = [frame for number, frame in enumerate(fleet_codec().encode(old)) if number != lost]

@@ -108,7 +108,6 @@ class Compartment:
     doors: DoorState | None = None
     bay: BayState | None = None
     tickets: deque[Reference] = field(default_factory=deque)
-    wheelbases_mm: dict[Reference, int] = field(default_factory=dict)
     stewardship: Stewardship = field(init=False)
     _number: int = 0
     _sequence: int = 0
@@ -120,6 +119,9 @@ class Compartment:
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
+        for entry in self.fleet.entries:
+            if entry.get("record") == "number":
+                self._number = int(entry["number"])
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,
@@ -288,10 +290,9 @@ class Compartment:
         self._number = successor(self._number, 16)
         car = Reference(self.fleet.node_id, self._number)
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
-        self.wheelbases_mm[car] = bay.wheelbase_mm
         effects = self.fleet.tokens.create(car_token(*car))
-        effects.append(Record({"record": "number", "number": self._number, "wheelbase_mm": bay.wheelbase_mm}))
-        effects += [self._state_car(car, self.station.number), self._desk(DeskText.TAKE_TICKET, car)]
+        effects.append(Record({"record": "number", "number": self._number}))
+        effects += [self._state_car(car, self.station.number, bay.wheelbase_mm), self._desk(DeskText.TAKE_TICKET, car)]
         effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
         self._go(BayPhase.LOCKING)
         return [*effects, self._light(LightColour.RED)]
@@ -316,9 +317,9 @@ class Compartment:
         car = self.tickets.popleft()
         self._number = successor(self._number, 16)
         task = Reference(self.fleet.node_id, self._number)
-        self.job = BayTask(task, Operation.RETRIEVE, car, self.wheelbases_mm.get(car, 0))
+        self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
-        return [Record({"record": "number", "number": self._number, "wheelbase_mm": 0}), *self._fetch(self.job, now_us)]
+        return [Record({"record": "number", "number": self._number}), *self._fetch(self.job, now_us)]
 
     def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
         where = self.fleet.mirror.car_station(job.car)
@@ -365,8 +366,7 @@ class Compartment:
         if not is_open or self.bay.load_kg or self.bay.person_inside:
             return []
         car = self.job.car
-        self.wheelbases_mm.pop(car, None)
-        effects = [self._state_car(car, OUTSIDE), self._desk(DeskText.WELCOME, Reference(0, 0))]
+        effects = [self._state_car(car, OUTSIDE, self.job.wheelbase_mm), self._desk(DeskText.WELCOME, Reference(0, 0))]
         return effects + self._to_free()
 
     # --- inner works -------------------------------------------------------------------------------------------
@@ -378,7 +378,7 @@ class Compartment:
             return [Report(f"nobody can fetch car {job.car.number}: {reason.name}; called again in 30 s")]
         effects: list[Effect] = [
             Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
-            self._state_car(job.car, OUTSIDE),
+            self._state_car(job.car, OUTSIDE, job.wheelbase_mm),
             self._desk(DeskText.FULL, job.car),
         ]
         return effects + self._to_free()
@@ -396,8 +396,9 @@ class Compartment:
         )
         return list(self.fleet.negotiation.open(terms, now_us))
 
-    def _state_car(self, car: Reference, station: int) -> Effect:
-        statement = CarAt(self.fleet.node_id, car, station, self.fleet.tokens.seen[car_token(*car)])
+    def _state_car(self, car: Reference, station: int, wheelbase_mm: int) -> Effect:
+        version = self.fleet.tokens.seen[car_token(*car)]
+        statement = CarAt(self.fleet.node_id, car, station, version, wheelbase_mm)
         self.fleet.mirror.on_car(statement)
         return Send(statement)
 

@@ -120,7 +120,7 @@ class ShuttleWork:
         key = car_token(*work.car)
         taken = work.handling is Handling.TAKE
         station = ANY_STATION if taken else work.station.number
-        statement = CarAt(self.fleet.node_id, work.car, station, self.fleet.tokens.seen[key])
+        statement = CarAt(self.fleet.node_id, work.car, station, self.fleet.tokens.seen[key], work.wheelbase_mm)
         self.fleet.mirror.on_car(statement)
         effects: list[Effect] = [Send(statement)]
         owner = keeper(self.fleet, work.station)

@@ -48,7 +48,7 @@ class Stewardship:
     def car_statements(self) -> list[Effect]:
         """Where each car in my custody stands."""
         return [
-            Send(CarAt(self.fleet.node_id, car, record.station, record.version))
+            Send(CarAt(self.fleet.node_id, car, record.station, record.version, record.wheelbase_mm))
             for car, record in self.fleet.mirror.cars.items()
             if record.custodian == self.fleet.node_id and record.station != OUTSIDE
         ]
@@ -58,7 +58,7 @@ class Stewardship:
         if record is None or not self.fleet.tokens.holds(car_token(*car)):
             return []
         self.winners.pop(car, None)
-        statement = CarAt(self.fleet.node_id, car, record.station, version)
+        statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
         return [Send(statement)] if self.fleet.mirror.on_car(statement) else []
 
     def _passing_order(self, segment: Segment, requester: int, now_us: int) -> Reason:
