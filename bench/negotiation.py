@@ -7,7 +7,8 @@ nothing is written.
 
 Counted per call, from the call to the winner's firm itinerary: bids; messages (a call, a bid, an itinerary, an award
 are one message each); frames on the bus, where a call is three and an itinerary one more than its legs. "ms to winner"
-is from the call to the moment at which the winner knows; "best" is how often the cheapest bidder, and nobody else, won.
+is from the call to the moment at which the winner knows; "in vain" are bids that were no better than one before them on
+the wire; "best" is how often the cheapest bidder, and nobody else, won.
 """
 
 import asyncio
@@ -26,7 +27,7 @@ from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation,
 from onboard.core.effects import Effect, Send
 from onboard.core.frame import Frame
 from onboard.core.kinematics import run_duration_us
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Reference, Stamp
+from onboard.core.messages import Bid, CallForProposals, Itinerary, Leg, Message, Reference, Stamp
 from onboard.core.negotiation import (
     Awarded,
     CallTerms,
@@ -35,6 +36,7 @@ from onboard.core.negotiation import (
     Negotiation,
     NegotiationEvent,
     Proposal,
+    beats,
     slot_of,
 )
 from onboard.core.negotiation import delay_us as better_bids_sooner
@@ -121,6 +123,7 @@ class Tally:
     messages: int = 0
     frames: int = 0
     best_won: int = 0
+    crossed: int = 0
     latency_us: int = 0
     winners: list[int] = field(default_factory=list)
 
@@ -132,6 +135,7 @@ class Node:
         self.party = party
         self.robot: IdleRobot | None = None
         self.closed: Closed | None = None
+        self._standing: Bid | None = None
         self._loop, self._tally = loop, tally
         self._bus = bus
         self._decoder = Decoder(fleet_codec())
@@ -153,14 +157,25 @@ class Node:
 
     def _say(self, message: Message) -> None:
         self._tally.messages += 1
-        self._tally.bids += type(message).__name__ == "Bid"
+        self._tally.bids += isinstance(message, Bid)
         for frame in fleet_codec().encode(message):
             self._bus.send(frame)
 
     def _on_frame(self, frame: Frame, time_us: int) -> None:
         message = self._decoder.feed(frame, time_us)
+        if isinstance(message, Bid) and self.robot is None:
+            self._watch(message)
         if message is not None:
             self.carry_out(self.party.receive(message, time_us), time_us)
+
+    def _watch(self, bid: Bid) -> None:
+        """The caller hears every bid in the order of the wire: one that improves nothing was sent in vain."""
+        if self._standing is not None and self._standing.call == bid.call:
+            standing = self._standing
+            if not beats(bid.cost, bid.sender, standing.cost, standing.sender, Criterion.FINISH_TIME):
+                self._tally.crossed += 1
+                return
+        self._standing = bid
 
     def _set_timer(self) -> None:
         if isinstance(self.party, Negotiation | ContractNetInitiator):
@@ -294,7 +309,7 @@ def measure(
 def _print_protocols(calls: int) -> None:
     print(
         f"{'robots':>6} {'protocol':<18} {'bids/call':>9} {'messages/call':>13} {'frames/call':>11} "
-        f"{'ms to winner':>12} {'best':>6}"
+        f"{'ms to winner':>12} {'in vain':>8} {'best':>6}"
     )
     for robots in FLEETS:
         for name, maker in PROTOCOLS.items():
@@ -302,15 +317,18 @@ def _print_protocols(calls: int) -> None:
             latency_ms = tally.latency_us / max(1, len(tally.winners)) / 1e3
             print(
                 f"{robots:>6} {name:<18} {tally.bids / calls:>9.2f} {tally.messages / calls:>13.2f} "
-                f"{tally.frames / calls:>11.2f} {latency_ms:>12.1f} {tally.best_won / calls:>6.0%}"
+                f"{tally.frames / calls:>11.2f} {latency_ms:>12.1f} {tally.crossed:>8} {tally.best_won / calls:>6.0%}"
             )
 
 
 def _print_slower_boards(calls: int) -> None:
-    print(f"\n{SLOWER_FLEET} robots, MIP, slower controllers\n\n{'us a frame':>10} {'bids/call':>9} {'best':>6}")
+    print(
+        f"\n{SLOWER_FLEET} robots, MIP, slower controllers\n\n"
+        f"{'us a frame':>10} {'bids/call':>9} {'in vain':>8} {'best':>6}"
+    )
     for processing_us in SLOWER_US:
         tally = measure(PROTOCOLS["MIP"], SLOWER_FLEET, calls, SEED, processing_us)
-        print(f"{processing_us:>10} {tally.bids / calls:>9.2f} {tally.best_won / calls:>6.0%}")
+        print(f"{processing_us:>10} {tally.bids / calls:>9.2f} {tally.crossed:>8} {tally.best_won / calls:>6.0%}")
 
 
 def main() -> None:

@@ -165,6 +165,10 @@ def _day_options(args: argparse.Namespace) -> DayOptions:
     except ValueError as error:
         raise OptionError(str(error)) from error
     live = args.serve is not None or bool(args.bus)
+    if live and args.without and args.speed not in (None, 1.0):
+        raise OptionError(
+            f"--speed {args.speed}: a controller in another process lives at the clock's pace; leave it out"
+        )
     return DayOptions(
         sessions=args.sessions,
         day=args.day,

@@ -19,9 +19,9 @@ from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site
 
 #: The run begins so long before the first customer, us: the machines find their places first.
-LEAD_US = 60_000_000
+LEAD_US = 10_000_000
 #: After the last customer the machines may finish what they do, us.
-TAIL_US = 60_000_000
+TAIL_US = 30_000_000
 #: Somebody who waits so long after the last departure was lost, us: the run ends and says so.
 PATIENCE_US = 2 * 3_600_000_000
 #: Looks at the clock between pictures, us of virtual time.

@@ -8,6 +8,7 @@ import pytest
 
 #: What installs a tool where it is missing (Debian, Ubuntu).
 PACKAGES = {
+    "asc2log": "can-utils",
     "candump": "can-utils",
     "canplayer": "can-utils",
     "log2asc": "can-utils",

@@ -204,10 +204,19 @@ class Oracle:
         if span.track not in self._alleys:
             return
         margin = track.pitch_mm / 2
-        bottom, top = self.world.limits_mm(span.track)
-        if low < bottom - margin or high > top + margin:
-            beyond_end = low < -margin - track.pitch_mm or high > track.length * track.pitch_mm + margin
-            self._once(Rule.ON_TRACK if beyond_end else Rule.FALL, f"robot {node_id} on track {span.track}")
+        bottom, top = -margin, (track.length - 1) * track.pitch_mm + margin
+        for side in ([low] if low < bottom else []) + ([high] if high > top else []):
+            if not self._had_platform(node_id, span.track, side):
+                beyond_end = low < bottom - track.pitch_mm or high > top + track.pitch_mm
+                self._once(Rule.ON_TRACK if beyond_end else Rule.FALL, f"robot {node_id} on track {span.track}")
+
+    def _had_platform(self, node_id: int, floor: int, position_mm: float) -> bool:
+        """Whether a platform stood at that end of the alley during the span, or took the robot along at its end."""
+        for lift, platform in self.world.platforms.items():
+            end_mm = self.world.end_mm(lift, floor)
+            if end_mm is not None and (end_mm < 0) == (position_mm < 0):
+                return self.world.platform_floor(lift) == floor or platform.robot == node_id
+        return False
 
     def _judge_pairs(self, now_us: int, node_id: int | None = None) -> None:
         """Least distance of every pair (with ``node_id``) since the last time one of them changed its motion."""

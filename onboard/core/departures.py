@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from onboard.core.kinematics import ceil_ms
 from onboard.core.lift_uses import HOME_INDEX, Gap, floor_intervals, lift_gaps
 from onboard.core.lifts import PLATFORM_INDEX, platform
-from onboard.core.occupancy import Sweep, junction_segments, leg_sweeps
+from onboard.core.occupancy import junction_segments, leg_sweeps
 from onboard.core.reservations import FOREVER, Interval, Reservations
 from onboard.core.roads import Move, Roads
 from onboard.core.site import Segment
@@ -39,6 +39,7 @@ class Departures:
         self._free: dict[Segment, list[Interval]] = {}
         self._held: dict[Segment, list[Interval]] = {}
         self._standing: dict[Segment, list[Interval]] = {}
+        self._tracks: dict[int, dict[int, list[Interval]]] = {}
 
     def standing(self, segment: Segment) -> list[Interval]:
         """When a body may stand at a segment: all that it touches there must be free."""
@@ -65,10 +66,10 @@ class Departures:
     def moves(self, here: Segment, moves: Iterable[Move], within: Interval) -> Iterator[tuple[Move, list[Interval]]]:
         """Each of ``moves`` that may be possible from standing at ``here`` during ``within``, with departures for it.
 
-        Of runs only what they sweep alike is taken into account yet; ``safe`` settles the rest.
+        Of runs only what they sweep alike is taken into account yet; ``first`` settles the rest.
         """
         begun: dict[int, list[list[Interval]]] = {1: [[within]], -1: [[within]]}
-        longest = self._roads.longest(here.track)
+        longest, held = self._roads.longest(here.track), self._held_on(here.track)
         for move in moves:
             there = move.destination
             if here.track != there.track:
@@ -76,7 +77,12 @@ class Departures:
                 continue
             step = 1 if there.index > here.index else -1
             alike = self._roads.alike(here.track, abs(there.index - here.index))
-            safe = self._begin(begun[step], here, step, longest[:alike])
+            left = begun[step]
+            while len(left) <= alike and left[-1]:
+                offset, enter_us, leave_us = longest[len(left) - 1]
+                windows = held.get(here.index + step * offset)
+                left.append(_without(left[-1], windows, enter_us, leave_us) if windows else left[-1])
+            safe = left[alike] if alike < len(left) else left[-1]
             if safe:
                 yield move, safe
 
@@ -95,22 +101,13 @@ class Departures:
         else:
             count, step = abs(there.index - here.index), 1 if there.index > here.index else -1
             alike = self._roads.alike(here.track, count)
-            for sweep in leg_sweeps(self._roads.site, here.track, count)[alike:]:
-                safe = self._swept(safe, here, step, sweep)
+            held = self._held_on(here.track)
+            for offset, enter_us, leave_us in leg_sweeps(self._roads.site, here.track, count)[alike:]:
+                windows = held.get(here.index + step * offset)
+                if windows:
+                    safe = _without(safe, windows, enter_us, leave_us)
             safe = self._sill(safe, here, there)
         return next(first_ms(safe), None)
-
-    def _begin(self, begun: list[list[Interval]], here: Segment, step: int, alike: tuple[Sweep, ...]) -> list[Interval]:
-        """What these first sweeps leave over; ``begun`` holds that for each lower number of them and grows."""
-        while len(begun) <= len(alike) and begun[-1]:
-            begun.append(self._swept(begun[-1], here, step, alike[len(begun) - 1]))
-        return begun[len(alike)] if len(alike) < len(begun) else []
-
-    def _swept(self, safe: list[Interval], here: Segment, step: int, sweep: Sweep) -> list[Interval]:
-        segment = self._roads.segment(here.track, here.index + step * sweep.offset)
-        if segment is None:
-            return safe
-        return _without(safe, self._held_windows(segment), sweep.enter_us, sweep.leave_us)
 
     def _sill(self, safe: list[Interval], here: Segment, there: Segment) -> list[Interval]:
         """Departures of a run from which the body crosses a lift's sill while the platform is there, at either end."""
@@ -120,6 +117,17 @@ class Departures:
             if self._roads.lift_at(position) is not None:
                 safe = _without(safe, self._held_windows(position), sweep.enter_us, sweep.leave_us)
         return safe
+
+    def _held_on(self, track: int) -> dict[int, list[Interval]]:
+        """What others hold of a track's segments, by index, where they hold any; platforms are left out."""
+        found = self._tracks.get(track)
+        if found is None:
+            found = self._tracks[track] = {}
+            for position in self._roads.positions(track):
+                windows = self._held_windows(position)
+                if windows and self._roads.lift_at(position) is None:
+                    found[position.index] = windows
+        return found
 
     def _free_intervals(self, segment: Segment) -> list[Interval]:
         found = self._free.get(segment)

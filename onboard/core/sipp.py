@@ -183,7 +183,8 @@ class _Search:
         self._tails = _tails(roads, visits)
         self._queue: list[tuple[_Key, _Node, _Untried | None]] = []
         self._pushed = 0
-        self._closed: dict[tuple[int, Segment, Interval], int] = {}
+        #: By phase, segment and begin of the interval: later arrivals than this are of no use.
+        self._useful_us: list[dict[Segment, dict[int, int]]] = [{} for _ in self._targets]
 
     def run(self, root: _Node, max_expansions: int) -> Route | NoRoute:
         """Search from ``root``; see ``plan_route``. The queue holds nodes, and nodes with a move still to be tried."""
@@ -194,7 +195,7 @@ class _Search:
             if untried is not None:
                 self._try(node, untried)
                 continue
-            if self._is_beaten(node):
+            if not self._is_useful(node):
                 continue
             if self._is_goal(node):
                 finish_us = node.visit_ends_us[-1] if node.visit_ends_us else node.time_us
@@ -202,17 +203,17 @@ class _Search:
             if expansions >= max_expansions:
                 return NoRoute("the search's bound of expansions is reached", expansions)
             expansions += 1
-            self._closed[node[:3]] = node.time_us
+            # From now on one has to be earlier; until now it was enough to be as early.
+            self._useful_us[node.phase][node.segment][node.interval.from_us] = node.time_us - 1
             self._expand(node)
         return NoRoute("no order of waits and moves leads to the goal and a refuge", expansions)
 
-    def _is_beaten(self, node: _Node) -> bool:
-        """Whether the state was left before at the same time or earlier.
+    def _is_useful(self, node: _Node) -> bool:
+        """Whether a state was not reached earlier, nor left before at the same time or earlier.
 
         A state can come up again earlier after the last visit only: by a route that ends that visit later.
         """
-        closed_us = self._closed.get(node[:3])
-        return closed_us is not None and closed_us <= node.time_us
+        return node.time_us <= self._useful_us[node.phase].get(node.segment, {}).get(node.interval.from_us, FOREVER)
 
     def _is_goal(self, node: _Node) -> bool:
         return node.phase == len(self.visits) and node.segment in self.refuges and node.interval.to_us >= FOREVER
@@ -222,25 +223,23 @@ class _Search:
         if node.phase < len(self.visits) and self.visits[node.phase].segment == node.segment:
             self._push_dwell(node, self.visits[node.phase])
         within = Interval(node.time_us, node.interval.to_us)
+        all_useful_us = self._useful_us[node.phase]
         moves = self._stops[node.phase].moves(node.segment, node.time_us)
         for move, choice in self.departures.moves(node.segment, moves, within):
             first_us, last_us = choice[0].from_us + move.duration_us, choice[-1].to_us + move.duration_us
+            useful_us = all_useful_us.get(move.destination, {})
             for interval in self.departures.standing(move.destination):
                 if interval.from_us >= last_us:
                     break
-                if interval.to_us > first_us:
-                    self._queue_move(node, _Untried(move, interval, max(first_us, interval.from_us), choice))
+                arrival_us = max(first_us, interval.from_us)
+                if arrival_us < interval.to_us and arrival_us <= useful_us.get(interval.from_us, FOREVER):
+                    self._queue_move(node, _Untried(move, interval, arrival_us, choice))
 
     def _queue_move(self, node: _Node, untried: "_Untried") -> None:
-        move = untried.move
-        if self._is_known(node, untried):
-            return
-        ends = self._ends_us(node, move.destination, untried.arrival_us)
-        if max(ends) >= FOREVER:
-            return
-        self._pushed += 1
-        effort = self._effort(node, move, untried.arrival_us)
-        heappush(self._queue, ((*ends, effort, _UNTRIED, self._pushed), node, untried))
+        ends = self._ends_us(node, untried.move.destination, untried.arrival_us)
+        if max(ends) < FOREVER:
+            self._pushed += 1
+            heappush(self._queue, ((*ends, node.effort, _UNTRIED, self._pushed), node, untried))
 
     def _effort(self, node: _Node, move: Move, arrival_us: int) -> _Effort:
         aboard_us, travel_mm, moves = node.effort
@@ -249,11 +248,6 @@ class _Search:
             if move.lift_track is None:
                 aboard_us -= move.duration_us
         return _Effort(aboard_us, travel_mm + move.distance_mm, moves + 1)
-
-    def _is_known(self, node: _Node, untried: "_Untried") -> bool:
-        """Whether the state to which a move leads was left no later than the move could come to it."""
-        closed_us = self._closed.get((node.phase, untried.move.destination, untried.interval))
-        return closed_us is not None and closed_us <= untried.arrival_us
 
     def _push_dwell(self, node: _Node, visit: Visit) -> None:
         begin_us = max(node.time_us, ceil_ms(visit.not_before_us))
@@ -272,9 +266,10 @@ class _Search:
 
     def _try(self, node: _Node, untried: "_Untried") -> None:
         """Queue the earliest arrival of a move in a safe interval of its destination."""
-        if self._is_known(node, untried):
-            return
         move, interval = untried.move, untried.interval
+        useful_us = self._useful_us[node.phase].get(move.destination, {})
+        if untried.arrival_us > useful_us.get(interval.from_us, FOREVER):
+            return
         depart_us = self.departures.first(node.segment, move, untried.choice, interval)
         if depart_us is None:
             return
@@ -293,11 +288,11 @@ class _Search:
         )
 
     def _push(self, node: _Node) -> None:
-        if self._is_beaten(node):
-            return
-        self._pushed += 1
         ends = self._ends_us(node, node.segment, node.time_us)
-        if max(ends) < FOREVER:
+        if self._is_useful(node) and max(ends) < FOREVER:
+            self._pushed += 1
+            useful_us = self._useful_us[node.phase].setdefault(node.segment, {})
+            useful_us[node.interval.from_us] = min(node.time_us, useful_us.get(node.interval.from_us, FOREVER))
             heappush(self._queue, ((*ends, node.effort, -node.begin_us, self._pushed), node, None))
 
     def _ends_us(self, node: _Node, segment: Segment, time_us: int) -> tuple[int, int]:

@@ -8,7 +8,8 @@ import dataclasses
 from collections.abc import Callable
 from enum import IntEnum
 from functools import cache, lru_cache
-from typing import Any, NamedTuple, get_type_hints
+from operator import attrgetter
+from typing import Any, NamedTuple, cast, get_type_hints
 
 from onboard.core import messages as m
 from onboard.core.codes import Reason
@@ -17,7 +18,6 @@ from onboard.core.messages import Leg, Message, Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts
 
-_TYPE_MASK = 0x1FFFFF00
 _NODE_MASK = 0xFF
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
 _MEMORY = 4096
@@ -45,11 +45,18 @@ class _Field(NamedTuple):
     enum: dict[int, Any] | None
 
 
+#: (shift, mask, sign, scale, offset, minimum, maximum, enum) of one field.
+_Slot = tuple[int, int, int, int, int, int, int, dict[int, Any] | None]
+
+
 class _Layout(NamedTuple):
+    """A message; ``fields`` for people, ``slots`` the same as plain tuples for the two hot loops."""
+
     name: str
     frame_id: int
     length: int
     fields: tuple[_Field, ...]
+    slots: tuple[_Slot, ...]
 
 
 #: Messages that travel as one frame, by DBC name.
@@ -96,6 +103,8 @@ def _compile(layout: MessageLayout) -> _Layout:
     types = _flat_types(cls) if cls is not None else _PART_TYPES[layout.name]
     fields = []
     for signal in layout.signals:
+        if signal.scale == 1 and signal.offset:
+            raise ValueError(f"{layout.name}.{signal.name}: an offset without a scale is not compiled")
         kind = types.get(signal.name, int)
         enum: dict[int, Any] | None = None
         if isinstance(kind, type) and issubclass(kind, IntEnum):
@@ -116,7 +125,25 @@ def _compile(layout: MessageLayout) -> _Layout:
                 enum,
             )
         )
-    return _Layout(layout.name, layout.frame_id, layout.length, tuple(fields))
+    slots = tuple(tuple(field)[1:] for field in fields)
+    return _Layout(layout.name, layout.frame_id, layout.length, tuple(fields), cast("tuple[_Slot, ...]", slots))
+
+
+def _getter(cls: type[Message], layout: _Layout) -> Callable[[Message], tuple[int, ...]]:
+    """A function from a message to its values in the DBC's order, nested tuples flattened."""
+    paths = {}
+    hints = get_type_hints(cls)
+    for field in dataclasses.fields(cls):
+        inners = _NESTED.get(hints[field.name])
+        if inners is None:
+            paths[field.name] = field.name
+        else:
+            paths.update({f"{field.name}_{inner}": f"{field.name}.{inner}" for inner in inners})
+    wanted = [paths[field.name] for field in layout.fields]
+    if len(wanted) == 1:
+        single = attrgetter(wanted[0])
+        return lambda message: (single(message),)
+    return attrgetter(*wanted)
 
 
 def _builder(cls: type[Message], layout: _Layout) -> Callable[[int, tuple[Any, ...]], Message]:
@@ -154,6 +181,11 @@ class Codec:
         self._build = {
             layout.name: _builder(_SINGLE[layout.name], layout) for layout in compiled if layout.name in _SINGLE
         }
+        self._single = {
+            layout.name: (layout, _getter(_SINGLE[layout.name], layout))
+            for layout in compiled
+            if layout.name in _SINGLE
+        }
         self._part = lru_cache(maxsize=_MEMORY)(self._decode)
 
     # --- out ---------------------------------------------------------------------------------------------------
@@ -169,16 +201,8 @@ class Codec:
                 return self._encode_call(message)
             case m.Itinerary():
                 return self._encode_itinerary(message)
-        name = type(message).__name__
-        values: dict[str, int] = {}
-        for field in dataclasses.fields(message):
-            value = getattr(message, field.name)
-            if isinstance(value, tuple):
-                for inner, item in zip(value._fields, value, strict=True):  # type: ignore[attr-defined]  # a NamedTuple
-                    values[f"{field.name}_{inner}"] = item
-            else:
-                values[field.name] = value
-        return (self._pack(name, message.sender, values),)
+        layout, getter = self._single[type(message).__name__]
+        return (self._pack_values(layout, message.sender, getter(message)),)
 
     def _encode_call(self, call: m.CallForProposals) -> tuple[Frame, ...]:
         values: dict[str, int] = {
@@ -226,14 +250,18 @@ class Codec:
 
     def _pack(self, name: str, sender: int, values: dict[str, int]) -> Frame:
         layout = self._by_name[name]
+        return self._pack_values(layout, sender, tuple(values[field.name] for field in layout.fields))
+
+    def _pack_values(self, layout: _Layout, sender: int, values: tuple[int, ...]) -> Frame:
         if not 0 < sender <= _NODE_MASK:
-            raise ValueError(f"{name}: sender {sender} is no node-ID")
+            raise ValueError(f"{layout.name}: sender {sender} is no node-ID")
         word = 0
-        for field in layout.fields:
-            value = values[field.name]
-            if not field.minimum <= value <= field.maximum:
-                raise ValueError(f"{name}.{field.name} = {value}: outside {field.minimum} to {field.maximum}")
-            word |= ((value - field.offset) // field.scale & field.mask) << field.shift
+        for value, (shift, mask, _, scale, offset, minimum, maximum, _) in zip(values, layout.slots, strict=True):
+            if value < minimum or value > maximum:
+                name = next(field.name for field in layout.fields if field.shift == shift)
+                raise ValueError(f"{layout.name}.{name} = {value}: outside {minimum} to {maximum}")
+            raw = value if scale == 1 else (value - offset) // scale
+            word |= (raw & mask) << shift
         return Frame(layout.frame_id | sender, word.to_bytes(layout.length, "little"))
 
     # --- in ----------------------------------------------------------------------------------------------------
@@ -246,11 +274,11 @@ class Codec:
 
     def name_of(self, frame: Frame) -> str | None:
         """The DBC name of a frame's message, or None."""
-        layout = self._by_id.get(frame.arbitration_id & _TYPE_MASK) if frame.is_extended else None
+        layout = self._by_id.get(frame.arbitration_id & ~_NODE_MASK) if frame.is_extended else None
         return layout.name if layout is not None else None
 
     def _decode(self, arbitration_id: int, data: bytes) -> Message | Part | Reason:
-        layout = self._by_id.get(arbitration_id & _TYPE_MASK)
+        layout = self._by_id.get(arbitration_id & ~_NODE_MASK)
         sender = arbitration_id & _NODE_MASK
         if layout is None or sender == 0:
             return Reason.UNKNOWN_IDENTIFIER
@@ -258,15 +286,16 @@ class Codec:
             return Reason.SHORT_FRAME
         word = int.from_bytes(data, "little")
         values = []
-        for field in layout.fields:
-            raw = word >> field.shift & field.mask
-            if raw & field.sign:
-                raw -= field.mask + 1
-            value: Any = raw * field.scale + field.offset
-            if not field.minimum <= value <= field.maximum:
+        for shift, mask, sign, scale, offset, minimum, maximum, enum in layout.slots:
+            value: Any = word >> shift & mask
+            if value & sign:
+                value -= mask + 1
+            if scale != 1:
+                value = value * scale + offset
+            if value < minimum or value > maximum:
                 return Reason.VALUE_OUT_OF_RANGE
-            if field.enum is not None:
-                value = field.enum.get(value)
+            if enum is not None:
+                value = enum.get(value)
                 if value is None:
                     return Reason.VALUE_OUT_OF_RANGE
             values.append(value)

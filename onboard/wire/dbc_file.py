@@ -33,12 +33,18 @@ class SignalLayout:
 
 @dataclass(frozen=True, slots=True)
 class MessageLayout:
-    """One message; ``frame_id`` has 0 in its lowest byte, where the sender's node-ID goes."""
+    """One message; ``frame_id`` has 0 in its lowest byte, where the sender's node-ID goes.
+
+    ``cycle_ms`` is 0 for a message that is sent on events only, ``on_events`` False for one that is sent in its cycle
+    only. ``timeout_ms`` is how long a drive goes on without hearing it, 0 where it is no such message.
+    """
 
     name: str
     frame_id: int
     length: int
     cycle_ms: int
+    on_events: bool
+    timeout_ms: int
     comment: str
     senders: tuple[str, ...]
     receivers: tuple[str, ...]
@@ -48,6 +54,9 @@ class MessageLayout:
 def _signal(signal: DbcSignal) -> SignalLayout:
     if signal.byte_order != "little_endian" or signal.minimum is None or signal.maximum is None:
         raise ValueError(f"signal {signal.name} must be little-endian and have a range")
+    numbers = (signal.scale, signal.offset, signal.minimum, signal.maximum)
+    if any(number != int(number) for number in numbers):
+        raise ValueError(f"signal {signal.name} must have a whole scale, offset and range, not {numbers}")
     choices = tuple(sorted((value, str(name)) for value, name in (signal.choices or {}).items()))
     return SignalLayout(
         signal.name,
@@ -67,11 +76,14 @@ def _signal(signal: DbcSignal) -> SignalLayout:
 def _message(message: DbcMessage) -> MessageLayout:
     signals = tuple(_signal(signal) for signal in sorted(message.signals, key=lambda one: one.start))
     receivers = tuple(dict.fromkeys(node for signal in message.signals for node in signal.receivers))
+    timeout = message.dbc.attributes.get("DriveTimeOutMs") if message.dbc is not None else None
     return MessageLayout(
         message.name,
         message.frame_id,
         message.length,
         message.cycle_time or 0,
+        message.send_type != "Cyclic",
+        int(timeout.value) if timeout is not None else 0,
         message.comment or "",
         tuple(message.senders),
         receivers,
@@ -79,11 +91,23 @@ def _message(message: DbcMessage) -> MessageLayout:
     )
 
 
-def read_layouts(text: str) -> tuple[MessageLayout, ...]:
-    """All messages of a DBC text, in the file's order of identifiers. Raises cantools' errors for a bad text."""
+def _load(text: str) -> Database:
     database = load_string(text, database_format="dbc", strict=True, sort_signals=None)
     assert isinstance(database, Database)
-    return tuple(_message(message) for message in sorted(database.messages, key=lambda one: one.frame_id))
+    return database
+
+
+def read_layouts(text: str) -> tuple[MessageLayout, ...]:
+    """All messages of a DBC text, in the order of their identifiers.
+
+    Raises cantools' errors for a bad text and ``ValueError`` for one that our codec cannot take.
+    """
+    return tuple(_message(message) for message in sorted(_load(text).messages, key=lambda one: one.frame_id))
+
+
+def read_nodes(text: str) -> tuple[tuple[str, str], ...]:
+    """Name and comment of all nodes of a DBC text, in the file's order."""
+    return tuple((node.name, node.comment or "") for node in _load(text).nodes)
 
 
 @cache

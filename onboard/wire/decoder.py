@@ -50,6 +50,8 @@ class Decoder:
 
     def _feed_call(self, part: Part, now_us: int) -> Message | None:
         key = ("call", part.sender, part.values[0])
+        # Another call under this number, from a sender that has lost count: nothing of the older one may complete it.
+        self._drop_other(key, part.name, part.values)
         collected = self._open(key, now_us)
         collected.parts[part.name] = part.values
         if len(collected.parts) < len(_CALL_PARTS):
@@ -77,12 +79,12 @@ class Decoder:
     def _feed_itinerary(self, part: Part, now_us: int) -> Message | None:
         key = ("itinerary", part.sender, part.values[0])
         if part.name == "ItineraryHead":
-            # A head begins its set anew: legs of an older one must not complete it.
-            if self._sets.pop(key, None) is not None:
-                self.drops[Reason.INCOMPLETE_SET] += 1
+            # Another head under this version begins the set anew: legs of the older one must not complete it.
+            self._drop_other(key, -1, part.values)
             collected = self._open(key, now_us)
             collected.parts[-1] = part.values
         else:
+            self._drop_other(key, part.values[2], part.values)
             found = self._sets.get(key)
             if found is None:
                 self.drops[Reason.INCOMPLETE_SET] += 1
@@ -95,6 +97,13 @@ class Decoder:
         del self._sets[key]
         legs = tuple(_leg(collected.parts[number], award_ms) for number in range(count))
         return Itinerary(part.sender, version, grade, Stamp(award_ms, initiator, call), legs)
+
+    def _drop_other(self, key: tuple[str, int, int], name: str | int, values: tuple[Any, ...]) -> None:
+        """Drop a set that holds this part with another content. A part that comes twice as it was is inert."""
+        collected = self._sets.get(key)
+        if collected is not None and collected.parts.get(name, values) != values:
+            del self._sets[key]
+            self.drops[Reason.INCOMPLETE_SET] += 1
 
     def _open(self, key: tuple[str, int, int], now_us: int) -> _Set:
         collected = self._sets.get(key)

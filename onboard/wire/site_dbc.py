@@ -4,17 +4,17 @@ Masked decoding makes cantools' monitor and plot merge all machines into one lin
 does not. Text is templated, as cantools' own writer reorders signals and drops attributes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from onboard.core.codes import KindCode
 from onboard.core.site import Machine, Site
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
 
-#: Senders of the fleet contract and of the device contract that each kind of machine stands for.
-_ROLES: dict[KindCode, frozenset[str]] = {
-    KindCode.ROBOT: frozenset({"Robot", "Controller", "Drive", "Shuttle"}),
-    KindCode.LIFT: frozenset({"Lift", "Controller", "Drive", "Platform"}),
-    KindCode.COMPARTMENT: frozenset({"Compartment", "Controller", "Doors", "Desk", "Bay"}),
+#: The node of the fleet contract that each kind of machine is.
+_ROLES: dict[KindCode, str] = {
+    KindCode.ROBOT: "Robot",
+    KindCode.LIFT: "Lift",
+    KindCode.COMPARTMENT: "Compartment",
 }
 #: Device messages by the roles of both ends: a robot's controller sends nothing to doors.
 _ENDS: dict[KindCode, frozenset[str]] = {
@@ -23,16 +23,19 @@ _ENDS: dict[KindCode, frozenset[str]] = {
     KindCode.COMPARTMENT: frozenset({"Controller", "Doors", "Desk", "Bay"}),
 }
 _EXTENDED = 1 << 31
+#: What a DBC writes for nobody.
+_NO_NODE = "Vector__XXX"
 
 
-def _sent_by(machine: Machine) -> Iterable[MessageLayout]:
-    """What a machine, or its devices, say."""
+def _sent_by(machine: Machine, machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
+    """What a machine, or its devices, say, and the names of those who listen."""
     for layout in fleet_layouts():
-        if _ROLES[machine.kind] & set(layout.senders):
-            yield layout
+        if _ROLES[machine.kind] in layout.senders:
+            others = [one.name for one in machines if one != machine and _ROLES[one.kind] in layout.receivers]
+            yield layout, ",".join(others) or _NO_NODE
     for layout in device_layouts():
         if set(layout.senders) | set(layout.receivers) <= _ENDS[machine.kind]:
-            yield layout
+            yield layout, machine.name
 
 
 def _signal(signal: SignalLayout, receivers: str) -> str:
@@ -53,11 +56,10 @@ def site_dbc(site: Site) -> str:
     attributes: list[str] = []
     values: list[str] = []
     for machine in machines:
-        others = ",".join(name for name in names if name != machine.name) or "Vector__XXX"
-        for layout in _sent_by(machine):
+        for layout, receivers in _sent_by(machine, machines):
             number = _EXTENDED | layout.frame_id | machine.node_id
             lines.append(f"BO_ {number} {machine.name}_{layout.name}: {layout.length} {machine.name}")
-            lines += [_signal(signal, others) for signal in layout.signals] + [""]
+            lines += [_signal(signal, receivers) for signal in layout.signals] + [""]
             comments.append(f'CM_ BO_ {number} "{layout.comment}";')
             comments += [f'CM_ SG_ {number} {signal.name} "{signal.comment}";' for signal in layout.signals]
             if layout.cycle_ms:

@@ -7,12 +7,19 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from bus_sim.cli import main as bus_sim
 from onboard.cli import main as onboard
+from onboard.core.codes import MachineState
+from onboard.core.frame import Frame
+from onboard.core.messages import Award, Bid, Heartbeat, Message, Progress, TokenGrant
+from onboard.io.open_bus import BusSettings, open_bus
+from onboard.wire.codec import fleet_codec
+from onboard.wire.decoder import Decoder
 
 DEADLINE_S = 60
 
@@ -114,43 +121,74 @@ async def _first_line(stream: asyncio.StreamReader, wanted: str) -> str:
             return line
 
 
-async def test_the_robot_joins_from_a_process_of_its_own(tmp_path: Path) -> None:
-    """P58: the controller that ran inside the simulation runs unchanged in its own process over the served buses."""
+class Listener:
+    """A node of the served fleet bus that waits for what the robot says."""
+
+    def __init__(self) -> None:
+        self.heard: list[Message] = []
+        self._decoder = Decoder(fleet_codec())
+        self._news = asyncio.Event()
+
+    def on_frame(self, frame: Frame, time_us: int) -> None:
+        message = self._decoder.feed(frame, time_us)
+        if message is not None:
+            self.heard.append(message)
+            self._news.set()
+
+    async def until(self, fits: Callable[[Message], bool]) -> Message:
+        while True:
+            for message in self.heard:
+                if fits(message):
+                    return message
+            self._news.clear()
+            await self._news.wait()
+
+
+async def test_p58_the_robot_joins_from_a_process_of_its_own(tmp_path: Path) -> None:
+    """The controller that ran inside the simulation runs unchanged in its own process, at the pace of the clock."""
     root = Path(__file__).parents[2]
-    site = (root / "bus_sim" / "sites" / "level1.toml").read_text()
-    (tmp_path / "level1.toml").write_text(site)
+    (tmp_path / "level1.toml").write_text((root / "bus_sim" / "sites" / "level1.toml").read_text())
     environment = {**os.environ, "PYTHONPATH": str(root), "COLUMNS": "200"}
-    words = ["run", "level1.toml", "--serve", "127.0.0.1:0", "--without", "MR1", "--one-car", "20", "--speed", "20"]
+    words = ["run", "level1.toml", "--serve", "127.0.0.1:0", "--without", "MR1", "--one-car", "20", "--seed", "4"]
     simulator = await asyncio.create_subprocess_exec(
-        sys.executable, "-u", "-m", "bus_sim.cli", *words, "--trace", "trace.log", "--json", "figures.json",
-        cwd=tmp_path, env=environment, stdout=asyncio.subprocess.PIPE,
+        sys.executable, "-u", "-m", "bus_sim.cli", *words, cwd=tmp_path, env=environment,
+        stdout=asyncio.subprocess.PIPE,
     )  # fmt: skip
     assert simulator.stdout is not None
     async with asyncio.timeout(DEADLINE_S):
         serving = await _first_line(simulator.stdout, "serving at")
     port = re.search(r"127\.0\.0\.1:(\d+)", serving)
     assert port is not None
-    bus = f'interface = "socketcand-asyncio"\nhost = "127.0.0.1"\nport = {port[1]}\n'
+    interface = f'interface = "socketcand-asyncio"\nhost = "127.0.0.1"\nport = {port[1]}\n'
     (tmp_path / "mr1.toml").write_text(
-        f'[machine]\nname = "MR1"\nsite = "level1.toml"\n[fleet_bus]\nchannel = "fleet"\n{bus}[device_bus]\n'
-        f'channel = "MR1"\n{bus}'
+        f'[machine]\nname = "MR1"\nsite = "level1.toml"\n[fleet_bus]\nchannel = "fleet"\n{interface}[device_bus]\n'
+        f'channel = "MR1"\n{interface}'
     )
     robot = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "onboard", "--machine", "mr1.toml", cwd=tmp_path, env=environment,
         stderr=asyncio.subprocess.PIPE,
     )  # fmt: skip
+    listener = Listener()
+    bus = await open_bus(
+        BusSettings("socketcand-asyncio", "fleet", extra=(("host", "127.0.0.1"), ("port", int(port[1]))))
+    )
+    bus.subscribe(listener.on_frame)
     try:
         async with asyncio.timeout(DEADLINE_S):
-            await simulator.stdout.read()
-            assert await simulator.wait() == 0
+            await listener.until(lambda m: isinstance(m, Heartbeat) and m.sender == 11 and m.state is MachineState.IDLE)
+            bid = await listener.until(lambda m: isinstance(m, Bid) and m.sender == 11)
+            award = await listener.until(lambda m: isinstance(m, Award) and m.winner == 11)
+            granted = await listener.until(lambda m: isinstance(m, TokenGrant) and m.holder == 11)
+            moving = await listener.until(lambda m: isinstance(m, Progress) and m.sender == 11 and m.speed_mm_s > 0)
     finally:
-        if simulator.returncode is None:
-            simulator.kill()
-        robot.send_signal(signal.SIGTERM)
+        await bus.close()
+        for process in (robot, simulator):
+            process.send_signal(signal.SIGTERM)
         async with asyncio.timeout(DEADLINE_S):
             _, errors = await robot.communicate()
-    figures = json.loads((tmp_path / "figures.json").read_text())
-    assert (figures["cars_in"], figures["cars_out"], figures["unserved"]) == (1, 1, 0)
+            await simulator.communicate()
+    order = [listener.heard.index(message) for message in (bid, award, granted, moving)]
+    assert order == sorted(order), "no motion before the award and a token"
     assert robot.returncode == 0, errors.decode()
     assert b"program:" in errors
     assert (tmp_path / "journal-MR1").exists()

@@ -88,7 +88,7 @@ def test_p10_p47_a_bid_comes_with_a_tentative_itinerary_and_the_award_makes_it_f
     firm_us, firm = scene.first(Itinerary, lambda m: m.grade is Grade.FIRM and len(m.legs) > 1)
     assert bid_us < tentative_us < award_us < firm_us
     assert bid.itinerary_version == tentative.version
-    assert (firm.stamp.initiator, firm.stamp.call) == (call.sender, call.call)
+    assert (firm.stamp.initiator, firm.stamp.call) == (call.sender, call.call & 0xFF)
     works = [(leg.track, leg.to_index, leg.side) for leg in firm.legs if leg.action is LegAction.WORK]
     assert works == [(leg.track, leg.to_index, leg.side) for leg in tentative.legs if leg.action is LegAction.WORK]
     assert len(works) == 2

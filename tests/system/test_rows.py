@@ -7,13 +7,14 @@ import pytest
 
 from bus_sim.demand import Demand, Stay
 from bus_sim.run import Simulation
-from onboard.core.authority import TokenKey
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     ANY_STATION,
     CallResult,
     Criterion,
     DeskText,
+    DriveMode,
     Grade,
     KindCode,
     LegAction,
@@ -30,6 +31,7 @@ from onboard.core.messages import (
     BusTime,
     CallForProposals,
     DeskOrder,
+    DriveState,
     Heartbeat,
     Itinerary,
     Message,
@@ -42,6 +44,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site, Station
+from onboard.kinds.car_park.compartment import Compartment, CompartmentFactory
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.program import Handling, Program, Step, Work
 from onboard.wire.codec import fleet_codec
@@ -214,6 +217,76 @@ def test_a_full_park_is_told_at_the_desk_and_a_large_car_turned_away() -> None:
     assert (summary.parked, summary.refused_full, summary.refused_too_large) == (9, 1, 1)
 
 
+def test_p20_p49_a_compartment_is_a_participant_too_asked_twice() -> None:
+    """A gateway asks which bay could give a car out soonest; the bay bids, is awarded, and has the car fetched."""
+
+    def gateway(simulation: Simulation) -> None:
+        bus = simulation.fleet.attach("gateway", 251)
+
+        def say(message: Message) -> None:
+            for frame in fleet_codec().encode(message):
+                bus.send(frame)
+
+        def call() -> None:
+            (parked,) = simulation.view.cars
+            deadline_ms = simulation.loop.now_us() // 1000 + 1_000
+            task = Reference(251, 1)
+            say(
+                CallForProposals(
+                    251, 1, task, Operation.RECEIVE, KindCode.COMPARTMENT, Criterion.FINISH_TIME, 1, 0, deadline_ms,
+                    ANY_STATION, ANY_STATION, parked, 2700,
+                )
+            )  # fmt: skip
+            simulation.loop.call_later(1.01, say, Award(251, 1, 1, task, 1, CallResult.AWARDED, Reason.NONE))
+
+        simulation.loop.call_at(200.0, call)
+
+    scene = play(one_floor(), stays((0, None)), before=gateway, extra_s=400)
+    scene.assert_sound()
+    bid_us, bid = scene.first(Bid, lambda m: m.initiator == 251)
+    assert (bid.sender, bid.cost) == (1, 204_000), "deadline and one door"
+    accepted_us, _ = scene.first(TaskReport, lambda m: m.task == Reference(251, 1))
+    fetch_us, fetch = scene.first(CallForProposals, lambda m: m.operation is Operation.RETRIEVE)
+    assert bid_us < accepted_us < fetch_us
+    assert scene.first(DeskOrder, lambda order: order.text is DeskText.CAR_READY)[1].car == fetch.car
+    assert any("lock the input door; call for a robot" in text for _, _, text in scene.simulation.log.lines)
+
+
+@pytest.mark.parametrize("under_way_s", [0.3, 1.5, 3.0, 5.0, 8.0])
+def test_a_drive_without_fresh_orders_stops_inside_its_machines_authority(under_way_s: float) -> None:
+    """The controller dies while the robot moves: the drive brakes by itself, on segments whose tokens it holds."""
+    site = one_floor()
+    moving_us, _ = play(site, stays((0, None))).first(DriveState, lambda m: m.mode is DriveMode.MOVING)
+    killed_s = moving_us / 1e6 + under_way_s
+
+    def kill(simulation: Simulation) -> None:
+        def pull_the_plug() -> None:
+            node = next(n for n in simulation.devices[11]._nodes if n.name == "MR1")
+            node.power_off()
+
+        simulation.loop.call_at(killed_s, pull_the_plug)
+
+    scene = play(site, stays((0, None)), before=kill, limit_s=60)
+    body = scene.simulation.plant.world.robots[11]
+    position_mm, speed_mm_s = body.motion.at(scene.simulation.loop.now_us())
+    assert speed_mm_s == 0
+    home_mm = site.position_mm(site.machines[11].home)
+    tokens = scene.simulation.controllers[11].holon.tokens
+    half_mm, pitch_mm = site.carrier_length_mm / 2, site.tracks[1].pitch_mm
+    reached = {round((position_mm + side * half_mm) / pitch_mm) + 1 for side in (-1, 1)}
+    assert position_mm < home_mm, "it was on its way"
+    assert all(tokens.holds(segment_token(Segment(1, index))) for index in reached)
+    assert scene.simulation.plant.oracle.finish() == []
+
+
+def test_a_restarted_compartment_never_names_two_cars_alike() -> None:
+    site = one_floor()
+    entries: list[dict[str, str | int]] = [{"record": "boot", "boot": 3}, {"record": "number", "number": 7}]
+    behaviour = Holon(site, site.machines[1], CompartmentFactory(), entries=entries).behaviour
+    assert isinstance(behaviour, Compartment)
+    assert behaviour._number == 7
+
+
 # --- row P22: a machine kind that the project does not know, with no line of protocol code ---------------------------
 
 
@@ -283,7 +356,8 @@ class CranePrice:
 
 def test_p22_a_new_kind_of_machine_bids_and_wins_without_protocol_code() -> None:
     machines = {node: Machine(node, f"CR{node}", KindCode.LIFT, Segment(1, 1)) for node in (21, 22)}
-    holons = {node: Holon(SITE, machines[node], CraneFactory(price)) for node, price in ((21, 900), (22, 400))}
+    site = dataclasses.replace(SITE, machines={**SITE.machines, **machines})
+    holons = {node: Holon(site, machines[node], CraneFactory(price)) for node, price in ((21, 900), (22, 400))}
     call = dataclasses.replace(a_call(1_500_000), kind=KindCode.LIFT, criterion=Criterion.MONEY)
     said: list[Message] = []
 

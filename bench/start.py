@@ -1,0 +1,163 @@
+"""How soon a machine is on the bus: start of ``onboard`` to its first heartbeat, and the memory taken until then.
+
+    python bench/start.py [--runs N]
+
+Each run is a new process with an empty journal; the bus is served over loopback in the socketcand protocol by this one.
+Wall time counts from just before the process is made to the arrival of the heartbeat; memory is the process's highest
+resident set by then (``VmHWM`` of proc(5), so Linux only). One run that is not counted fills the caches. For comparison
+the table begins with an interpreter that does nothing but say that it runs, alone and with each library imported.
+"""
+
+import argparse
+import asyncio
+import os
+import re
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+from bus_sim.serve.socketcand import SocketcandServer
+from onboard.core.frame import Frame
+from onboard.ports.bus import BusHealth, FrameHandler
+from onboard.wire.codec import fleet_codec
+
+ROOT = Path(__file__).parents[1]
+AIM_S, AIM_MB = 0.5, 40.0
+DEADLINE_S = 60.0
+MACHINE = """\
+[machine]
+name = "MR1"
+site = "{site}"
+[fleet_bus]
+interface = "{interface}"
+channel = "fleet"
+host = "127.0.0.1"
+port = {port}
+[device_bus]
+interface = "{interface}"
+channel = "MR1"
+host = "127.0.0.1"
+port = {port}
+"""
+
+
+class Start(NamedTuple):
+    """One start: wall seconds, and MB (2**20 bytes) of the highest resident set."""
+
+    wall_s: float
+    peak_mb: float
+
+
+class Ear:
+    """The served bus: nobody else is on it, and the first heartbeat said on it ends the wait."""
+
+    name = "ear"
+
+    def __init__(self) -> None:
+        self.heard: asyncio.Future[float] = asyncio.get_running_loop().create_future()
+
+    def subscribe(self, on_frame: FrameHandler, on_sent: FrameHandler | None = None) -> None:
+        """Nothing is ever said to the client."""
+
+    def send(self, frame: Frame) -> bool:
+        """A client says something."""
+        if fleet_codec().name_of(frame) == "Heartbeat" and not self.heard.done():
+            self.heard.set_result(time.perf_counter())
+        return True
+
+    def health(self) -> BusHealth:
+        """Always well."""
+        return BusHealth()
+
+    async def close(self) -> None:
+        """A client leaves."""
+
+
+async def start_onboard(interface: str) -> Start:
+    """Start one controller and wait for its first heartbeat."""
+    ear = Ear()
+    server = SocketcandServer(lambda _channel, _name: ear, lambda time_us: time_us, port=0)
+    port = await server.start()
+    with tempfile.TemporaryDirectory() as folder:
+        site = ROOT / "bus_sim" / "sites" / "level1.toml"
+        machine = Path(folder) / "mr1.toml"
+        machine.write_text(MACHINE.format(site=site, interface=interface, port=port), encoding="utf-8")
+        begun_s = time.perf_counter()
+        process = await _python("-m", "onboard", "--machine", str(machine))
+        try:
+            async with asyncio.timeout(DEADLINE_S):
+                heard_s = await ear.heard
+            peak_mb = _peak_mb(process.pid)
+        finally:
+            if process.returncode is None:
+                process.terminate()
+            await process.communicate()
+            await server.close()
+    return Start(heard_s - begun_s, peak_mb)
+
+
+async def start_script(script: str) -> Start:
+    """Start an interpreter that runs ``script`` and then waits for its input to end."""
+    begun_s = time.perf_counter()
+    process = await _python("-c", f"{script}\nimport sys\nprint('here', flush=True)\nsys.stdin.read()")
+    assert process.stdout is not None
+    await process.stdout.readline()
+    heard_s = time.perf_counter()
+    peak_mb = _peak_mb(process.pid)
+    await process.communicate(b"\n")
+    return Start(heard_s - begun_s, peak_mb)
+
+
+async def _python(*words: str) -> asyncio.subprocess.Process:
+    pipe = asyncio.subprocess.PIPE
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return await asyncio.create_subprocess_exec(
+        sys.executable, *words, env=environment, stdin=pipe, stdout=pipe, stderr=asyncio.subprocess.DEVNULL
+    )
+
+
+def _peak_mb(pid: int) -> float:
+    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
+    match = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.MULTILINE)
+    if match is None:
+        raise RuntimeError(f"process {pid} has ended before it was measured")
+    return int(match[1]) / 1024
+
+
+async def measure(runs: int) -> None:
+    """Print the table."""
+    print(f"median of {runs} runs, worst in brackets; aims {AIM_S} s and {AIM_MB:.0f} MB")
+    print("| process | wall s | peak MB |")
+    print("|---|---|---|")
+    scripts = {
+        "an interpreter that does nothing": "",
+        "with asyncio imported": "import asyncio",
+        "with python-can imported": "import can",
+        "with cantools imported": "import cantools",
+    }
+    for name, script in scripts.items():
+        print(_row(name, [await start_script(script) for _ in range(runs + 1)]), flush=True)
+    for interface in ("socketcand-asyncio", "socketcand"):
+        print(_row(f"onboard on {interface}", [await start_onboard(interface) for _ in range(runs + 1)]), flush=True)
+
+
+def _row(name: str, starts: list[Start]) -> str:
+    wall_s, peak_mb = zip(*starts[1:], strict=True)
+    return (
+        f"| {name} | {statistics.median(wall_s):.3f} ({max(wall_s):.3f}) "
+        f"| {statistics.median(peak_mb):.1f} ({max(peak_mb):.1f}) |"
+    )
+
+
+def main() -> None:
+    """Read the options and measure."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--runs", type=int, default=7, help="starts for each row (default %(default)s)")
+    asyncio.run(measure(parser.parse_args().runs))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,134 @@
+"""docs/network.md from the DBC files: ``python -m onboard.wire.network_doc [FILE]``."""
+
+import sys
+from collections.abc import Iterable
+from enum import IntEnum
+from pathlib import Path
+
+from dbc import device_dbc_text, fleet_dbc_text
+from onboard.core import codes
+from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts, read_nodes
+
+_HEAD = """\
+# The network
+
+Generated from `dbc/fleet.dbc` and `dbc/device.dbc` by `make docs`; the DBC files are the contract, this page only shows
+them.
+
+The machines of a site share one **fleet bus**, at the bit rate that the site file names. Each machine speaks with its
+own drives, doors and sensors on a **device bus**. No identifier is in both contracts, so that a machine with one
+interface may have both on one wire.
+
+All of it is classic CAN 2.0B: data frames with 29-bit identifiers and 8 data bytes. Bit 0 of a signal is its least
+significant; bits count from the first byte's lowest bit (Intel, little-endian); bits without a signal are sent as 0 and
+not looked at. An identifier is
+
+| bits 28..24 | bits 23..16 | bits 15..8 | bits 7..0 |
+|---|---|---|---|
+| priority, 0 highest | message type | zero | node-ID of the sending machine, 1 to 255 |
+
+so two nodes never send one identifier with different data. Below, `nn` is the node-ID. On a device bus it is the
+machine's in both directions. `bus-sim dbc SITE` prints a DBC with one message for each machine, for tools that use no
+mask.
+
+A frame that is shorter, has another identifier, or holds a value out of its range is dropped and counted. Cycle times
+are the ones of a site file that does not set its own.
+"""
+
+
+def _identifier(layout: MessageLayout) -> str:
+    return f"`{layout.frame_id >> 8:06X}nn`"
+
+
+def _cell(text: str) -> str:
+    """Text that stays in its cell: a pipe would end it."""
+    return text.replace("|", r"\|")
+
+
+def _link(name: str) -> str:
+    return f"[{name}](#{name.lower()})"
+
+
+def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
+    """Name of each value table: that of the enumeration in ``core/codes.py`` with the same content."""
+    enums = [kind for kind in vars(codes).values() if isinstance(kind, type) and issubclass(kind, IntEnum)]
+    named = {tuple((int(code), code.name) for code in kind): kind.__name__ for kind in enums if kind is not IntEnum}
+    return {**named, ((0, "NO"), (1, "YES")): "Answer"}
+
+
+def _values(signal: SignalLayout) -> str:
+    if signal.choices:
+        return _link(_value_tables()[signal.choices])
+    scale = "" if (signal.scale, signal.offset) == (1, 0) else f"; raw x {signal.scale} + {signal.offset}"
+    return f"{signal.minimum} to {signal.maximum}{f' {signal.unit}' if signal.unit else ''}{scale}"
+
+
+def _when(layout: MessageLayout) -> str:
+    if not layout.cycle_ms:
+        return "on events"
+    return f"{layout.cycle_ms} ms{' and on events' if layout.on_events else ''}"
+
+
+def _ends(nodes: Iterable[str], everybody: tuple[str, ...]) -> str:
+    found = tuple(nodes)
+    return "all" if set(found) == set(everybody) else ", ".join(found)
+
+
+def _bus(title: str, text: str, layouts: tuple[MessageLayout, ...]) -> list[str]:
+    nodes = read_nodes(text)
+    names = tuple(name for name, _ in nodes)
+    lines = [f"## {title}", "", "| node | what it is |", "|---|---|"]
+    lines += [f"| {name} | {_cell(comment)} |" for name, comment in nodes]
+    lines += ["", "| message | identifier | priority | from | to | sent |", "|---|---|---|---|---|---|"]
+    for layout in layouts:
+        ends = f"{_ends(layout.senders, names)} | {_ends(layout.receivers, names)}"
+        lines.append(
+            f"| {_link(layout.name)} | {_identifier(layout)} | {layout.frame_id >> 24} | {ends} | {_when(layout)} |"
+        )
+    for layout in layouts:
+        lines += _message(layout)
+    return [*lines, ""]
+
+
+def _message(layout: MessageLayout) -> list[str]:
+    lines = ["", f"### {layout.name}", "", layout.comment, ""]
+    if layout.timeout_ms:
+        lines += [f"Time-out of the drive: {layout.timeout_ms} ms.", ""]
+    lines += ["| signal | bits | values | meaning |", "|---|---|---|---|"]
+    for signal in layout.signals:
+        bits = f"{signal.shift} to {signal.shift + signal.bits - 1}" if signal.bits > 1 else f"{signal.shift}"
+        sign = ", signed" if signal.signed else ""
+        lines.append(f"| `{signal.name}` | {bits}{sign} | {_values(signal)} | {_cell(signal.comment)} |")
+    return lines
+
+
+def _tables(layouts: Iterable[MessageLayout]) -> list[str]:
+    """Every value table that is used, once, in the order of its first use."""
+    names = _value_tables()
+    used = dict.fromkeys(signal.choices for layout in layouts for signal in layout.signals if signal.choices)
+    lines = ["## Value tables"]
+    for choices in used:
+        lines += ["", f"### {names[choices]}", "", "| value | name |", "|---|---|"]
+        lines += [f"| {value} | {name} |" for value, name in choices]
+    return lines
+
+
+def network_page() -> str:
+    """The whole page as Markdown."""
+    lines = [
+        _HEAD,
+        *_bus("Fleet bus", fleet_dbc_text(), fleet_layouts()),
+        *_bus("Device bus", device_dbc_text(), device_layouts()),
+        *_tables((*fleet_layouts(), *device_layouts())),
+    ]
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def main() -> None:
+    """Write the page to the file named, or to docs/network.md."""
+    target = Path(sys.argv[1] if len(sys.argv) > 1 else "docs/network.md")
+    target.write_text(network_page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

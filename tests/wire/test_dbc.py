@@ -1,0 +1,169 @@
+"""The DBC files are complete: another team could build a machine from them alone."""
+
+import re
+from enum import IntEnum
+from pathlib import Path
+from typing import Any, get_type_hints
+
+import pytest
+from cantools.database.can import Message
+
+from dbc import device_dbc_text, fleet_dbc_text
+from onboard.core import codes, messages
+from onboard.wire import network_doc
+from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts, read_layouts
+from onboard.wire.network_doc import network_page
+from onboard.wire.site_dbc import site_dbc
+from tests.sites import one_floor
+from tests.wire.samples import judge_of, layouts
+
+TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text()}
+#: One message of each class of priority, in the order of the design.
+ORDER = [
+    "EmergencyStop", "TokenGrant", "BusTime", "Call", "Award", "Bid", "ItineraryHead", "Progress", "Heartbeat",
+    "DriveOrder", "DriveState", "Diagnostic",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", list(TEXTS))
+def test_every_signal_has_range_comment_receivers_and_every_message_senders(name: str) -> None:
+    database = judge_of(TEXTS[name])
+    for message in database.messages:
+        assert isinstance(message, Message)
+        assert message.is_extended_frame and message.length == 8 and message.comment and message.senders
+        for signal in message.signals:
+            where = f"{message.name}.{signal.name}"
+            assert signal.comment and signal.receivers, where
+            assert signal.minimum is not None and signal.maximum is not None, where
+            assert signal.byte_order == "little_endian", where
+            assert (signal.unit or "") == _unit_in(signal.name), where
+
+
+def _unit_in(name: str) -> str:
+    """Units come last in a name."""
+    endings = {"_mm_s": "mm/s", "_us": "us", "_ms": "ms", "_mm": "mm", "_kg": "kg"}
+    return next((unit for ending, unit in endings.items() if name.endswith(ending)), "")
+
+
+def test_identifiers_hold_priority_type_and_a_free_lowest_byte() -> None:
+    found = layouts()
+    assert all(layout.frame_id & 0xFFFF == 0 for layout in found)
+    types = [layout.frame_id >> 16 & 0xFF for layout in found]
+    assert len(set(types)) == len(types), "fleet and device bus may share one wire"
+    ids = {layout.name: layout.frame_id for layout in found}
+    assert [ids[name] for name in ORDER] == sorted(ids[name] for name in ORDER)
+
+
+def _kinds(layout: MessageLayout) -> dict[str, Any]:
+    """Type of each field that the signals of a message stand for."""
+    composed = {"Call": messages.CallForProposals, "Itinerary": messages.Itinerary}
+    if layout.name == "ItineraryLeg":
+        return get_type_hints(messages.Leg)
+    stem = next((one for one in composed if layout.name.startswith(one)), None)
+    return get_type_hints(composed[stem] if stem else getattr(messages, layout.name))
+
+
+def test_value_tables_are_the_codes_and_only_they_have_value_tables() -> None:
+    seen = set()
+    for layout in layouts():
+        kinds = _kinds(layout)
+        for signal in layout.signals:
+            kind, where = kinds.get(signal.name, int), f"{layout.name}.{signal.name}"
+            if kind is bool:
+                assert signal.choices == ((0, "NO"), (1, "YES")), where
+            elif isinstance(kind, type) and issubclass(kind, IntEnum):
+                seen.add(kind)
+                assert signal.choices == tuple((int(code), code.name) for code in kind), where
+            else:
+                assert not signal.choices, where
+                continue
+            assert (signal.minimum, signal.maximum) == (signal.choices[0][0], signal.choices[-1][0]), where
+    every = {kind for kind in vars(codes).values() if isinstance(kind, type) and issubclass(kind, IntEnum)}
+    assert seen == every - {IntEnum}
+
+
+def test_ranges_fit_into_the_bits() -> None:
+    for layout in layouts():
+        for signal in layout.signals:
+            for end in (signal.minimum, signal.maximum):
+                raw, rest = divmod(end - signal.offset, signal.scale)
+                low = -(1 << signal.bits - 1) if signal.signed else 0
+                assert rest == 0 and low <= raw < low + (1 << signal.bits), f"{layout.name}.{signal.name}"
+
+
+def test_periods_and_version_are_those_of_a_site_that_sets_none() -> None:
+    timing = one_floor().timing
+    cycles = {layout.name: layout.cycle_ms * 1000 for layout in layouts() if not layout.on_events}
+    assert cycles == {"Heartbeat": timing.heartbeat_us, "BusTime": timing.bus_time_us}
+    (order,) = (layout for layout in layouts() if layout.timeout_ms)
+    assert (order.name, order.cycle_ms * 1000) == ("DriveOrder", timing.drive_refresh_us)
+    assert order.timeout_ms > 2 * order.cycle_ms, "one lost order stops no drive"
+    for text in TEXTS.values():
+        assert f'BA_ "ContractVersion" {codes.CONTRACT_VERSION};' in text
+
+
+def test_every_message_class_travels_and_nothing_else() -> None:
+    classes = {
+        name for name, kind in vars(messages).items() if isinstance(kind, type) and issubclass(kind, messages.Message)
+    }
+    parts = {"Call", "CallTerms", "CallLoad", "ItineraryHead", "ItineraryLeg"}
+    expected = (classes - {"Message", "CallForProposals", "Itinerary"}) | parts
+    assert {layout.name for layout in (*fleet_layouts(), *device_layouts())} == expected
+
+
+def test_the_sites_dbc_has_one_message_for_each_machine() -> None:
+    database = judge_of(site_dbc(one_floor(robots=2)))
+    bids = {message.name: message.frame_id for message in database.messages if message.name.endswith("_Bid")}
+    assert bids == {"IOC1_Bid": 0x09390001, "MR1_Bid": 0x0939000B, "MR2_Bid": 0x0939000C}
+    names = {message.name for message in database.messages}
+    assert {"MR1_DriveState", "IOC1_DoorState"} <= names
+    assert not {"MR1_DoorState", "IOC1_DriveState", "IOC1_Progress", "MR1_BusTime"} & names
+
+
+def test_the_sites_dbc_keeps_signals_comments_tables_and_cycles() -> None:
+    ours = {layout.name: layout for layout in layouts()}
+    for found in read_layouts(site_dbc(one_floor(robots=2))):
+        name, _, kind = found.name.partition("_")
+        original = ours[kind]
+        node_id = one_floor(robots=2).machine(name).node_id
+        assert found.senders == (name,)
+        assert found.frame_id == original.frame_id | node_id
+        assert (found.comment, found.cycle_ms, found.signals) == (original.comment, original.cycle_ms, original.signals)
+
+
+def test_the_sites_dbc_names_those_who_listen() -> None:
+    found = {layout.name: layout.receivers for layout in read_layouts(site_dbc(one_floor(robots=2)))}
+    assert found["MR1_Bid"] == ("IOC1", "MR2")
+    assert found["MR1_DriveOrder"] == found["MR1_DriveState"] == ("MR1",)
+    assert found["MR1_Diagnostic"] == ()
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ('SG_ n : 0|8@0+ (1,0) [0|1] "" R', "n must be little-endian"),
+        ('SG_ n : 0|8@1+ (0.5,0) [0|1] "" R', "n must have a whole scale, offset and range"),
+        ('SG_ n : 0|8@1+ (1,0) [0|0] "" R', "n must be little-endian and have a range"),
+    ],
+)
+def test_a_signal_that_our_codec_cannot_take_is_refused(line: str, told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        read_layouts(f'VERSION ""\nBU_: R\nBO_ 2147549184 M: 8 R\n {line}\n')
+
+
+def test_the_network_page_is_a_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["network_doc", str(tmp_path / "network.md")])
+    network_doc.main()
+    page = (tmp_path / "network.md").read_text(encoding="utf-8")
+    titles = re.findall(r"^#{1,3} (.+)$", page, re.MULTILINE)
+    assert len(titles) == len(set(titles))
+    assert set(re.findall(r"\(#(\w+)\)", page)) <= {title.lower() for title in titles}
+    assert {layout.name for layout in layouts()} <= set(titles)
+    for table in re.findall(r"(?:^\|.*\n)+", page, re.MULTILINE):
+        columns = {len(re.findall(r"(?<!\\)\|", row)) for row in table.splitlines()}
+        assert len(columns) == 1, f"a pipe breaks a cell: {table}"
+
+
+def test_the_network_page_is_current() -> None:
+    page = Path(__file__).parents[2] / "docs" / "network.md"
+    assert page.read_text(encoding="utf-8") == network_page(), "run: make docs"
