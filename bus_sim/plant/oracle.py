@@ -99,6 +99,7 @@ class Oracle:
     def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
         if change is Change.CARRIER:
             self._sills = {lift: self.world.overhang(lift) for lift in self.world.platforms}
+            self._judge_departure(node_id, now_us)
             self._judge_track(node_id, now_us)
             self._judge_pairs(now_us, node_id)
             robot = self.world.robots[node_id]
@@ -203,19 +204,27 @@ class Oracle:
         low, high = span.motion.extremes_mm(span.from_us, now_us)
         if span.track not in self._alleys:
             return
-        margin = track.pitch_mm / 2
-        bottom, top = -margin, (track.length - 1) * track.pitch_mm + margin
-        for side in ([low] if low < bottom else []) + ([high] if high > top else []):
-            if not self._had_platform(node_id, span.track, side):
-                beyond_end = low < bottom - track.pitch_mm or high > top + track.pitch_mm
-                self._once(Rule.ON_TRACK if beyond_end else Rule.FALL, f"robot {node_id} on track {span.track}")
+        margin = track.pitch_mm * (1.5 if self.world.platforms else 0.5)
+        if low < -margin or high > (track.length - 1) * track.pitch_mm + margin:
+            self._once(Rule.ON_TRACK, f"robot {node_id} on track {span.track}")
 
-    def _had_platform(self, node_id: int, floor: int, position_mm: float) -> bool:
-        """Whether a platform stood at that end of the alley during the span, or took the robot along at its end."""
-        for lift, platform in self.world.platforms.items():
+    def _judge_departure(self, node_id: int, now_us: int) -> None:
+        """A carrier that sets out for a platform must have one there; that it stays is the lift's part."""
+        robot = self.world.robots[node_id]
+        if robot.track not in self._alleys:
+            return
+        track = self.world.site.tracks[robot.track]
+        low, high = robot.motion.extremes_mm(now_us, robot.motion.end_us)
+        for side_mm, beyond in ((low, low < -track.pitch_mm / 2), (high, high > (track.length - 0.5) * track.pitch_mm)):
+            if beyond and not self._has_platform(robot.track, side_mm):
+                self._once(Rule.FALL, f"robot {node_id} on track {robot.track}")
+
+    def _has_platform(self, floor: int, position_mm: float) -> bool:
+        """Whether a platform stands at that end of an alley."""
+        for lift in self.world.platforms:
             end_mm = self.world.end_mm(lift, floor)
             if end_mm is not None and (end_mm < 0) == (position_mm < 0):
-                return self.world.platform_floor(lift) == floor or platform.robot == node_id
+                return self.world.platform_floor(lift) == floor
         return False
 
     def _judge_pairs(self, now_us: int, node_id: int | None = None) -> None:

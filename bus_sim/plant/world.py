@@ -118,7 +118,7 @@ class World:
         return abs(position_mm - round(position_mm / pitch_mm) * pitch_mm) <= MARK_TOLERANCE_MM
 
     def standing_position(self, node_id: int) -> Segment | None:
-        """The position at whose mark a robot's carrier stands still; on a platform index 0 or length + 1 of the alley."""
+        """The mark at which a robot's carrier stands still; on a platform index 0 or length + 1 of the alley."""
         robot = self.robots[node_id]
         now_us = self.timers.now_us()
         position_mm, speed = robot.motion.at(now_us)
@@ -182,9 +182,9 @@ class World:
         end_mm = self.end_mm(node_id, floor)
         for robot_id, robot in self.robots.items():
             position = self.standing_position(robot_id)
-            if robot.track == floor and position is not None and end_mm is not None:
-                if abs(robot.motion.at(self.timers.now_us())[0] - end_mm) <= MARK_TOLERANCE_MM:
-                    return robot_id
+            stands = robot.track == floor and position is not None and end_mm is not None
+            if stands and abs(robot.motion.at(self.timers.now_us())[0] - (end_mm or 0.0)) <= MARK_TOLERANCE_MM:
+                return robot_id
         return None
 
     def overhang(self, node_id: int) -> int | None:

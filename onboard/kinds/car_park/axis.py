@@ -1,6 +1,7 @@
 """An alley as a carrier's drive sees it: positions in mm, slots with tokens, and the lifts' platforms at its ends."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from onboard.core.lifts import gate, lift_at, platform
 from onboard.core.site import Segment, Site
@@ -58,6 +59,6 @@ class AlleyAxis:
         """Slots that a body from ``low_mm`` to ``high_mm`` is in, and the gate where it is across a sill."""
         indices = list(range(self.index_at(low_mm), self.index_at(high_mm) + 1))
         held = [self.slot(index) for index in indices]
-        for one, other in zip(indices, indices[1:], strict=False):
+        for one, other in pairwise(indices):
             held += self.crossing(one, other)
         return held

@@ -1,8 +1,8 @@
 """The elevator robot (ER): a platform that serves rides in the order of everybody's plans, one at a time.
 
-It schedules its future from the robots' itineraries and is never locked for a session: it goes ahead to the floor of the
-next ride, grants platform and gate there, moves when the gate is back and its sensor sees the carrier wholly aboard,
-and grants the gate again on the floor of arrival. It moves only while it holds the gate itself.
+It schedules its future from the robots' itineraries and is never locked for a session: it goes ahead to the floor of
+the next ride, grants platform and gate there, moves when the gate is back and its sensor sees the carrier wholly
+aboard, and grants the gate again on the floor of arrival. It moves only while it holds the gate itself.
 """
 
 from collections.abc import Callable
@@ -301,7 +301,7 @@ class Lift:
 
 
 def rides_of(track: int, robot: int, itinerary: Itinerary, now_us: int) -> list[Ride]:
-    """Rides on one lift that an itinerary still plans: those whose robot has not left the platform by its own account."""
+    """Rides on one lift that an itinerary still plans: those that its robot has not told to be over."""
     if itinerary.grade is not Grade.FIRM:
         return []
     rides = []

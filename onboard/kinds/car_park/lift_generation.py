@@ -33,9 +33,9 @@ class LiftGeneration:
         if indices is None or itinerary is None:
             return None
         for leg in itinerary.legs:
-            if leg.action is LegAction.RIDE and leg.track == self.machine.home.track:
-                if (leg.from_index, leg.to_index) == indices:
-                    return leg.end_ms
+            mine = leg.action is LegAction.RIDE and leg.track == self.machine.home.track
+            if mine and (leg.from_index, leg.to_index) == indices:
+                return leg.end_ms
         return None
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:

@@ -25,7 +25,7 @@ class Riding:
         return []
 
     def advance(self, now_us: int) -> list[Effect]:
-        """Return the gate so that the platform may move; then ask for it until the lift grants it at the other floor."""
+        """Return the gate so that the platform may move; then ask until the lift grants it at the other floor."""
         if self.done:
             return []
         tokens, key = self.fleet.tokens, segment_token(gate(self.lift_track))

@@ -1,0 +1,93 @@
+"""Several floors: steps 15 to 20 of Fig. 9, lifts that serve rides as calls, robots that share them (rows P02, P39, P49, P50)."""
+
+import pytest
+
+from bus_sim.sites import find_site
+from onboard.core.authority import TokenKey, segment_token
+from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, Operation, TaskPhase
+from onboard.core.lifts import gate, platform
+from onboard.core.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    DriveState,
+    Itinerary,
+    PlatformState,
+    Progress,
+    TaskReport,
+    TokenGrant,
+)
+from tests.system.scene import Scene, play, stays
+
+
+@pytest.fixture(scope="module")
+def entry() -> Scene:
+    """One car on the small site: the robot comes down by a lift, parks it, and goes up again."""
+    scene = play(find_site("small"), stays((0, None)), extra_s=200)
+    scene.assert_sound()
+    return scene
+
+
+def granted(scene: Scene, key: TokenKey, holder: int, after_us: int) -> int:
+    return scene.first(
+        TokenGrant, lambda m: (m.token_kind, m.token, m.holder) == (key.kind, key.number, holder), after_us
+    )[0]
+
+
+def test_p50_steps_15_to_20_the_lift_is_asked_comes_takes_the_robot_and_lets_it_go(entry: Scene) -> None:
+    site = entry.simulation.site
+    _, call = entry.first(CallForProposals, lambda m: m.operation is Operation.PARK)
+    award_us, award = entry.first(Award, lambda m: m.task == call.task)
+    robot = award.winner
+    asked_us, ride = entry.first(CallForProposals, lambda m: m.operation is Operation.RIDE)
+    assert ride.sender == robot and ride.kind is KindCode.LIFT and asked_us > award_us
+    _, plan = entry.first(Itinerary, lambda m: m.grade is Grade.FIRM and m.sender == robot and len(m.legs) > 2)
+    leg = next(leg for leg in plan.legs if leg.action is LegAction.RIDE)
+    lift = site.stewards[leg.track]
+    arrived_us, _ = entry.first(
+        Progress, lambda m: (m.sender, m.index, m.speed_mm_s) == (lift, leg.from_index, 0), after_us=award_us
+    )
+    boards_us = granted(entry, segment_token(gate(leg.track)), robot, arrived_us)
+    aboard_us, _ = entry.first(PlatformState, lambda m: m.sender == lift and m.carrier_aboard, after_us=boards_us)
+    back_us = granted(entry, segment_token(gate(leg.track)), lift, boards_us)
+    rides_us, _ = entry.first(DriveState, lambda m: m.sender == lift and m.mode is DriveMode.MOVING, after_us=back_us)
+    there_us, _ = entry.first(
+        Progress, lambda m: (m.sender, m.index, m.speed_mm_s) == (lift, leg.to_index, 0), after_us=rides_us
+    )
+    leaves_us = granted(entry, segment_token(gate(leg.track)), robot, there_us)
+    free_us = granted(entry, segment_token(platform(leg.track)), lift, leaves_us)
+    order = [award_us, arrived_us, boards_us, aboard_us, rides_us, there_us, leaves_us, free_us]
+    assert order == sorted(order) and back_us < rides_us
+    done_us, _ = entry.first(TaskReport, lambda m: m.task == call.task and m.phase is TaskPhase.DONE)
+    assert free_us < done_us
+
+
+def test_p49_p02_lifts_compartments_and_robots_call_or_answer(entry: Scene) -> None:
+    kinds = {node: machine.kind for node, machine in entry.simulation.site.machines.items()}
+    assert {kinds[call.sender] for _, call in entry.all(CallForProposals)} == {KindCode.COMPARTMENT, KindCode.ROBOT}
+    assert {kinds[bid.sender] for _, bid in entry.all(Bid)} == {KindCode.ROBOT, KindCode.LIFT}
+    rides = [call for _, call in entry.all(CallForProposals) if call.operation is Operation.RIDE]
+    closed = {(a.sender, a.call): a.result for _, a in entry.all(Award)}
+    assert rides and all(closed[ride.sender, ride.call] is CallResult.AWARDED for ride in rides)
+
+
+def test_a_lift_never_moves_while_somebody_holds_its_gate(entry: Scene) -> None:
+    site = entry.simulation.site
+    for track, lift in ((track, site.stewards[track]) for track in site.tracks if track >= 128):
+        holder = lift
+        for said in entry.said:
+            message = said.message
+            if isinstance(message, TokenGrant) and message.token == gate(track).number and message.token_kind == 0:
+                holder = message.holder
+            if isinstance(message, DriveState) and message.sender == lift and message.mode is DriveMode.MOVING:
+                assert holder == lift, f"at {said.time_us / 1e6:.3f} s"
+
+
+@pytest.mark.parametrize(("site", "cars"), [("small", 8), ("standard", 8)])
+def test_several_robots_share_lifts_and_serve_everybody(site: str, cars: int) -> None:
+    demand = stays(*[(45.0 * number, 700.0 + 60.0 * number) for number in range(cars)])
+    scene = play(find_site(site), demand, limit_s=3_000)
+    scene.assert_sound()
+    summary = scene.simulation.plant.street.summary()
+    assert (summary.parked, summary.served, summary.inside) == (cars, cars, 0)
+    assert len({bid.sender for _, bid in scene.all(Bid) if bid.sender >= 11}) >= 2, "more than one robot took part"
