@@ -204,8 +204,11 @@ class Oracle:
         low, high = span.motion.extremes_mm(span.from_us, now_us)
         if span.track not in self._alleys:
             return
-        margin = track.pitch_mm * (1.5 if self.world.platforms else 0.5)
-        if low < -margin or high > (track.length - 1) * track.pitch_mm + margin:
+        end_mm = (track.length - 1) * track.pitch_mm
+        bottom, top = (
+            track.pitch_mm * (1.5 if self._shaft(span.track, side) else 0.5) for side in (-1.0, end_mm + 1.0)
+        )
+        if low < -bottom or high > end_mm + top:
             self._once(Rule.ON_TRACK, f"robot {node_id} on track {span.track}")
 
     def _judge_departure(self, node_id: int, now_us: int) -> None:
@@ -216,16 +219,17 @@ class Oracle:
         track = self.world.site.tracks[robot.track]
         low, high = robot.motion.extremes_mm(now_us, robot.motion.end_us)
         for side_mm, beyond in ((low, low < -track.pitch_mm / 2), (high, high > (track.length - 0.5) * track.pitch_mm)):
-            if beyond and not self._has_platform(robot.track, side_mm):
+            lift = self._shaft(robot.track, side_mm)
+            if beyond and lift is not None and self.world.platform_floor(lift) != robot.track:
                 self._once(Rule.FALL, f"robot {node_id} on track {robot.track}")
 
-    def _has_platform(self, floor: int, position_mm: float) -> bool:
-        """Whether a platform stands at that end of an alley."""
+    def _shaft(self, floor: int, position_mm: float) -> int | None:
+        """The lift that serves an alley at the end that a position is nearer to, or beyond."""
         for lift in self.world.platforms:
             end_mm = self.world.end_mm(lift, floor)
             if end_mm is not None and (end_mm < 0) == (position_mm < 0):
-                return self.world.platform_floor(lift) == floor
-        return False
+                return lift
+        return None
 
     def _judge_pairs(self, now_us: int, node_id: int | None = None) -> None:
         """Least distance of every pair (with ``node_id``) since the last time one of them changed its motion."""

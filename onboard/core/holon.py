@@ -243,7 +243,9 @@ class Holon:
         if beat.contract != CONTRACT_VERSION or beat.site_digest != self.site.digest:
             self.drops[Reason.OTHER_CONTRACT if beat.contract != CONTRACT_VERSION else Reason.OTHER_SITE] += 1
             return []
-        if self.mirror.on_heartbeat(beat, now_us):
+        fresh = self.mirror.on_heartbeat(beat, now_us)
+        self._elect_time_source(self.clock.local_us(now_us))
+        if fresh:
             return [Send(SyncRequest(self.node_id, beat.sender))]
         if beat.mirror_digest == self.mirror.digest():
             del self._mismatches[beat.sender]

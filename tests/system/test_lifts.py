@@ -1,4 +1,4 @@
-"""Several floors: steps 15 to 20 of Fig. 9, lifts that serve rides as calls, robots that share them (rows P02, P39, P49, P50)."""
+"""Several floors: steps 15 to 20 of Fig. 9, rides as calls, robots that share lifts (rows P02, P39, P49, P50)."""
 
 import pytest
 
