@@ -21,7 +21,7 @@ from onboard.io.open_bus import BusSettings, open_bus
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 
-DEADLINE_S = 60
+DEADLINE_S = 150
 
 
 def run_program(*words: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:

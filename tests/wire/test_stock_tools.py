@@ -25,7 +25,7 @@ from tests.tools import require_tool, run_tool
 from tests.wire.samples import signal_values
 
 ROOT = Path(__file__).parents[2]
-DEADLINE_S = 60
+DEADLINE_S = 150
 
 
 @pytest.fixture(scope="module")
