@@ -12,7 +12,8 @@ from rich.panel import Panel
 from rich.text import Text
 
 from onboard.core.codes import KindCode, MachineState, Side
-from onboard.core.site import Site, Station, TrackKind
+from onboard.core.lifts import lift_at, lift_tracks, sill
+from onboard.core.site import Segment, Site, Station, TrackKind
 from onboard.trace.view import SiteView
 
 #: Pictures a second at most; more only costs the simulation time.
@@ -54,7 +55,7 @@ def draw_floor(site: Site, view: SiteView, track: int) -> list[Text]:
     places = set(site.places)
     rows = []
     for side in (Side.FAR, Side.NEAR):
-        row = Text(f"{track:>2} {side.name[0]} " if side is Side.FAR else "   N ")
+        row = Text((f"{track:>2} {side.name[0]} " if side is Side.FAR else "   N ") + " " * _shaft_width(site))
         for index in range(1, site.tracks[track].length + 1):
             station = Station(track, index, side)
             car = taken.get(station.number)
@@ -71,6 +72,7 @@ def draw_floor(site: Site, view: SiteView, track: int) -> list[Text]:
 
 def _alley(site: Site, view: SiteView, track: int) -> Text:
     row = Text("     ")
+    row.append_text(_shaft(site, view, track, 0))
     here: dict[int, list[int]] = {}
     for node, (segment, _) in view.positions.items():
         machine = site.machines.get(node)
@@ -83,7 +85,26 @@ def _alley(site: Site, view: SiteView, track: int) -> Text:
         else:
             loaded = any(view.aboard.get(node) is not None for node in nodes)
             row.append(f"{view.name(nodes[0])[:4]:^5}", style="bold reverse green" if loaded else "bold green")
+    row.append_text(_shaft(site, view, track, site.tracks[track].length + 1))
     return row
+
+
+def _shaft_width(site: Site) -> int:
+    """Room for the lifts at the left end, where the site has any."""
+    return 7 if lift_tracks(site) else 0
+
+
+def _shaft(site: Site, view: SiteView, track: int, index: int) -> Text:
+    """A lift at one end of an alley: its platform with whoever stands on it, or the empty shaft."""
+    lift = lift_at(site, Segment(track, index))
+    if lift is None:
+        return Text(" " * _shaft_width(site))
+    node = site.stewards[lift]
+    at = view.positions[node][0].index
+    if sill(site, lift, at).track != track:
+        return Text("   :   ", style="dim")
+    aboard = [view.name(n) for n, (segment, _) in view.positions.items() if segment == Segment(track, index)]
+    return Text(f"[{aboard[0] if aboard else '=':^5}]", style="bold yellow")
 
 
 def draw(site: Site, view: SiteView, clock: Clock, line: str) -> Group:
