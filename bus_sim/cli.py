@@ -14,6 +14,7 @@ from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names
 from onboard import __version__
 from onboard.config.problems import ConfigError
+from onboard.config.site_report import site_report
 from onboard.io.open_bus import BusOpenError
 from onboard.wire.site_dbc import site_dbc
 
@@ -49,7 +50,8 @@ def build_parser() -> argparse.ArgumentParser:
     )
     dbc = commands.add_parser("dbc", help="print the DBC of a site: one message for each machine")
     dbc.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file")
-    commands.add_parser("sites", help="list the sites that ship with the simulator")
+    sites = commands.add_parser("sites", help="list the shipped sites, or tell of one what it holds and what it can lose")
+    sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     return parser
 
 
@@ -129,7 +131,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = build_parser().parse_args(argv)
     try:
         if args.command == "sites":
-            print("\n".join(site_names()))
+            print("\n".join(site_names() if args.site is None else site_report(find_site(args.site))))
             return 0
         site = find_site(args.site)
         if args.command == "dbc":

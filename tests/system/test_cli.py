@@ -97,6 +97,14 @@ def test_a_persons_mistake_gets_one_clear_line_and_status_2(
     assert list(tmp_path.iterdir()) == [], "nothing half done"
 
 
+def test_sites_are_listed_and_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert bus_sim(["sites"]) == 0
+    assert capsys.readouterr().out.split() == ["large", "level1", "small", "standard"]
+    assert bus_sim(["sites", "standard"]) == 0
+    shown = capsys.readouterr().out
+    assert "places: 191" in shown and "without ER1" in shown
+
+
 @pytest.mark.parametrize("program", ["bus_sim.cli", "onboard"])
 def test_help_teaches_and_the_version_is_told(program: str, tmp_path: Path) -> None:
     shown = run_program(program, "--help", cwd=tmp_path)
