@@ -50,7 +50,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     dbc = commands.add_parser("dbc", help="print the DBC of a site: one message for each machine")
     dbc.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file")
-    sites = commands.add_parser("sites", help="list the shipped sites, or tell of one what it holds and what it can lose")
+    sites = commands.add_parser("sites", help="list the shipped sites, or tell what one holds and can lose")
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     return parser
 
