@@ -68,7 +68,8 @@ class Oracle:
         self.take_stock()
         self._overlapping: set[tuple[int, int]] = set()
         self._present: set[tuple[Rule, str]] = set()
-        self._sills: dict[int, int | None] = {}
+        #: The floor at which each platform last stood, None while it is under way.
+        self._floors = {lift: world.platform_floor(lift) for lift in world.platforms}
         self._alleys = {n for n, t in world.site.tracks.items() if t.kind is not TrackKind.LIFT}
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
@@ -98,7 +99,6 @@ class Oracle:
 
     def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
         if change is Change.CARRIER:
-            self._sills = {lift: self.world.overhang(lift) for lift in self.world.platforms}
             self._judge_departure(node_id, now_us)
             self._judge_track(node_id, now_us)
             self._judge_pairs(now_us, node_id)
@@ -151,10 +151,13 @@ class Oracle:
     def _judge_platform(self, node_id: int, now_us: int) -> None:
         """A platform that begins to move must have nothing over its sill."""
         platform = self.world.platforms[node_id]
-        before = self._sills.get(node_id)
-        if now_us < platform.motion.end_us and before is not None:
-            self.report(Rule.LIFT_CRUSH, f"lift {node_id}, robot {before}")
-        self._sills[node_id] = self.world.overhang(node_id)
+        floor = self._floors[node_id]
+        if now_us < platform.motion.end_us and floor is not None:
+            # Asked for this moment: since the last change a body may have run on over the sill and away from it.
+            over = self.world.over_sill(node_id, floor)
+            if over is not None:
+                self.report(Rule.LIFT_CRUSH, f"lift {node_id}, robot {over}")
+        self._floors[node_id] = self.world.platform_floor(node_id)
 
     def _judge_passage(self, node_id: int) -> None:
         bay = self.world.bays[node_id]

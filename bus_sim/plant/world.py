@@ -190,8 +190,12 @@ class World:
     def overhang(self, node_id: int) -> int | None:
         """The robot whose body is over the sill of a lift at the floor where its platform is."""
         floor = self.platform_floor(node_id)
-        end_mm = self.end_mm(node_id, floor) if floor is not None else None
-        if floor is None or end_mm is None:
+        return self.over_sill(node_id, floor) if floor is not None else None
+
+    def over_sill(self, node_id: int, floor: int) -> int | None:
+        """The robot whose body is over the sill of a lift at a floor, wherever the platform is."""
+        end_mm = self.end_mm(node_id, floor)
+        if end_mm is None:
             return None
         pitch_mm, half_mm = self.site.tracks[floor].pitch_mm, self.site.carrier_length_mm / 2
         edge_mm = -pitch_mm / 2 if end_mm < 0 else end_mm - pitch_mm / 2

@@ -82,6 +82,8 @@ class TokenBook:
     holder: dict[TokenKey, int] = field(default_factory=dict)
     wanted: dict[TokenKey, int] = field(default_factory=dict)
     refused: dict[TokenKey, Reason] = field(default_factory=dict)
+    #: Grows with every change of the tables above, so that nobody need look twice at the same state.
+    changes: int = 0
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
@@ -116,6 +118,7 @@ class TokenBook:
         if key in self.seen or key in self.held:
             raise ValueError(f"token {key} exists already")
         self.held[key] = self.seen[key] = 1
+        self.changes += 1
         return [self._record("token_held", key, 1, self.node_id)]
 
     def want(self, key: TokenKey, now_us: int) -> list[Effect]:
@@ -123,10 +126,12 @@ class TokenBook:
         if self.holds(key) or key in self.wanted:
             return []
         self.wanted[key] = now_us
+        self.changes += 1
         return self.wake(now_us)
 
     def forget(self, key: TokenKey) -> None:
         """Stop asking. A grant that still arrives is accepted and can be given back."""
+        self.changes += 1
         self.wanted.pop(key, None)
         self.refused.pop(key, None)
 
@@ -135,6 +140,7 @@ class TokenBook:
         if not self.holds(key):
             raise ValueError(f"node {self.node_id} gives {key} which it does not hold")
         version = successor(self.held.pop(key, self.seen.get(key, 0)), _VERSION_BITS)
+        self.changes += 1
         self.seen[key] = version
         self.holder[key] = to
         self.leaving[key] = Grant(version, to, now_us + self.site.timing.token_repeat_us)
@@ -162,6 +168,7 @@ class TokenBook:
         if grant.holder != self.node_id:
             return []
         self.held[key] = grant.version
+        self.changes += 1
         self.forget(key)
         return [
             self._record("token_held", key, grant.version, self.node_id),
@@ -184,6 +191,7 @@ class TokenBook:
         key = TokenKey(refusal.token_kind, refusal.token)
         if refusal.requester == self.node_id and key in self.wanted:
             self.refused[key] = refusal.reason
+            self.changes += 1
 
     def statements(self) -> list[Effect]:
         """What this node holds away from the site file's first holders, said for a node that asks."""
@@ -214,6 +222,7 @@ class TokenBook:
 
     def _learn(self, key: TokenKey, version: int, holder: int) -> None:
         # A newer version held elsewhere proves that my own grant arrived, or that my memory is older than the bus.
+        self.changes += 1
         self.seen[key] = version
         self.holder[key] = holder
         self.held.pop(key, None)

@@ -5,7 +5,7 @@ it holds the gate, and the lift moves only while it holds it itself, so nothing 
 the platform moves. On an alley's axis the platform is the position before index 1 or behind the last.
 """
 
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment, Site
 
 #: Index of the platform's token on a lift's track, and of its gate's.
 PLATFORM_INDEX = 0
@@ -22,9 +22,9 @@ def gate(lift_track: int) -> Segment:
     return Segment(lift_track, GATE_INDEX)
 
 
-def lift_tracks(site: Site) -> list[int]:
+def lift_tracks(site: Site) -> tuple[int, ...]:
     """All lifts of a site by their track numbers."""
-    return [number for number, track in site.tracks.items() if track.kind is TrackKind.LIFT]
+    return site.lifts
 
 
 def sill(site: Site, lift_track: int, lift_index: int) -> Segment:
@@ -51,7 +51,4 @@ def platform_on(site: Site, lift_track: int, floor: int) -> Segment | None:
 
 def lift_at(site: Site, position: Segment) -> int | None:
     """The lift whose platform is meant by an alley position before index 1 or behind the last; None for all others."""
-    for lift_track in lift_tracks(site):
-        if platform_on(site, lift_track, position.track) == position:
-            return lift_track
-    return None
+    return site.platforms.get(position)

@@ -7,6 +7,7 @@ a car can stand: a place or a compartment, on one side of a segment.
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 from typing import NamedTuple
 
 from onboard.core.codes import KindCode, Side
@@ -154,6 +155,24 @@ class Site:
     def compartments(self) -> dict[int, Station]:
         """Station of each compartment by node-ID."""
         return {m.node_id: m.station for m in self.machines.values() if m.station is not None}
+
+    @cached_property
+    def lifts(self) -> tuple[int, ...]:
+        """Track numbers of all lifts, in the site's order."""
+        return tuple(number for number, track in self.tracks.items() if track.kind is TrackKind.LIFT)
+
+    @cached_property
+    def platforms(self) -> dict[Segment, int]:
+        """Lift track by the platform's position on each alley served: index 0 at the left end, length + 1 at the right.
+
+        Worked out once: every motion asks for it many times.
+        """
+        found: dict[Segment, int] = {}
+        for lift in self.lifts:
+            for at in self.tracks[lift].joins:
+                end = 0 if at.index == 1 else self.tracks[at.track].length + 1
+                found.setdefault(Segment(at.track, end), lift)
+        return found
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""

@@ -1,6 +1,7 @@
 """An alley as a carrier's drive sees it: positions in mm, slots with tokens, and the lifts' platforms at its ends."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 from onboard.core.lifts import gate, lift_at, platform
@@ -14,12 +15,12 @@ class AlleyAxis:
     site: Site
     floor: int
 
-    @property
+    @cached_property
     def lowest(self) -> int:
         """First index of the axis."""
         return 1 if lift_at(self.site, Segment(self.floor, 0)) is None else 0
 
-    @property
+    @cached_property
     def highest(self) -> int:
         """Last index of the axis."""
         length = self.site.tracks[self.floor].length

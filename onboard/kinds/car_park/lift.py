@@ -189,8 +189,8 @@ class Lift:
         if self.phase is LiftPhase.BOARDING and not self._gate_was_out and self._stands_at(ride.board):
             self._gate_was_out = True
             return Reason.NONE
-        if self.phase is LiftPhase.LEAVING and not self._gate_was_out and self._stands_at(ride.leave):
-            self._gate_was_out = True
+        if self.phase is LiftPhase.LEAVING and self._stands_at(ride.leave):
+            # As often as it is asked for: who waits aboard gives the gate back meanwhile. The ride ends with the platform.
             return Reason.NONE
         return Reason.DOOR_NOT_READY
 

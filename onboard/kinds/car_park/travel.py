@@ -5,7 +5,7 @@ inside its authority at any moment; orders are repeated only while ``authorised`
 nothing brakes by itself.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
 from onboard.core.behaviour import Fleet
@@ -37,11 +37,16 @@ class Carriage:
     blocked: Segment | None = None
     stopped: bool = False
     _reported: Segment | None = None
+    _axes: dict[int, AlleyAxis] = field(default_factory=dict)
+    #: What ``advance`` looked at when it last found nothing to do.
+    _settled: tuple[object, ...] | None = None
 
     @property
     def axis(self) -> AlleyAxis:
         """The alley that the carrier is on."""
-        return AlleyAxis(self.fleet.site, self.track)
+        if self.track not in self._axes:
+            self._axes[self.track] = AlleyAxis(self.fleet.site, self.track)
+        return self._axes[self.track]
 
     @property
     def standing_at(self) -> Segment | None:
@@ -102,6 +107,18 @@ class Carriage:
 
     def advance(self, now_us: int) -> list[Effect]:
         """Ask for the segments ahead, extend the drive's target as far as they are held, and repeat its order."""
+        due = self.refresh_at_us is not None and self.refresh_at_us <= now_us
+        if not due and self._settled == self._outlook():
+            return []
+        effects = self._go_on(now_us)
+        self._settled = None if effects else self._outlook()
+        return effects
+
+    def _outlook(self) -> tuple[object, ...]:
+        """All that decides what is to be done, but the time: each message on the bus asks, and few change anything."""
+        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped
+
+    def _go_on(self, now_us: int) -> list[Effect]:
         if self.goal is None or self.sensed is None or self.arrived:
             return self._rest(now_us)
         ahead = self._ahead()
