@@ -25,14 +25,22 @@ exit status:
   2  a mistake in the command line or in a file; one line for each says where and what to do
 
 examples:
-  bus-sim run                          a real day on the one-floor site, as fast as possible
-  bus-sim run level1 --speed 60        the same, a minute a second
+  bus-sim run                          the busiest hour of a real day on the standard site, a minute a second
+  bus-sim run standard                 that whole day, as fast as possible
+  bus-sim run standard --hour 16:30    from 16:30 to 17:30, after a hurried warm-up
+  bus-sim run level1                   a day on the one-floor site
   bus-sim run level1 --one-car 300     one car by hand, fetched after five minutes
   bus-sim run level1 --serve           at the pace of the clock, the fleet bus on 127.0.0.1:29536 (socketcand)
   bus-sim run level1 --bus socketcan:vcan0
                                        the fleet bus on an interface, so that `candump vcan0` shows it
   bus-sim dbc level1 > level1.dbc      one message for each machine, for candump | cantools decode, Wireshark ...
 """
+
+
+#: Where nothing else is named.
+DEFAULT_SITE = "standard"
+#: Simulated seconds a second while a window is shown: an hour in a minute.
+WINDOW_SPEED = 60.0
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -57,16 +65,24 @@ def build_parser() -> argparse.ArgumentParser:
 
 def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
-        "site", nargs="?", default="level1", help="name of a shipped site, or a site file (default: level1)"
+        "site",
+        nargs="?",
+        help="name of a shipped site, or a site file (default: standard, and of the shipped day its busiest hour)",
     )
     demand = run.add_argument_group("who comes (default: the shipped real day, 2019-07-24)")
     demand.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file (columns as in bus_sim/data)")
-    demand.add_argument("--day", metavar="YYYY-MM-DD", help="only sessions that begin on this local day")
+    demand.add_argument(
+        "--day",
+        metavar="D[..D]",
+        help="only sessions that begin on this local day, or from the first to the last of two, such as "
+        "2019-07-24..2019-07-26; cars that stay over midnight stay",
+    )
     demand.add_argument(
         "--stalls",
         metavar="NAME,...",
-        default="AG-1F",
-        help="only stalls so named, or beginning so (default: AG-1F, the fourteen stalls of level 1)",
+        default="",
+        help="only stalls so named, or beginning so (default: all of the file; of the shipped day all 52 where a site "
+        "has several compartments, else the fourteen of level 1)",
     )
     demand.add_argument("--one-car", type=float, metavar="SECONDS", help="one car by hand, fetched after so long")
     demand.add_argument(
@@ -77,13 +93,13 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         help="cars at normal intervals of this mean and standard deviation, in seconds",
     )
     demand.add_argument("--cars", type=int, default=50, metavar="N", help="number of cars with --random (default: 50)")
+    _add_when(run.add_argument_group("which part of the day (default: all of it where a site is named)"))
     how = run.add_argument_group("how it runs")
     how.add_argument("--seed", type=int, default=1, help="seed of everything that is drawn by chance (default: 1)")
     how.add_argument(
         "--speed",
-        type=float,
         metavar="FACTOR",
-        help="simulated seconds a second (default: as fast as possible; 1 with --serve or --bus)",
+        help="simulated seconds a second, or max (default: 60 in a window, else max; 1 with --serve or --bus)",
     )
     how.add_argument("--for", type=float, dest="limit_s", metavar="SECONDS", help="stop after so much simulated time")
     how.add_argument(
@@ -126,6 +142,17 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_when(when: argparse._ArgumentGroup) -> None:
+    window = when.add_mutually_exclusive_group()
+    window.add_argument(
+        "--hour",
+        metavar="HH:MM",
+        help="this hour of the first day, or busiest; what happens before is hurried through. "
+        "With 2019-07-25T07:00 an hour of another day",
+    )
+    window.add_argument("--window", metavar="FROM-TO", help="the same with an end of its own, such as 06:30-09:00")
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
@@ -133,7 +160,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.command == "sites":
             print("\n".join(site_names() if args.site is None else site_report(find_site(args.site))))
             return 0
-        site = find_site(args.site)
+        site = find_site(args.site or DEFAULT_SITE)
         if args.command == "dbc":
             sys.stdout.write(site_dbc(site))
             return 0
@@ -153,6 +180,30 @@ class OptionError(ValueError):
     """A mistake in one option: its name, the value and the remedy in one line."""
 
 
+def _speed(text: str | None) -> float | None:
+    """Simulated seconds a second; None for as fast as possible."""
+    if text is None or text == "max":
+        return None
+    try:
+        speed = float(text)
+    except ValueError as error:
+        raise OptionError(f"--speed {text}: not a number; write a factor above 0, or max") from error
+    if not 0 < speed < float("inf"):
+        raise OptionError(f"--speed {speed}: must be above 0, or max")
+    return speed
+
+
+def _window(args: argparse.Namespace, *, live: bool) -> str | None:
+    """The window asked for; without a site and without anything that asks for a whole run the busiest hour."""
+    if args.hour is not None and "-" in args.hour and "T" not in args.hour:
+        raise OptionError(f"--hour {args.hour}: one time of day, such as 06:30; a window is --window {args.hour}")
+    if args.window is not None and "-" not in args.window:
+        raise OptionError(f"--window {args.window}: must be FROM-TO, such as 06:30-09:00")
+    asked: str | None = args.hour or args.window
+    whole = args.site is not None or args.one_car is not None or args.random is not None or args.limit_s is not None
+    return asked if asked is not None or whole or live or args.without else "busiest"
+
+
 def _day_options(args: argparse.Namespace) -> DayOptions:
     faults = []
     for text in args.fault:
@@ -160,17 +211,24 @@ def _day_options(args: argparse.Namespace) -> DayOptions:
             faults.append(parse_fault(text))
         except ValueError as error:
             raise OptionError(f"--fault {text}: {error}") from error
-    if args.speed is not None and args.speed <= 0:
-        raise OptionError(f"--speed {args.speed}: must be above 0")
+    speed = _speed(args.speed)
     try:
         parse_bus_specs(args.bus, 500_000)
     except ValueError as error:
         raise OptionError(str(error)) from error
     live = args.serve is not None or bool(args.bus)
-    if live and args.without and args.speed not in (None, 1.0):
+    window = _window(args, live=live)
+    if live and args.without and args.speed is not None and speed != 1.0:
         raise OptionError(
             f"--speed {args.speed}: a controller in another process lives at the clock's pace; leave it out"
         )
+    if live and args.without and window is not None:
+        raise OptionError(
+            f"--without {args.without[0]}: a window's warm-up is hurried, and a controller in another process lives at "
+            "the clock's pace; leave out --hour and --window"
+        )
+    if args.speed is None:
+        speed = 1.0 if live else WINDOW_SPEED if window is not None else None
     return DayOptions(
         sessions=args.sessions,
         day=args.day,
@@ -179,7 +237,8 @@ def _day_options(args: argparse.Namespace) -> DayOptions:
         random_s=tuple(args.random) if args.random is not None else None,
         cars=args.cars,
         seed=args.seed,
-        speed=args.speed if args.speed is not None or not live else 1.0,
+        window=window,
+        speed=speed,
         limit_s=args.limit_s,
         without=frozenset(args.without),
         faults=tuple(faults),

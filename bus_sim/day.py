@@ -1,7 +1,8 @@
-"""A day on a site: the demand is chosen, the run is made and shown, and its summary told."""
+"""A day on a site, or a window of it: the demand is chosen, the run is made and shown, and its summary told."""
 
 import asyncio
 import time
+from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -9,14 +10,16 @@ from pathlib import Path
 from rich.console import Console
 
 from bus_sim.can.faults import Fault
-from bus_sim.demand import Demand, DemandError
-from bus_sim.run import FLEET, RunOptions, Simulation, build, run_until
-from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
-from bus_sim.serve.socketcand import ServeError, SocketcandServer
+from bus_sim.demand import LEVEL1_DAY, WHOLE_DAY, Demand, DemandError
+from bus_sim.outside import Outside
+from bus_sim.run import RunOptions, Simulation, build, run_until
 from bus_sim.show import Clock, TerminalShow
-from bus_sim.summary import RunSummary, Waiting, bus_figures, negotiation_figures, unserved
+from bus_sim.summary import BurstFigures, RunSummary, bus_figures, unserved
 from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.window import BURST_US, Window, choose_window, densest
 from onboard.core.site import Site
+from onboard.trace.durations import Durations
+from onboard.trace.indicators import Indicators
 
 #: The run begins so long before the first customer, us: the machines find their places first.
 LEAD_US = 10_000_000
@@ -26,11 +29,13 @@ TAIL_US = 30_000_000
 PATIENCE_US = 2 * 3_600_000_000
 #: Looks at the clock between pictures, us of virtual time.
 STEP_US = 1_000_000
+#: Without a terminal a window is told line by line, one in so long, us of virtual time.
+WINDOW_LINE_US = 300_000_000
 
 
 @dataclass(frozen=True)
 class DayOptions:
-    """What ``bus-sim run`` was asked for; see its help."""
+    """What ``bus-sim run`` was asked for; see its help. ``speed`` is that of the window where there is one."""
 
     sessions: Path | None = None
     day: str | None = None
@@ -38,6 +43,7 @@ class DayOptions:
     one_car_s: float | None = None
     random_s: tuple[float, float] | None = None
     cars: int = 50
+    window: str | None = None
     seed: int = 1
     speed: float | None = None
     limit_s: float | None = None
@@ -50,19 +56,37 @@ class DayOptions:
     quiet: bool = False
 
 
-def choose_demand(options: DayOptions) -> Demand:
-    """The stays to be played. Raises ``DemandError`` for a person's mistake."""
+def choose_demand(options: DayOptions, site: Site | None = None) -> Demand:
+    """The stays to be played. Raises ``DemandError`` for a person's mistake.
+
+    Unless told otherwise a site with several compartments gets the shipped day of all 52 stalls, any other that of
+    level 1, which one compartment can serve.
+    """
     if options.one_car_s is not None:
         return Demand.one_car(stay_s=options.one_car_s, seed=options.seed)
     if options.random_s is not None:
         return Demand.by_mean(*options.random_s, options.seed, count=options.cars)
-    day = None
-    if options.day is not None:
-        try:
-            day = date.fromisoformat(options.day)
-        except ValueError as error:
-            raise DemandError(f"--day {options.day}: not a day; write it as 2019-07-24") from error
-    return Demand.from_sessions(options.sessions, stations=options.stalls, day=day, seed=options.seed)
+    first, last = _days(options.day)
+    shipped = WHOLE_DAY if site is not None and len(site.compartments) > 1 else LEVEL1_DAY
+    return Demand.from_sessions(
+        options.sessions, stations=options.stalls, day=first, until=last, shipped=shipped, seed=options.seed
+    )
+
+
+def _days(text: str | None) -> tuple[date | None, date | None]:
+    """First and last day of ``D`` or ``D1..D2``."""
+    if text is None:
+        return None, None
+    first, _, last = text.partition("..")
+    try:
+        days = date.fromisoformat(first), date.fromisoformat(last or first)
+    except ValueError as error:
+        raise DemandError(
+            f"--day {text}: not a day; write it as 2019-07-24, several as 2019-07-24..2019-07-26"
+        ) from error
+    if days[1] < days[0]:
+        raise DemandError(f"--day {text}: the last day is before the first; turn them round")
+    return days
 
 
 def run_day(site: Site, options: DayOptions) -> RunSummary:
@@ -70,7 +94,8 @@ def run_day(site: Site, options: DayOptions) -> RunSummary:
 
     Raises ``DemandError`` and ``BusOpenError`` for a person's mistakes, before anything has run.
     """
-    demand = choose_demand(options)
+    demand = choose_demand(options, site)
+    window = choose_window(demand, options.window) if options.window is not None else None
     unknown = options.without - {machine.name for machine in site.machines.values()}
     if unknown:
         known = ", ".join(machine.name for machine in site.machines.values())
@@ -78,101 +103,181 @@ def run_day(site: Site, options: DayOptions) -> RunSummary:
     loop = VirtualTimeLoop(pace=options.speed)
     try:
         asyncio.set_event_loop(loop)
-        return loop.run_until_complete(_play(site, options, demand, loop))
+        return loop.run_until_complete(_Day(site, options, demand, window, loop).play())
     finally:
         asyncio.set_event_loop(None)
         loop.close()
 
 
-async def _play(site: Site, options: DayOptions, demand: Demand, loop: VirtualTimeLoop) -> RunSummary:
-    first_us = min((stay.arrival_us for stay in demand.stays), default=0)
-    last_us = max((stay.departure_us or stay.arrival_us for stay in demand.stays), default=0)
-    origin_us = LEAD_US - first_us
-    zero = (demand.zero or datetime(2000, 1, 1, tzinfo=UTC)) - timedelta(microseconds=origin_us)
-    console = Console(quiet=options.quiet)
-    if options.trace is not None:
-        options.trace.parent.mkdir(parents=True, exist_ok=True)
-    run_options = RunOptions(
-        seed=options.seed,
-        epoch_us=round(zero.timestamp() * 1_000_000),
-        trace=options.trace,
-        trace_devices=options.devices,
-        faults=options.faults,
-        without=options.without,
-    )
-    simulation = build(site, run_options, loop)
-    console.print(
-        f"site {site.name}, {len(demand.stays)} cars, seed {options.seed}, speed {options.speed or 'unlimited'}"
-        + "".join(f", fault {fault}" for fault in options.faults),
-        highlight=False,
-    )
-    simulation.plant.street.add_all(demand, origin_us)
-    started_s = time.monotonic()
-    async with Outside(simulation, options, console):
-        simulation.start()
-        limit_us = round(options.limit_s * 1_000_000) if options.limit_s else last_us + origin_us + PATIENCE_US
-        clock = Clock(zero)
-        with TerminalShow(site, simulation.view, clock, lambda: _figures(simulation), console) as show:
-            await run_until(
-                simulation,
-                lambda: simulation.plant.street.is_over,
-                limit_us,
-                STEP_US,
-                lambda: show.update(loop.now_us()),
-            )
-            if options.limit_s is None:
-                await run_until(
-                    simulation, lambda: False, loop.now_us() + TAIL_US, STEP_US, lambda: show.update(loop.now_us())
-                )
-    simulation.close()
-    summary = summarise(simulation, time.monotonic() - started_s)
-    for line in summary.lines():
-        console.print(line, highlight=False, soft_wrap=True)
-    return summary
+class _Day:
+    """One run from its first second to its summary."""
 
-
-class Outside:
-    """Everything that joins the buses from outside, for the time of a run."""
-
-    def __init__(self, simulation: Simulation, options: DayOptions, console: Console) -> None:
-        self._simulation = simulation
+    def __init__(
+        self, site: Site, options: DayOptions, demand: Demand, window: Window | None, loop: VirtualTimeLoop
+    ) -> None:
+        first_us = min((stay.arrival_us for stay in demand.stays), default=0)
+        if window is not None:
+            first_us = min(first_us, window.begin_us)
         self._options = options
-        self._console = console
-        self._server: SocketcandServer | None = None
-        self._bridges: list[Bridge] = []
+        self._demand = demand
+        self._window = window
+        self._loop = loop
+        self._origin_us = LEAD_US - first_us
+        self._zero = (demand.zero or datetime(2000, 1, 1, tzinfo=UTC)) - timedelta(microseconds=self._origin_us)
+        self._console = Console(quiet=options.quiet)
+        self._begin_us = 0
+        self._begin_s = 0.0
+        self._indicators = Indicators(site)
+        self._simulation = self._build(site)
 
-    async def __aenter__(self) -> None:
-        if self._options.serve is not None or self._options.buses:
-            # Somebody acknowledges from the start: a lone controller would repeat its first frame for ever.
-            self._simulation.fleet.attach("gateway")
-        if self._options.serve is not None:
-            await self._serve(self._options.serve)
-        bitrate = self._simulation.site.bitrate
-        for settings in parse_bus_specs(self._options.buses, bitrate):
-            bridge, _ = await open_bridge(self._simulation.fleet.attach(str(settings), None), settings)
-            self._bridges.append(bridge)
-            self._console.print(f"the fleet bus is on {settings}", highlight=False)
-
-    async def __aexit__(self, *_: object) -> None:
-        for bridge in self._bridges:
-            await bridge.close()
-        if self._server is not None:
-            await self._server.close()
-
-    async def _serve(self, address: str) -> None:
-        host, _, port = address.rpartition(":")
-        if not port.isdigit():
-            raise ServeError(f"--serve {address}: must be HOST:PORT, such as 127.0.0.1:29536")
-        epoch_us = self._simulation.options.epoch_us
-        server = SocketcandServer(
-            self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", int(port)
+    def _build(self, site: Site) -> Simulation:
+        options = self._options
+        if options.trace is not None:
+            options.trace.parent.mkdir(parents=True, exist_ok=True)
+        run_options = RunOptions(
+            seed=options.seed,
+            epoch_us=round(self._zero.timestamp() * 1_000_000),
+            trace=options.trace,
+            trace_devices=options.devices,
+            faults=options.faults,
+            without=options.without,
         )
-        bound = await server.start()
-        self._server = server
-        channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
+        simulation = build(site, run_options, self._loop)
+        simulation.observers.append(self._indicators.feed)
+        return simulation
+
+    async def play(self) -> RunSummary:
+        """The whole run."""
+        simulation, options, console = self._simulation, self._options, self._console
+        console.print(
+            f"site {simulation.site.name}, {len(self._demand.stays)} cars, seed {options.seed}, "
+            f"speed {options.speed or 'unlimited'}" + "".join(f", fault {fault}" for fault in options.faults),
+            highlight=False,
+        )
+        simulation.plant.street.add_all(self._demand, self._origin_us)
+        self._begin_s = time.monotonic()
+        outside = Outside(simulation, options.serve, options.buses, console)
+        clock = Clock(self._zero)
+        show = TerminalShow(simulation.site, simulation.view, clock, lambda: _figures(simulation), console)
+        async with AsyncExitStack() as stack:
+            if self._window is None:
+                await stack.enter_async_context(outside)
+                simulation.start()
+                stack.enter_context(show)
+                await self._to_the_end(show)
+            else:
+                simulation.start()
+                stack.enter_context(show)
+                await self._warm_up(self._window, show)
+                # Guests come for the window: they could not follow a warm-up that is hurried.
+                await stack.enter_async_context(outside)
+                await self._through(self._window, show)
+        wall_s = time.monotonic() - self._begin_s
+        simulation.close()
+        summary = self._summarise(wall_s)
+        for line in summary.lines():
+            console.print(line, highlight=False, soft_wrap=True)
+        return summary
+
+    async def _until(self, limit_us: int, show: TerminalShow, *, or_over: bool = False) -> None:
+        street = self._simulation.plant.street
+        await run_until(
+            self._simulation,
+            lambda: or_over and street.is_over,
+            limit_us,
+            STEP_US,
+            lambda: show.update(self._loop.now_us()),
+        )
+
+    async def _to_the_end(self, show: TerminalShow) -> None:
+        if self._options.limit_s is not None:
+            await self._until(round(self._options.limit_s * 1_000_000), show, or_over=True)
+            return
+        last_us = max((stay.departure_us or stay.arrival_us for stay in self._demand.stays), default=0)
+        await self._until(last_us + self._origin_us + PATIENCE_US, show, or_over=True)
+        await self._until(self._loop.now_us() + TAIL_US, show)
+
+    async def _warm_up(self, window: Window, show: TerminalShow) -> None:
+        """Everything before the window, as fast as possible; then measuring begins anew."""
+        begin_us = window.begin_us + self._origin_us
+        before = sum(stay.arrival_us < window.begin_us for stay in self._demand.stays)
+        clock = Clock(self._zero)
         self._console.print(
-            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False
+            f"warm-up from {clock.at(0)} to {clock.at(begin_us)}, as fast as possible: {before} cars come before",
+            highlight=False,
+            soft_wrap=True,
         )
+        self._loop.set_pace(None)
+        await self._until(begin_us, show)
+        now_us = self._loop.now_us()
+        self._indicators.begin(now_us)
+        self._simulation.fleet.restart_statistics()
+        self._console.print(
+            f"warmed up in {time.monotonic() - self._begin_s:.1f} s; now {window.told(self._demand)} "
+            f"at speed {self._options.speed or 'unlimited'}",
+            highlight=False,
+            soft_wrap=True,
+        )
+        self._begin_us = now_us
+        self._begin_s = time.monotonic()
+        self._loop.set_pace(self._options.speed)
+
+    async def _through(self, window: Window, show: TerminalShow) -> None:
+        show.every(WINDOW_LINE_US)
+        end_us = window.end_us + self._origin_us
+        if self._options.limit_s is not None:
+            end_us = min(end_us, self._begin_us + round(self._options.limit_s * 1_000_000))
+        await self._until(end_us, show)
+
+    # --- figures -----------------------------------------------------------------------------------------------
+
+    def _summarise(self, wall_s: float) -> RunSummary:
+        simulation, now_us = self._simulation, self._loop.now_us()
+        street = simulation.plant.street.summary(self._begin_us)
+        fleet = self._indicators.figures(now_us)
+        frames, errors, mean_load, worst_load = bus_figures(simulation.fleet.statistics())
+        drops: dict[str, int] = {}
+        halted = []
+        for controller in simulation.controllers.values():
+            for reason, count in controller.all_drops().items():
+                drops[reason.name] = drops.get(reason.name, 0) + count
+            if controller.holon.halted is not None:
+                halted.append(f"{controller.holon.machine.name}: {controller.holon.halted}")
+        trace = self._options.trace
+        return RunSummary(
+            site=simulation.site.name,
+            seed=self._options.seed,
+            window=self._window.told(self._demand) if self._window is not None else None,
+            simulated_s=(now_us - self._begin_us) / 1e6,
+            wall_s=wall_s,
+            cars_in=street.parked,
+            cars_out=street.served,
+            inside=street.inside,
+            refused_full=street.refused_full,
+            refused_too_large=street.refused_too_large,
+            unserved=unserved(street),
+            wait_in=Durations.of(street.in_wait_us),
+            wait_out=Durations.of(street.out_wait_us),
+            burst=self._burst(),
+            fleet=fleet,
+            messages=sum(fleet.messages.values()),
+            frames=frames,
+            error_frames=errors,
+            bus_load_mean=mean_load,
+            bus_load_worst_second=worst_load,
+            wire_drops=drops,
+            violations=tuple(str(violation) for violation in simulation.plant.oracle.finish()),
+            halted=tuple(halted),
+            trace=str(trace) if trace is not None else None,
+        )
+
+    def _burst(self) -> BurstFigures | None:
+        burst = densest(self._demand, self._window)
+        if burst is None:
+            return None
+        begin_us = burst.begin_us + self._origin_us
+        waits_us = self._simulation.plant.street.in_waits_us(begin_us, begin_us + BURST_US)
+        return BurstFigures(Clock(self._zero).at(begin_us), BURST_US / 1e6, burst.count, Durations.of(waits_us))
 
 
 def _figures(simulation: Simulation) -> str:
@@ -181,46 +286,4 @@ def _figures(simulation: Simulation) -> str:
     return (
         f"cars in {street.parked}  out {street.served}  inside {street.inside}  waiting {unserved(street)}"
         f"  calls {simulation.view.calls_opened}  bids {simulation.view.bids}  bus load {load.mean_load:.2%}"
-    )
-
-
-def summarise(simulation: Simulation, wall_s: float) -> RunSummary:
-    """All figures of a run that has ended."""
-    street = simulation.plant.street.summary()
-    calls, reopened, refused, bids = negotiation_figures(simulation.view)
-    frames, errors, mean_load, worst_load = bus_figures(simulation.fleet.statistics())
-    drops: dict[str, int] = {}
-    halted = []
-    for controller in simulation.controllers.values():
-        for reason, count in controller.all_drops().items():
-            drops[reason.name] = drops.get(reason.name, 0) + count
-        if controller.holon.halted is not None:
-            halted.append(f"{controller.holon.machine.name}: {controller.holon.halted}")
-    trace = simulation.options.trace
-    return RunSummary(
-        simulation.site.name,
-        simulation.options.seed,
-        simulation.loop.now_us() / 1e6,
-        wall_s,
-        street.parked,
-        street.served,
-        street.inside,
-        street.refused_full,
-        street.refused_too_large,
-        unserved(street),
-        Waiting.of(street.in_wait_us),
-        Waiting.of(street.out_wait_us),
-        calls,
-        reopened,
-        refused,
-        bids,
-        sum(simulation.view.messages.values()),
-        frames,
-        errors,
-        mean_load,
-        worst_load,
-        drops,
-        tuple(str(violation) for violation in simulation.plant.oracle.finish()),
-        tuple(halted),
-        str(trace) if trace is not None else None,
     )

@@ -17,8 +17,9 @@ from bus_sim.plant.bodies import CarBody, random_car
 
 #: Columns of a session file that are read; others may be there.
 COLUMNS = ("arrival", "departure", "station_id", "session_id")
-#: The day that ships with the simulator: stalls AG-1F01 to AG-1F14, 2019-07-24 (bus_sim/data/README.md).
-SHIPPED_DAY = "acn_jpl_2019-07-24_level1.csv"
+#: What ships with the simulator, both 2019-07-24 (bus_sim/data/README.md): stalls AG-1F01 to AG-1F14, and all 52.
+LEVEL1_DAY = "acn_jpl_2019-07-24_level1.csv"
+WHOLE_DAY = "acn_jpl_2019-07-24.csv"
 
 
 class DemandError(ValueError):
@@ -85,20 +86,24 @@ class Demand:
         *,
         stations: Iterable[str] = (),
         day: date | None = None,
+        until: date | None = None,
+        shipped: str = LEVEL1_DAY,
         seed: int = 0,
     ) -> "Demand":
         """The sessions of a CSV file that begin on one local day at stations named, or beginning as named.
 
-        Without a path the shipped day is read; without stations all count; without a day all days, and time zero is
-        midnight before the first arrival. A session still there at midnight keeps its later departure. ``skipped``
-        counts rows of other days and stations. Raises ``DemandError`` for what cannot be read.
+        Without a path the ``shipped`` day is read; without stations all count; without a day all days, and time zero is
+        midnight before the first arrival. With ``until`` the days from ``day`` to it, both included. A session still
+        there at midnight keeps its later departure. ``skipped`` counts rows of other days and stations. Raises
+        ``DemandError`` for what cannot be read.
         """
-        source: Readable = Path(path) if path is not None else _shipped()
+        source: Readable = Path(path) if path is not None else _shipped(shipped)
         wanted = tuple(stations)
         sessions = list(read_sessions(source))
-        chosen = [s for s in sessions if s.is_at(wanted) and (day is None or s.arrival.date() == day)]
+        last = until or day
+        chosen = [s for s in sessions if s.is_at(wanted) and _is_within(s.arrival.date(), day, last)]
         if not chosen:
-            raise DemandError(_nothing(source.name, sessions, wanted, day))
+            raise DemandError(_nothing(source.name, sessions, wanted, day, last))
         chosen.sort(key=lambda session: (session.arrival, session.name))
         first = chosen[0].arrival
         zero = datetime.combine(first.date(), time(), first.tzinfo)
@@ -217,7 +222,11 @@ def _time(row: dict[str, str | None], column: str, where: str) -> datetime:
     return moment
 
 
-def _nothing(name: str, sessions: list[Session], stations: tuple[str, ...], day: date | None) -> str:
+def _is_within(day: date, first: date | None, last: date | None) -> bool:
+    return (first is None or first <= day) and (last is None or day <= last)
+
+
+def _nothing(name: str, sessions: list[Session], stations: tuple[str, ...], day: date | None, last: date | None) -> str:
     if not sessions:
         return f"{name}: no sessions in the file"
     here = [session for session in sessions if session.is_at(stations)]
@@ -225,7 +234,8 @@ def _nothing(name: str, sessions: list[Session], stations: tuple[str, ...], day:
         known = sorted({session.station for session in sessions})
         return f"{name}: no station {', '.join(stations)}; the file has {known[0]} to {known[-1]}"
     days = sorted({session.arrival.date() for session in here})
-    return f"{name}: nobody arrives on {day}; the file has {days[0]} to {days[-1]}"
+    when = f"on {day}" if day == last else f"from {day} to {last}"
+    return f"{name}: nobody arrives {when}; the file has {days[0]} to {days[-1]}"
 
 
 def _us(moment: datetime, zero: datetime) -> int:
@@ -256,5 +266,5 @@ def _departures(arrivals_us: list[int], law: Law, min_stay_us: int, chance: rand
     return departures
 
 
-def _shipped() -> Readable:
-    return files("bus_sim").joinpath("data", SHIPPED_DAY)
+def _shipped(name: str) -> Readable:
+    return files("bus_sim").joinpath("data", name)

@@ -14,6 +14,8 @@ from bus_sim.journal import SimulatedJournal
 from bus_sim.plant.plant import Plant
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.controller.shell import Controller, Ports
+from onboard.core.behaviour import BehaviourFactory
+from onboard.core.codes import KindCode
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.messages import Message
@@ -85,6 +87,10 @@ class Simulation:
     controllers: dict[int, Controller] = field(default_factory=dict)
     journals: dict[int, SimulatedJournal] = field(default_factory=dict)
     writer: CandumpWriter | None = None
+    #: Which behaviour drives which kind; baselines put their own in before ``start``.
+    factories: Callable[[KindCode], BehaviourFactory] = factory_for
+    #: Told every message of the fleet bus with its time, after the view.
+    observers: list[Callable[[Message, int], None]] = field(default_factory=list)
 
     def start(self) -> None:
         """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop."""
@@ -99,7 +105,7 @@ class Simulation:
         journal = self.journals.setdefault(machine.node_id, SimulatedJournal())
         entries = journal.replay()
         boots = sum(1 for entry in entries if entry.get("record") == "boot")
-        holon = Holon(self.site, machine, factory_for(machine.kind), boot=boots % 255 + 1, entries=entries)
+        holon = Holon(self.site, machine, self.factories(machine.kind), boot=boots % 255 + 1, entries=entries)
         ports = Ports(
             self.fleet.attach(machine.name, machine.node_id),
             self.devices[machine.node_id].attach(machine.name, machine.node_id),
@@ -136,6 +142,8 @@ class Simulation:
             message: Message | None = decoder.feed(frame, time_us)
             if message is not None:
                 self.view.feed(message, time_us)
+                for observer in self.observers:
+                    observer(message, time_us)
 
         self.fleet.tap(on_fleet)
         if self.writer is not None and self.options.trace_devices:

@@ -37,11 +37,11 @@ class Clock:
     def __init__(self, zero: datetime) -> None:
         self._zero = zero
 
-    def until_next_hour_us(self, time_us: int) -> int:
-        """From a loop time to the next full hour of local time, above 0."""
+    def until_next_us(self, time_us: int, every_us: int) -> int:
+        """From a loop time to the next full ``every_us`` (a divisor of an hour) of local time, above 0."""
         local = self._zero + timedelta(microseconds=time_us)
         past_us = (local.minute * 60 + local.second) * 1_000_000 + local.microsecond
-        return 3_600_000_000 - past_us
+        return every_us - past_us % every_us
 
     def at(self, time_us: int) -> str:
         """Local time, to the second."""
@@ -122,7 +122,7 @@ def draw(site: Site, view: SiteView, clock: Clock, line: str) -> Group:
 
 
 class TerminalShow:
-    """A live picture where output is a terminal, else one plain line each simulated hour."""
+    """A live picture where output is a terminal, else one plain line each simulated hour, or oftener."""
 
     def __init__(self, site: Site, view: SiteView, clock: Clock, figures: Callable[[], str], console: Console) -> None:
         self._site = site
@@ -131,6 +131,7 @@ class TerminalShow:
         self._figures = figures
         self._console = console
         self._next_line_us = 0
+        self._every_us = 3_600_000_000
         self._last_s = 0.0
         self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
 
@@ -145,11 +146,16 @@ class TerminalShow:
         if self._live is not None:
             self._live.stop()
 
+    def every(self, every_us: int) -> None:
+        """From now on a line each ``every_us`` of simulated time, a divisor of an hour."""
+        self._every_us = every_us
+        self._next_line_us = 0
+
     def update(self, now_us: int) -> None:
         """Show the site as it is now, if it is time to."""
         if self._live is None:
             if now_us >= self._next_line_us:
-                self._next_line_us = now_us + self._clock.until_next_hour_us(now_us)
+                self._next_line_us = now_us + self._clock.until_next_us(now_us, self._every_us)
                 self._console.print(f"{self._clock.at(now_us)}  {self._figures()}", highlight=False, soft_wrap=True)
             return
         now_s = time.monotonic()

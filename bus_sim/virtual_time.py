@@ -106,6 +106,18 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         """Virtual microseconds."""
         return self._now_us
 
+    def set_pace(self, pace: float | None) -> None:
+        """Follow the wall clock from now on, ``pace`` virtual seconds to a wall second, or hurry where it is None.
+
+        Raises ``ValueError`` where ``pace`` is not positive.
+        """
+        if pace is not None and not pace > 0:
+            raise ValueError(f"pace {pace}: must be a positive number of virtual seconds a second, or None")
+        self.pace = pace
+        self._anchor = (time.monotonic(), self._now_us)
+        # What is due is looked at again under the new pace.
+        self._stop_asked = True
+
     def at_us(self, when_us: int, callback: Callable[[int], None]) -> None:
         """See ``Clock``; about twice as fast as ``call_at``."""
         heapq.heappush(self._timers, (max(when_us, self._now_us), next(self._sequence), None, callback))

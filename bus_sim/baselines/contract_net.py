@@ -58,7 +58,8 @@ class ContractNetParticipant:
             return []
         able = self.estimator.lower_bound(call, now_us) is not None
         proposal = self.estimator.estimate(call, now_us) if able else None
-        if proposal is None:
+        if not isinstance(proposal, Proposal):
+            # Contractors of the classic protocol know their cost by themselves.
             return [Send(Bid(self.node_id, call.sender, call.call, REFUSAL, 0))]
         self.proposals[key] = (call, proposal)
         return [

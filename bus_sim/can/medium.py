@@ -68,6 +68,8 @@ class Medium:
         self._corrupters = tuple(i for i in self.injectors if i.fault.kind is FaultKind.CORRUPTION)
         self._meter = LoadMeter(bit_rate, clock.now_us())
         self._taps: list[Tap] = []
+        #: Called by the nodes with every frame that they take for sending.
+        self.queue_taps: list[Tap] = []
         self._nodes: list[SimulatedBus] = []
         self._joining: list[SimulatedBus] = []
         self._offers: list[_Offer] = []
@@ -110,9 +112,17 @@ class Medium:
         """See every frame and error frame once, in wire order, without being on the bus: no ACK, no error flags."""
         self._taps.append(callback)
 
+    def tap_queues(self, callback: Tap) -> None:
+        """See every frame as a node takes it for sending, with the time and the node's name (response times)."""
+        self.queue_taps.append(callback)
+
     def statistics(self) -> BusStatistics:
         """What the bus carried up to now."""
         return self._meter.snapshot(self.clock.now_us())
+
+    def restart_statistics(self) -> None:
+        """Count from now on."""
+        self._meter = LoadMeter(self.bit_rate, self.clock.now_us())
 
     @property
     def is_silent(self) -> bool:

@@ -115,6 +115,8 @@ class SimulatedBus:
         else:
             self._send_refused += 1
             return False
+        for tap in self._medium.queue_taps:
+            tap(frame, self._medium.clock.now_us(), self.name)
         return True
 
     def health(self) -> BusHealth:

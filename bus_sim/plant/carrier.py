@@ -4,8 +4,9 @@ from collections.abc import Callable
 
 from bus_sim.plant.link import DeviceLink
 from bus_sim.plant.motion import Motion, braking, driving, standing
+from bus_sim.plant.shaft import PlatformBody
 from bus_sim.plant.timers import Timer, Timers
-from bus_sim.plant.world import Change, PlatformBody, RobotBody, World
+from bus_sim.plant.world import Change, RobotBody, World
 from onboard.core.codes import DriveMode
 from onboard.core.messages import DriveOrder, DriveState, Message
 from onboard.core.serial import is_newer
@@ -23,10 +24,13 @@ class Carrier:
     """Drive, position sensor and mark sensor of one robot's carrier.
 
     ``shuttle_home`` is the home switch wired to the drive (row P32): while it is open the drive refuses to move, and
-    brakes where it moves, in mode FAULT until the switch closes. ``fault`` says why in words. An order is taken up if
-    its sequence is the last one's or newer; any sequence counts after ``DRIVE_TIMEOUT_US`` without orders, as that of
-    a controller that started again. Repeating an order keeps it fresh. A DriveState follows on every change of mode, on
-    passing the middle or the border of a segment, and slowly otherwise.
+    brakes where it moves, in mode FAULT until the switch closes. So it does, until it takes up another order, for a
+    target beyond the end of its alley unless a platform stands there, whose shaft gate is open only then; and aboard a
+    platform that is not at a floor. ``fault`` says why in words.
+
+    An order is taken up if its sequence is the last one's or newer; any sequence counts after ``DRIVE_TIMEOUT_US``
+    without orders, as that of a controller that started again. Repeating an order keeps it fresh. A DriveState follows
+    on every change of mode, on passing the middle or the border of a segment, and slowly otherwise.
     """
 
     def __init__(
@@ -53,6 +57,7 @@ class Carrier:
         self._timer: Timer | None = None
         self._moving = False
         self._repeat_at_us = 0
+        self._told_mm = 0
         link.subscribe(self._on_message)
         world.watch(self._on_change)
 
@@ -83,6 +88,10 @@ class Carrier:
     @property
     def _axis(self) -> Axis:
         return self._site.carrier
+
+    @property
+    def _pitch_mm(self) -> int:
+        return self._site.tracks[self._world.axis_of(self.node_id)].pitch_mm
 
     def _move(self, motion: Motion) -> None:
         self._world.move_carrier(self.node_id, motion)
@@ -176,9 +185,23 @@ class Carrier:
         self._say(now_us)
 
     def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
-        """The home switch: opening stops a moving drive, closing ends the fault that it caused."""
-        if change is not Change.SHUTTLE or node_id != self.node_id:
-            return
+        if change is Change.SHUTTLE and node_id == self.node_id:
+            self._on_home_switch(now_us)
+        elif change is Change.PLATFORM:
+            self._on_platform(now_us)
+
+    def _on_platform(self, now_us: int) -> None:
+        """A shaft's gate opened or shut, perhaps after a ride to an alley of another length."""
+        if not self._moving:
+            if round(self._body.motion.final_mm) != self._told_mm:
+                self._say(now_us)
+        elif self._order is not None:
+            refusal = self._refusal(self._order)
+            if refusal:
+                self._fail(refusal, now_us)
+
+    def _on_home_switch(self, now_us: int) -> None:
+        """Opening stops a moving drive, closing ends the fault that it caused."""
         if not self._shuttle_home():
             if self._moving:
                 self._fail("the shuttle is out", now_us)
@@ -198,7 +221,9 @@ class Carrier:
         self._say(now_us)
 
     def _say(self, now_us: int) -> None:
-        self._link.send(self.state(now_us))
+        state = self.state(now_us)
+        self._told_mm = state.position_mm
+        self._link.send(state)
         self._repeat_at_us = now_us + REPEAT_US
         self._schedule(now_us)
 
@@ -213,7 +238,7 @@ class Carrier:
 
     def _next_mark_us(self, now_us: int) -> int:
         motion = self._body.motion
-        step_mm = self._site.tracks[self._body.track].pitch_mm / 2
+        step_mm = self._pitch_mm / 2
         nearest = round(motion.at(now_us)[0] / step_mm)
         reached = [motion.next_reach_us(mark * step_mm, now_us) for mark in (nearest - 1, nearest, nearest + 1)]
         return min((time for time in reached if time is not None), default=motion.end_us)

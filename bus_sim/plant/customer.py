@@ -13,7 +13,8 @@ from typing import ClassVar
 from bus_sim.demand import Stay
 from bus_sim.plant.bodies import DRIVER_S
 from bus_sim.plant.compartment import Compartment
-from bus_sim.plant.oracle import Oracle, Rule
+from bus_sim.plant.oracle import Oracle
+from bus_sim.plant.rules import Rule
 from bus_sim.plant.timers import Timer, Timers
 from bus_sim.plant.world import World
 from onboard.core.messages import Reference

@@ -101,6 +101,11 @@ class Motion:
                 return phase.position(t), phase.speed(t), phase.a
         return self.final_mm, 0.0, 0.0
 
+    def shifted(self, by_mm: float) -> "Motion":
+        """The same motion on an axis whose zero lies ``by_mm`` lower."""
+        phases = tuple(phase._replace(x=phase.x + by_mm) for phase in self.phases)
+        return Motion(self.start_us, phases, self.final_mm + by_mm) if by_mm else self
+
     def _position(self, t: float) -> float:
         return self.state(t)[0]
 

@@ -5,55 +5,15 @@ A run with any violation has failed.
 """
 
 from collections.abc import Iterator
-from enum import Enum
 from itertools import pairwise
-from typing import NamedTuple
 
 from bus_sim.plant.bodies import Aboard, Location
 from bus_sim.plant.motion import Motion
+from bus_sim.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Span, Violation
+from bus_sim.plant.shaft_rules import ShaftRules
 from bus_sim.plant.world import BayBody, Change, RobotBody, World
 from onboard.core.codes import DoorName, DoorPosition
 from onboard.core.site import Station, TrackKind
-
-#: Overlap below this, mm, is rounding.
-OVERLAP_TOLERANCE_MM = 1e-3
-
-
-class Rule(Enum):
-    """The invariants."""
-
-    BODIES_APART = "two bodies overlap on a track"
-    ON_TRACK = "a carrier leaves its track"
-    SHUTTLE_HOME_TO_MOVE = "a carrier moves while its shuttle is out"
-    ONE_DOOR = "both doors of a compartment are not locked"
-    NO_PERSON_TO_MACHINES = "a person is inside while the output door is not locked"
-    PERSON_BY_OPEN_DOOR = "a person passes a door that is not open"
-    BAY_BY_OPEN_DOOR = "a shuttle is in a bay whose output door is not open"
-    NO_WALL = "a shuttle reaches where there is no station"
-    ONE_CAR = "two cars are in one place"
-    CARS_CONSERVED = "a car is lost or doubled"
-    OWN_CAR = "a customer is given another's car"
-    LIFT_CRUSH = "a lift crushing what overhangs its sill"
-    FALL = "a carrier in a shaft without a platform"
-
-
-class Violation(NamedTuple):
-    """One broken invariant: when (us of loop time), which, and what exactly."""
-
-    time_us: int
-    rule: Rule
-    text: str
-
-    def __str__(self) -> str:
-        return f"{self.time_us / 1e6:.6f} s: {self.rule.value}: {self.text}"
-
-
-class Span(NamedTuple):
-    """A carrier's motion and from when on it holds."""
-
-    track: int
-    motion: Motion
-    from_us: int
 
 
 class Oracle:
@@ -68,12 +28,10 @@ class Oracle:
         self.take_stock()
         self._overlapping: set[tuple[int, int]] = set()
         self._present: set[tuple[Rule, str]] = set()
-        #: The floor at which each platform last stood, None while it is under way.
-        self._floors = {lift: world.platform_floor(lift) for lift in world.platforms}
-        self._alleys = {n for n, t in world.site.tracks.items() if t.kind is not TrackKind.LIFT}
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
             self._spans[node_id] = Span(robot.track, robot.motion, now_us)
+        self._shafts = ShaftRules(world, self._spans)
         self._judge_pairs(now_us)
         world.watch(self._on_change)
 
@@ -89,6 +47,7 @@ class Oracle:
         """Judge the motions up to now and the stock of cars; answers all violations of the run, in order of time."""
         now_us = self.world.timers.now_us()
         self._judge_pairs(now_us)
+        self.violations += self._shafts.judge(now_us)
         for node_id in self._spans:
             self._judge_track(node_id, now_us)
         self._judge_cars()
@@ -98,14 +57,13 @@ class Oracle:
     # --- after every change ------------------------------------------------------------------------------------
 
     def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
+        if change in (Change.CARRIER, Change.PLATFORM):
+            self.violations += self._shafts.judge(now_us)
         if change is Change.CARRIER:
-            self._judge_departure(node_id, now_us)
             self._judge_track(node_id, now_us)
             self._judge_pairs(now_us, node_id)
             robot = self.world.robots[node_id]
             self._spans[node_id] = Span(robot.track, robot.motion, now_us)
-        if change is Change.PLATFORM:
-            self._judge_platform(node_id, now_us)
         if change is Change.PERSON:
             self._judge_passage(node_id)
         if change is Change.CAR:
@@ -147,17 +105,6 @@ class Oracle:
             yield Rule.ONE_DOOR, f"compartment {node_id}: input {outer.name}, output {inner.name}"
         if bay.persons and inner is not DoorPosition.LOCKED:
             yield Rule.NO_PERSON_TO_MACHINES, f"compartment {node_id}"
-
-    def _judge_platform(self, node_id: int, now_us: int) -> None:
-        """A platform that begins to move must have nothing over its sill."""
-        platform = self.world.platforms[node_id]
-        floor = self._floors[node_id]
-        if now_us < platform.motion.end_us and floor is not None:
-            # Asked for this moment: since the last change a body may have run on over the sill and away from it.
-            over = self.world.over_sill(node_id, floor)
-            if over is not None:
-                self.report(Rule.LIFT_CRUSH, f"lift {node_id}, robot {over}")
-        self._floors[node_id] = self.world.platform_floor(node_id)
 
     def _judge_passage(self, node_id: int) -> None:
         bay = self.world.bays[node_id]
@@ -202,37 +149,19 @@ class Oracle:
     # --- whole motions, afterwards -----------------------------------------------------------------------------
 
     def _judge_track(self, node_id: int, now_us: int) -> None:
+        """A carrier's centre stays on its segments, and beyond them only in a shaft."""
         span = self._spans[node_id]
         track = self.world.site.tracks[span.track]
-        low, high = span.motion.extremes_mm(span.from_us, now_us)
-        if span.track not in self._alleys:
+        if track.kind is TrackKind.LIFT:
             return
-        end_mm = (track.length - 1) * track.pitch_mm
-        bottom, top = (
-            track.pitch_mm * (1.5 if self._shaft(span.track, side) else 0.5) for side in (-1.0, end_mm + 1.0)
-        )
-        if low < -bottom or high > end_mm + top:
+        low_mm, high_mm = -track.pitch_mm / 2, (track.length - 0.5) * track.pitch_mm
+        for sills in self.world.sills.values():
+            if span.track in sills:
+                far_mm = sills[span.track].centre_mm + sills[span.track].towards * track.pitch_mm / 2
+                low_mm, high_mm = min(low_mm, far_mm), max(high_mm, far_mm)
+        lowest_mm, highest_mm = span.motion.extremes_mm(span.from_us, now_us)
+        if lowest_mm < low_mm or highest_mm > high_mm:
             self._once(Rule.ON_TRACK, f"robot {node_id} on track {span.track}")
-
-    def _judge_departure(self, node_id: int, now_us: int) -> None:
-        """A carrier that sets out for a platform must have one there; that it stays is the lift's part."""
-        robot = self.world.robots[node_id]
-        if robot.track not in self._alleys:
-            return
-        track = self.world.site.tracks[robot.track]
-        low, high = robot.motion.extremes_mm(now_us, robot.motion.end_us)
-        for side_mm, beyond in ((low, low < -track.pitch_mm / 2), (high, high > (track.length - 0.5) * track.pitch_mm)):
-            lift = self._shaft(robot.track, side_mm)
-            if beyond and lift is not None and self.world.platform_floor(lift) != robot.track:
-                self._once(Rule.FALL, f"robot {node_id} on track {robot.track}")
-
-    def _shaft(self, floor: int, position_mm: float) -> int | None:
-        """The lift that serves an alley at the end that a position is nearer to, or beyond."""
-        for lift in self.world.platforms:
-            end_mm = self.world.end_mm(lift, floor)
-            if end_mm is not None and (end_mm < 0) == (position_mm < 0):
-                return lift
-        return None
 
     def _judge_pairs(self, now_us: int, node_id: int | None = None) -> None:
         """Least distance of every pair (with ``node_id``) since the last time one of them changed its motion."""

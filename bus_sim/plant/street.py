@@ -81,14 +81,14 @@ class Street:
         """Whether everybody who had a time to leave has left, and nobody waits for anything."""
         return all(c.state is State.GONE or self._stays_for_good(c) for c in self.customers)
 
-    def summary(self) -> Summary:
-        """What happened so far."""
+    def summary(self, since_us: int = 0) -> Summary:
+        """What happened so far, or since a loop time; waiting of those who came, or asked, since then."""
         visits = [customer.visit for customer in self.customers]
-        outcomes = [visit.outcome for visit in visits]
+        outcomes = [visit.outcome for visit in visits if _is_since(visit.gone_us, since_us)]
         states = [customer.state for customer in self.customers]
         return Summary(
-            arrived=sum(visit.arrived_us is not None for visit in visits),
-            parked=sum(visit.parked_us is not None for visit in visits),
+            arrived=sum(_is_since(visit.arrived_us, since_us) for visit in visits),
+            parked=sum(_is_since(visit.parked_us, since_us) for visit in visits),
             served=outcomes.count(Outcome.SERVED),
             inside=states.count(State.PARKED),
             queueing=states.count(State.QUEUEING),
@@ -96,12 +96,26 @@ class Street:
             refused_full=outcomes.count(Outcome.FULL),
             refused_too_large=outcomes.count(Outcome.TOO_LARGE),
             cancelled=outcomes.count(Outcome.CANCELLED),
-            in_wait_us=tuple(visit.in_wait_us for visit in visits if visit.in_wait_us is not None),
+            in_wait_us=self.in_waits_us(since_us),
             out_wait_us=tuple(
                 visit.out_wait_us
                 for visit in visits
-                if visit.out_wait_us is not None and visit.outcome is Outcome.SERVED
+                if visit.out_wait_us is not None
+                and visit.outcome is Outcome.SERVED
+                and _is_since(visit.asked_us, since_us)
             ),
+        )
+
+    def in_waits_us(self, since_us: int, until_us: int | None = None) -> tuple[int, ...]:
+        """Waiting of all who came from one loop time on, or until another, and have their ticket, in us."""
+        visits = [customer.visit for customer in self.customers]
+        return tuple(
+            visit.in_wait_us
+            for visit in visits
+            if visit.in_wait_us is not None
+            and visit.arrived_us is not None
+            and since_us <= visit.arrived_us
+            and (until_us is None or visit.arrived_us < until_us)
         )
 
     def _stays_for_good(self, customer: Customer) -> bool:
@@ -173,6 +187,10 @@ class Street:
             return
         customer.ticket = car
         self._by_ticket[car] = customer
+
+
+def _is_since(moment_us: int | None, since_us: int) -> bool:
+    return moment_us is not None and moment_us >= since_us
 
 
 def _came_us(customer: Customer) -> int:

@@ -11,12 +11,18 @@ from enum import Enum
 
 from bus_sim.plant.bodies import Aboard, CarBody, Location
 from bus_sim.plant.motion import Motion, standing
+from bus_sim.plant.shaft import PlatformBody, Sill, sills_of
 from bus_sim.plant.timers import Timers
 from onboard.core.codes import DoorName, DoorPosition, KindCode, Side
 from onboard.core.site import Segment, Site, Station
 
 #: Tolerance of the fine position sensor opposite a station, mm (row P34).
 MARK_TOLERANCE_MM = 5.0
+
+
+def is_at_mark(position_mm: float, pitch_mm: float) -> bool:
+    """Whether a position is within the fine sensor's tolerance of a mark; marks are ``pitch_mm`` apart, one at 0."""
+    return abs(position_mm - round(position_mm / pitch_mm) * pitch_mm) <= MARK_TOLERANCE_MM
 
 
 class Change(Enum):
@@ -49,15 +55,6 @@ class RobotBody:
 
 
 @dataclass
-class PlatformBody:
-    """A lift's platform as it is: its motion along the shaft of ``track``, and the robot that stands on it."""
-
-    track: int
-    motion: Motion
-    robot: int | None = None
-
-
-@dataclass
 class BayBody:
     """A compartment as it is. ``persons`` counts people inside; ``crossing`` a car with its body over the sill."""
 
@@ -78,6 +75,7 @@ class World:
         self.robots: dict[int, RobotBody] = {}
         self.bays: dict[int, BayBody] = {}
         self.platforms: dict[int, PlatformBody] = {}
+        self.sills: dict[int, dict[int, Sill]] = {}
         self.cars: dict[str, CarBody] = {}
         self.where: dict[str, Location] = {}
         self._watchers: list[Watcher] = []
@@ -89,6 +87,7 @@ class World:
             elif machine.kind is KindCode.LIFT:
                 start = standing(float(site.position_mm(machine.home)), now_us)
                 self.platforms[machine.node_id] = PlatformBody(machine.home.track, start)
+                self.sills[machine.node_id] = sills_of(site, machine.home.track)
             elif machine.kind is KindCode.COMPARTMENT and machine.station is not None:
                 self.bays[machine.node_id] = BayBody(machine.station)
 
@@ -110,26 +109,34 @@ class World:
         """Node-ID of the compartment whose bay this station is."""
         return next((node for node, bay in self.bays.items() if bay.station == station), None)
 
+    def axis_of(self, node_id: int) -> int:
+        """The track on whose axis a robot's position is: its own, and while it rides the alley where it boarded."""
+        riding = (platform.axis for platform in self.platforms.values() if platform.robot == node_id)
+        return next(riding, self.robots[node_id].track)
+
     def at_mark(self, node_id: int) -> bool:
-        """The fine sensor: whether a carrier's centre is opposite that of a segment, moving or not (row P34)."""
-        robot = self.robots[node_id]
-        pitch_mm = self.site.tracks[robot.track].pitch_mm
-        position_mm = robot.motion.at(self.timers.now_us())[0]
-        return abs(position_mm - round(position_mm / pitch_mm) * pitch_mm) <= MARK_TOLERANCE_MM
+        """The fine sensor: whether a carrier's centre is opposite a mark, moving or not (row P34).
+
+        Every segment has one, and every platform.
+        """
+        position_mm = self.robots[node_id].motion.at(self.timers.now_us())[0]
+        return is_at_mark(position_mm, self.site.tracks[self.axis_of(node_id)].pitch_mm)
+
+    def stands(self, node_id: int) -> bool:
+        """Whether a carrier's motion is at its end."""
+        return self.timers.now_us() >= self.robots[node_id].motion.end_us
 
     def standing_position(self, node_id: int) -> Segment | None:
-        """The mark at which a robot's carrier stands still; on a platform index 0 or length + 1 of the alley."""
+        """The mark at which a robot's carrier stands still; index 0 or length + 1 of an alley on a platform there.
+
+        None between marks, while it moves, and while it rides.
+        """
         robot = self.robots[node_id]
-        now_us = self.timers.now_us()
-        position_mm, speed = robot.motion.at(now_us)
-        if speed or now_us < robot.motion.end_us or robot.track not in self.site.tracks:
+        if self.is_riding(node_id) or not self.stands(node_id) or not self.at_mark(node_id):
             return None
         track = self.site.tracks[robot.track]
-        index = round(position_mm / track.pitch_mm) + 1
-        off_mm = abs(position_mm - (index - 1) * track.pitch_mm)
-        if off_mm > MARK_TOLERANCE_MM or not 0 <= index <= track.length + 1:
-            return None
-        return Segment(robot.track, index)
+        index = round(robot.motion.final_mm / track.pitch_mm) + 1
+        return Segment(robot.track, index) if 0 <= index <= track.length + 1 else None
 
     def standing_segment(self, node_id: int) -> Segment | None:
         """The segment at whose centre a robot's carrier stands still, within the fine sensor's tolerance."""
@@ -141,91 +148,95 @@ class World:
     # --- lifts -------------------------------------------------------------------------------------------------
 
     def platform_floor(self, node_id: int) -> int | None:
-        """The floor at whose mark a lift's platform stands still, None while it is between floors."""
+        """The floor at whose mark a lift's platform stands still, None while it is between floors or moves."""
         platform = self.platforms[node_id]
-        now_us = self.timers.now_us()
-        position_mm, speed = platform.motion.at(now_us)
-        if speed or now_us < platform.motion.end_us:
+        if self.timers.now_us() < platform.motion.end_us:
             return None
         track = self.site.tracks[platform.track]
-        index = round(position_mm / track.pitch_mm) + 1
-        if abs(position_mm - (index - 1) * track.pitch_mm) > MARK_TOLERANCE_MM:
+        if not is_at_mark(platform.motion.final_mm, track.pitch_mm):
             return None
-        return track.joins[index - 1].track
-
-    def end_mm(self, node_id: int, floor: int) -> float | None:
-        """Centre of a lift's platform on the axis of a floor's alley, None where it does not stop there."""
-        for sill in self.site.tracks[self.platforms[node_id].track].joins:
-            if sill.track == floor:
-                track = self.site.tracks[floor]
-                return float(-track.pitch_mm if sill.index == 1 else track.length * track.pitch_mm)
-        return None
+        index = round(platform.motion.final_mm / track.pitch_mm) + 1
+        return track.joins[index - 1].track if 1 <= index <= track.length else None
 
     def limits_mm(self, floor: int) -> tuple[float, float]:
         """How far a carrier may drive on an alley now: onto a platform only where one stands there."""
         track = self.site.tracks[floor]
         low_mm, high_mm = 0.0, float((track.length - 1) * track.pitch_mm)
         for node_id in self.platforms:
-            end_mm = self.end_mm(node_id, floor)
-            if end_mm is not None and self.platform_floor(node_id) == floor:
-                low_mm, high_mm = min(low_mm, end_mm), max(high_mm, end_mm)
+            if self.platform_floor(node_id) == floor:
+                centre_mm = self.sills[node_id][floor].centre_mm
+                low_mm, high_mm = min(low_mm, centre_mm), max(high_mm, centre_mm)
         return low_mm, high_mm
 
-    def aboard(self, node_id: int) -> int | None:
-        """The robot that stands wholly on a lift's platform."""
-        riding = self.platforms[node_id].robot
-        if riding is not None:
+    def on_platform(self, node_id: int) -> int | None:
+        """The robot whose body is wholly on a lift's platform, at its mark or not, moving or not."""
+        riding, floor = self.platforms[node_id].robot, self.platform_floor(node_id)
+        if riding is not None or floor is None:
             return riding
+        sill, length_mm = self.sills[node_id][floor], self.site.carrier_length_mm
+        play_mm = max(MARK_TOLERANCE_MM, (self.site.tracks[floor].pitch_mm - length_mm) / 2)
+        return next((node for node in self._on(floor) if abs(self._at(node) - sill.centre_mm) <= play_mm), None)
+
+    def aboard(self, node_id: int) -> int | None:
+        """The robot that stands wholly on a lift's platform, at its mark."""
+        robot_id = self.on_platform(node_id)
+        if robot_id is None or not self.stands(robot_id) or not self.at_mark(robot_id):
+            return None
+        return robot_id
+
+    def overhang(self, node_id: int) -> int | None:
+        """The robot whose body is over the sill of a lift at the floor where its platform stands."""
         floor = self.platform_floor(node_id)
         if floor is None:
             return None
-        end_mm = self.end_mm(node_id, floor)
-        for robot_id, robot in self.robots.items():
-            position = self.standing_position(robot_id)
-            stands = robot.track == floor and position is not None and end_mm is not None
-            if stands and abs(robot.motion.at(self.timers.now_us())[0] - (end_mm or 0.0)) <= MARK_TOLERANCE_MM:
-                return robot_id
-        return None
+        sill, length_mm = self.sills[node_id][floor], self.site.carrier_length_mm
+        beyond_mm = {node: sill.beyond_mm(self._at(node), length_mm) for node in self._on(floor)}
+        return next((node for node, over_mm in beyond_mm.items() if 0 < over_mm < length_mm), None)
 
-    def overhang(self, node_id: int) -> int | None:
-        """The robot whose body is over the sill of a lift at the floor where its platform is."""
+    def next_crossing_us(self, node_id: int) -> int | None:
+        """When, at the earliest, a body that is moving now begins or ends to be over the sill of a lift."""
         floor = self.platform_floor(node_id)
-        return self.over_sill(node_id, floor) if floor is not None else None
-
-    def over_sill(self, node_id: int, floor: int) -> int | None:
-        """The robot whose body is over the sill of a lift at a floor, wherever the platform is."""
-        end_mm = self.end_mm(node_id, floor)
-        if end_mm is None:
+        if floor is None:
             return None
-        pitch_mm, half_mm = self.site.tracks[floor].pitch_mm, self.site.carrier_length_mm / 2
-        edge_mm = -pitch_mm / 2 if end_mm < 0 else end_mm - pitch_mm / 2
-        for robot_id, robot in self.robots.items():
-            if robot.track == floor:
-                position_mm = robot.motion.at(self.timers.now_us())[0]
-                if position_mm - half_mm < edge_mm < position_mm + half_mm:
-                    return robot_id
-        return None
+        now_us, half_mm = self.timers.now_us(), self.site.carrier_length_mm / 2
+        edge_mm = self.sills[node_id][floor].edge_mm
+        motions = [self.robots[node].motion for node in self._on(floor)]
+        times = [motion.next_reach_us(edge_mm + off_mm, now_us) for motion in motions for off_mm in (-half_mm, half_mm)]
+        # At the very microsecond of touching, nothing is over the sill yet.
+        return min((time + 1 for time in times if time is not None), default=None)
 
     def is_riding(self, robot_id: int) -> bool:
-        """Whether the platform under a carrier is on its way."""
+        """Whether the platform under a carrier is between floors, moving or not."""
         return any(platform.robot == robot_id for platform in self.platforms.values())
 
     def move_platform(self, node_id: int, motion: Motion) -> None:
-        """A platform's motion from now on; whoever stands on it rides, and is on another alley when it stands again."""
+        """A platform's motion from now on; also called with a standing one when it has come to its end.
+
+        Whoever is wholly on it rides, on the shaft's track, and is on that floor's alley when it stands at a floor.
+        """
         platform = self.platforms[node_id]
-        robot_id = self.aboard(node_id)
+        robot_id = self.on_platform(node_id)
+        if robot_id is not None and platform.robot is None:
+            platform.axis = self.robots[robot_id].track
         platform.motion = motion
-        now_us = self.timers.now_us()
-        moving = now_us < motion.end_us
         if robot_id is not None:
-            robot = self.robots[robot_id]
-            platform.robot = robot_id if moving else None
-            floor = None if moving else self.platform_floor(node_id)
-            robot.track = platform.track if floor is None else floor
-            if not moving and floor is None:
-                platform.robot = robot_id
+            self._carry(platform, self.sills[node_id], robot_id, self.platform_floor(node_id))
             self._tell(Change.CARRIER, robot_id)
         self._tell(Change.PLATFORM, node_id)
+
+    def _carry(self, platform: PlatformBody, sills: dict[int, Sill], robot_id: int, floor: int | None) -> None:
+        robot = self.robots[robot_id]
+        if floor is None:
+            platform.robot, robot.track = robot_id, platform.track
+            return
+        robot.motion = robot.motion.shifted(sills[floor].centre_mm - sills[platform.axis].centre_mm)
+        platform.robot, robot.track = None, floor
+
+    def _on(self, track: int) -> list[int]:
+        return [node for node, robot in self.robots.items() if robot.track == track]
+
+    def _at(self, robot_id: int) -> float:
+        return self.robots[robot_id].motion.at(self.timers.now_us())[0]
 
     def station_beside(self, node_id: int, side: Side) -> Station | None:
         """The place or bay that a robot's shuttle would reach on one side; None for a wall, or between marks."""

@@ -15,7 +15,7 @@ from onboard.config.problems import Problems
 from onboard.config.reader import Table
 from onboard.config.room import check_room
 from onboard.core.codes import KindCode
-from onboard.core.site import Site, TrackKind
+from onboard.core.site import RideCalls, Site, TrackKind
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
@@ -42,6 +42,9 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     constants = read_constants(root, lift, layout.pitch_mm)
     robots = sum(1 for machine in fleet.by_node.values() if machine.kind is KindCode.ROBOT)
     timing = read_timing(root.table("timing"), robots, bitrate)
+    negotiation = root.table("negotiation")
+    rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "after"))
+    timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))
     _check_whole(root, layout, fleet)
     root.check_unknown()
     problems.raise_if_any()
@@ -62,6 +65,7 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
         floor_height_mm=floor_height_mm,
         cars=constants.cars,
         timing=timing,
+        rides=rides,
     )
     if not crowded:
         check_room(root, site, fleet)

@@ -5,17 +5,21 @@ newer than anything seen; nothing is taken back because of a time-out. A lost gr
 is heard, so losing frames costs time and never doubles a token.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import KindCode, Reason, TokenKind
+from onboard.core.codes import NOBODY, KindCode, Reason, TokenKind
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Segment, Site, Station
 
 _VERSION_BITS = 16
+#: Whoever was refused asks again after this many token repeats: the holder remembers the request. Ours.
+REFUSED_REPEATS = 5
+#: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst. Ours.
+IN_FLIGHT_US = 20_000
 
 
 class TokenKey(NamedTuple):
@@ -59,6 +63,22 @@ def genesis_holder(site: Site, key: TokenKey) -> int:
     return site.stewards.get(key.number >> 8, 0)
 
 
+class Claim(NamedTuple):
+    """What a request says beside the token.
+
+    ``itinerary_version`` is that of the firm itinerary that needs it, 0 for none; ``predecessor`` is who is believed to
+    pass right before.
+    """
+
+    itinerary_version: int
+    predecessor: int
+
+
+def no_claim(key: TokenKey) -> Claim:
+    """No plan needs the token, and nobody is believed to come first."""
+    return Claim(0, NOBODY)
+
+
 class Grant(NamedTuple):
     """A token on its way: said again until ``holder`` is heard under ``version`` or newer."""
 
@@ -82,8 +102,14 @@ class TokenBook:
     holder: dict[TokenKey, int] = field(default_factory=dict)
     wanted: dict[TokenKey, int] = field(default_factory=dict)
     refused: dict[TokenKey, Reason] = field(default_factory=dict)
+    #: What to say with a request for a token, from this node's plan and mirror.
+    claim: Callable[[TokenKey], Claim] = no_claim
+    #: Tokens asked for without an agreed order, and since when the holder's view of the order has differed from mine.
+    unordered: set[TokenKey] = field(default_factory=set)
+    behind_since_us: dict[TokenKey, int] = field(default_factory=dict)
     #: Grows with every change of the tables above, so that nobody need look twice at the same state.
     changes: int = 0
+    _genesis: dict[TokenKey, int] = field(default_factory=dict)
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
@@ -105,13 +131,13 @@ class TokenBook:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
         if key in self.held:
             return True
-        return key not in self.seen and genesis_holder(self.site, key) == self.node_id
+        return key not in self.seen and self._first_holder(key) == self.node_id
 
     def holder_of(self, key: TokenKey) -> int:
         """Who holds a token as far as this node heard: exact for its own, a hint for others."""
         if self.holds(key):
             return self.node_id
-        return self.holder.get(key, genesis_holder(self.site, key))
+        return self.holder.get(key, self._first_holder(key))
 
     def create(self, key: TokenKey) -> list[Effect]:
         """Bring a new token (of a car) into the world, held by this node. Raises ``ValueError`` where it exists."""
@@ -134,6 +160,7 @@ class TokenBook:
         self.changes += 1
         self.wanted.pop(key, None)
         self.refused.pop(key, None)
+        self.behind_since_us.pop(key, None)
 
     def give(self, key: TokenKey, to: int, now_us: int) -> list[Effect]:
         """Move a held token to node ``to``: erase, journal, then send. Raises ``ValueError`` where it is not held."""
@@ -151,6 +178,8 @@ class TokenBook:
         key = TokenKey(request.token_kind, request.token)
         pending = self.leaving.get(key)
         if pending is not None and pending.holder == request.sender:
+            if now_us < pending.repeat_at_us - self.site.timing.token_repeat_us + IN_FLIGHT_US:
+                return []
             return [Send(self._grant(key, pending.version, pending.holder))]
         if not self.holds(key):
             return []
@@ -162,7 +191,7 @@ class TokenBook:
     def on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         """Accept a token only if addressed to me and newer than anything seen; else learn where it went."""
         key = TokenKey(grant.token_kind, grant.token)
-        if not self._is_news(key, grant.version):
+        if not self.is_news(key, grant.version):
             return self._say_again(key, grant)
         self._learn(key, grant.version, grant.holder)
         if grant.holder != self.node_id:
@@ -182,30 +211,35 @@ class TokenBook:
         if pending is not None and pending.version == statement.version and pending.holder == statement.sender:
             del self.leaving[key]
             return [self._record("token_gone", key, statement.version, statement.sender)]
-        if self._is_news(key, statement.version):
+        if self.is_news(key, statement.version):
             self._learn(key, statement.version, statement.sender)
         return []
 
-    def on_refusal(self, refusal: TokenRefusal) -> None:
-        """Remember why the holder does not give a wanted token yet."""
+    def on_refusal(self, refusal: TokenRefusal, now_us: int) -> None:
+        """Remember why the holder does not give a wanted token yet; as it remembers the request, ask less often."""
         key = TokenKey(refusal.token_kind, refusal.token)
         if refusal.requester == self.node_id and key in self.wanted:
             self.refused[key] = refusal.reason
+            if refusal.reason is Reason.MIRROR_BEHIND:
+                self.behind_since_us.setdefault(key, now_us)
+            else:
+                self.behind_since_us.pop(key, None)
+            self.wanted[key] = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
             self.changes += 1
 
     def statements(self) -> list[Effect]:
         """What this node holds away from the site file's first holders, said for a node that asks."""
         return [Send(TokenHeld(self.node_id, key.kind, key.number, version)) for key, version in self.held.items()]
 
-    def wake(self, now_us: int, itinerary_version: int = 0) -> list[Effect]:
+    def wake(self, now_us: int) -> list[Effect]:
         """Say again what has waited long enough: wanted tokens, and grants whose receiver was not heard."""
         effects: list[Effect] = []
         repeat_us = self.site.timing.token_repeat_us
         for key, due_us in self.wanted.items():
             if due_us <= now_us:
                 self.wanted[key] = now_us + repeat_us
-                seen = self.seen.get(key, 0)
-                effects.append(Send(TokenRequest(self.node_id, key.kind, key.number, seen, itinerary_version, 0)))
+                claim = no_claim(key) if key in self.unordered else self.claim(key)
+                effects.append(Send(TokenRequest(self.node_id, *key, self.seen.get(key, 0), *claim)))
         for key, grant in self.leaving.items():
             if grant.repeat_at_us <= now_us:
                 self.leaving[key] = grant._replace(repeat_at_us=now_us + repeat_us)
@@ -217,8 +251,15 @@ class TokenBook:
         times = [*self.wanted.values(), *(grant.repeat_at_us for grant in self.leaving.values())]
         return min(times) if times else None
 
-    def _is_news(self, key: TokenKey, version: int) -> bool:
+    def is_news(self, key: TokenKey, version: int) -> bool:
+        """Whether ``version`` of a token is newer than anything seen of it."""
         return key not in self.seen or is_newer(version, self.seen[key], _VERSION_BITS)
+
+    def _first_holder(self, key: TokenKey) -> int:
+        found = self._genesis.get(key)
+        if found is None:
+            found = self._genesis[key] = genesis_holder(self.site, key)
+        return found
 
     def _learn(self, key: TokenKey, version: int, holder: int) -> None:
         # A newer version held elsewhere proves that my own grant arrived, or that my memory is older than the bus.

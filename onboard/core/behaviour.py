@@ -5,7 +5,7 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from onboard.core.authority import TokenBook, TokenKey
@@ -14,6 +14,7 @@ from onboard.core.effects import Effect
 from onboard.core.messages import Message
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent
+from onboard.core.petitions import Petitions
 from onboard.core.site import Machine, Site
 
 
@@ -27,6 +28,10 @@ class Fleet:
     mirror: Mirror
     negotiation: Negotiation
     entries: tuple[Mapping[str, str | int], ...] = ()
+    petitions: Petitions = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.petitions = Petitions(self.site.timing.token_repeat_us)
 
     @property
     def node_id(self) -> int:

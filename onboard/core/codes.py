@@ -50,6 +50,7 @@ class CallResult(IntEnum):
     REFUSED = 2
     WITHDRAWN = 3
     REJECTED = 4
+    OPTION = 5
 
 
 class Grade(IntEnum):

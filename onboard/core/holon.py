@@ -8,10 +8,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from onboard.core.authority import TokenBook, TokenKey, genesis_holder
+from onboard.core.authority import Claim, TokenBook, TokenKey, genesis_holder
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BusClock
-from onboard.core.codes import CONTRACT_VERSION, NOBODY, KindCode, MachineState, Reason
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
     Award,
@@ -34,11 +34,13 @@ from onboard.core.messages import (
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
-from onboard.core.serial import successor
-from onboard.core.site import Machine, Site
+from onboard.core.serial import is_newer, successor
+from onboard.core.site import Machine, Segment, Site
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
 DIGEST_PATIENCE = 2
+#: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
+ASK_AGAIN_US = 1_000_000
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
 #: Bus time on the wire has 48 bits of microseconds: 8.9 years.
@@ -70,6 +72,7 @@ class Holon:
         self.tokens = TokenBook(site, machine.node_id)
         entries = tuple(entries)
         self.tokens.replay(entries)
+        self._has_past = any(entry.get("record") == "boot" for entry in entries)
         self.mirror = Mirror(site, machine.node_id)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
@@ -82,6 +85,8 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self.tokens.claim = self._claim
+        self._asked_again_us: dict[int, int] = {}
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
         self._mismatches: Counter[int] = Counter()
@@ -91,7 +96,7 @@ class Holon:
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             TokenRequest: self._on_token_request,
             TokenGrant: self._on_token_grant,
-            TokenHeld: lambda message, now_us: self.tokens.on_held(message),
+            TokenHeld: self._on_token_held,
             TokenRefusal: self._on_token_refusal,
             CallForProposals: self._negotiate,
             Bid: self._negotiate,
@@ -145,7 +150,7 @@ class Holon:
         """Do what has fallen due."""
         self._elect_time_source(local_us)
         now_us = self.clock.bus_us(local_us)
-        effects = self.tokens.wake(now_us, self.behaviour.itinerary_version)
+        effects = self.tokens.wake(now_us) + self._serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if not self._bus_time_lost:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
@@ -158,6 +163,7 @@ class Holon:
             self._heartbeat_due_us,
             self._bus_time_due_us,
             self.tokens.next_wake(),
+            self._petition_due(),
             self._negotiation_due(),
             self.behaviour.next_wake(),
         ]
@@ -198,20 +204,70 @@ class Holon:
 
     def _on_token_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
         key = TokenKey(request.token_kind, request.token)
-        if self.tokens.holds(key):
-            verdict = self.behaviour.may_grant(key, request.sender, now_us)
-        else:
-            verdict = Reason.TOKEN_HELD_BY_OTHER
-        return self.tokens.on_request(request, verdict, now_us)
+        petitions = self.fleet.petitions
+        petitions.hear(key, request, now_us)
+        if not self.tokens.holds(key):
+            return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
+        verdict = self.behaviour.may_grant(key, request.sender, now_us)
+        effects = self.tokens.on_request(request, verdict, now_us)
+        if verdict is Reason.MIRROR_BEHIND:
+            effects += self._ask_again(key, request, now_us)
+        return effects
+
+    def _ask_again(self, key: TokenKey, request: TokenRequest, now_us: int) -> list[Effect]:
+        """The requester and I see another order: those whom it is about say again what they plan and where they are."""
+        about = [request.sender, request.predecessor, self._claim(key, request.sender).predecessor]
+        effects: list[Effect] = []
+        for node in dict.fromkeys(about):
+            asked_us = self._asked_again_us.get(node)
+            if node in (NOBODY, self.node_id) or (asked_us is not None and now_us < asked_us + ASK_AGAIN_US):
+                continue
+            self._asked_again_us[node] = now_us
+            effects.append(Send(SyncRequest(self.node_id, node)))
+        return effects
+
+    def _claim(self, key: TokenKey, node: int | None = None) -> Claim:
+        """What a node's plan says about a segment's token as I see it; by default mine."""
+        itinerary = self.mirror.itineraries.get(self.node_id if node is None else node)
+        if itinerary is None or key.kind is not TokenKind.SEGMENT:
+            return Claim(0 if itinerary is None else itinerary.version, NOBODY)
+        segment = Segment(key.number >> 8, key.number & 0xFF)
+        return Claim(itinerary.version, self.mirror.order.predecessor(itinerary.sender, segment) or NOBODY)
+
+    def _serve_petitions(self, now_us: int) -> list[Effect]:
+        """Look again at requests that were refused: what stood against them may be over."""
+        effects: list[Effect] = []
+        for key in list(self.fleet.petitions.open):
+            for requester in self.fleet.petitions.due(key, now_us) if self.tokens.holds(key) else ():
+                if self.tokens.holds(key) and self.behaviour.may_grant(key, requester, now_us) is Reason.NONE:
+                    effects += self.tokens.give(key, requester, now_us)
+        return effects
+
+    def _petition_due(self) -> int | None:
+        waiting = self.fleet.petitions.open.items()
+        return min((one.due_us for key, by in waiting if self.tokens.holds(key) for one in by.values()), default=None)
 
     def _on_token_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
-        if genesis_holder(self.site, TokenKey(grant.token_kind, grant.token)) == NOBODY:
+        key = TokenKey(grant.token_kind, grant.token)
+        if genesis_holder(self.site, key) == NOBODY:
             self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
-        return self.tokens.on_grant(grant, now_us)
+        if self.tokens.is_news(key, grant.version):
+            if key.kind is TokenKind.SEGMENT:
+                self.mirror.order.on_return(grant.sender, Segment(key.number >> 8, key.number & 0xFF))
+            self.fleet.petitions.close(key, grant.holder)
+        effects = self.tokens.on_grant(grant, now_us)
+        if not self.tokens.holds(key):
+            return effects
+        self.fleet.petitions.returned(key, now_us)
+        return effects + self._serve_petitions(now_us)
+
+    def _on_token_held(self, statement: TokenHeld, now_us: int) -> list[Effect]:
+        self.fleet.petitions.close(TokenKey(statement.token_kind, statement.token), statement.sender)
+        return self.tokens.on_held(statement)
 
     def _on_token_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
-        self.tokens.on_refusal(refusal)
+        self.tokens.on_refusal(refusal, now_us)
         return []
 
     def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
@@ -246,7 +302,7 @@ class Holon:
         fresh = self.mirror.on_heartbeat(beat, now_us)
         self._elect_time_source(self.clock.local_us(now_us))
         if fresh:
-            return [Send(SyncRequest(self.node_id, beat.sender))]
+            return [Send(SyncRequest(self.node_id, beat.sender, self.mirror.boots_before[beat.sender]))]
         if beat.mirror_digest == self.mirror.digest():
             del self._mismatches[beat.sender]
             return []
@@ -259,11 +315,20 @@ class Holon:
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
             return []
+        if request.whom == self.node_id and self._has_forgotten(request.boot_before):
+            return self._halt(
+                f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
+                "a person must regenerate its tokens"
+            )
         effects = self.behaviour.statements(now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
             effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
         return effects
+
+    def _has_forgotten(self, boot_before: int) -> bool:
+        """Whether my journal lacks a life that a peer knew: tokens that I gave away then would seem to be mine."""
+        return boot_before != 0 and (not self._has_past or is_newer(boot_before, self.boot, 8))
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")

@@ -41,6 +41,10 @@ class Reference(NamedTuple):
     number: int
 
 
+#: No task, no car, no call.
+NO_REFERENCE = Reference(0, 0)
+
+
 @dataclass(frozen=True, slots=True)
 class Message:
     """Base of all messages; ``sender`` is a node-ID."""
@@ -108,10 +112,15 @@ class BusTime(Message):
 
 @dataclass(frozen=True, slots=True)
 class CallForProposals(Message):
-    """A call: frames ``Call``, ``CallTerms``, ``CallLoad``.
+    """A call: frames ``Call``, ``CallTerms``, ``CallLoad``, and for a sub-call (``depth`` not 0) ``CallParent``.
 
     ``call`` is the initiator's call number; a call opened again has a new one and ``attempt`` one more.
-    ``from_station`` and ``to_station`` are station numbers or ``ANY_STATION``. ``wheelbase_mm`` is that of the car.
+    ``from_station`` and ``to_station`` are station numbers or ``ANY_STATION``. ``wheelbase_mm`` is that of the car,
+    0 where none is meant.
+
+    A sub-call is ``part`` 1, 2, ... of the call ``parent`` (initiator, call). It can begin ``ready_ms`` after its own
+    deadline (in steps of 100 ms); its winner holds the bid as an option for ``hold_ms`` after it (in steps of 250 ms),
+    or is awarded at once where that is 0.
     """
 
     call: int
@@ -126,6 +135,10 @@ class CallForProposals(Message):
     to_station: int
     car: Reference
     wheelbase_mm: int
+    parent: Reference = NO_REFERENCE
+    part: int = 0
+    ready_ms: int = 0
+    hold_ms: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,9 +249,13 @@ class CarAt(Message):
 
 @dataclass(frozen=True, slots=True)
 class SyncRequest(Message):
-    """Asks node ``whom`` (0: all) to state again what it vouches for: itinerary, cars, tokens it holds."""
+    """Asks node ``whom`` (0: all) to state again what it vouches for: itinerary, place, cars, tokens it holds.
+
+    ``boot_before`` is the boot counter that the sender knew of it before its present one, 0 for none.
+    """
 
     whom: int
+    boot_before: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,8 @@ from onboard.core.lift_uses import standing_after
 from onboard.core.lifts import lift_tracks
 from onboard.core.messages import CarAt, Heartbeat, Itinerary, Progress, Reference
 from onboard.core.occupancy import final_position, itinerary_windows, lift_uses
+from onboard.core.passing import Plan, next_plan
+from onboard.core.passing_order import PassingOrder
 from onboard.core.reservations import Reservations
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, Station
@@ -62,17 +64,28 @@ class Mirror:
     node_id: int
     peers: dict[int, Peer] = field(default_factory=dict)
     itineraries: dict[int, Itinerary] = field(default_factory=dict)
+    #: The same with when their first legs began, and what each replaced: the order of passing comes from there.
+    plans: dict[int, Plan] = field(default_factory=dict)
+    replaced: dict[int, Plan] = field(default_factory=dict)
     cars: dict[Reference, CarRecord] = field(default_factory=dict)
     progress: dict[int, Progress] = field(default_factory=dict)
+    #: Boot counter of each node's life before the present one, 0 where I knew of none.
+    boots_before: dict[int, int] = field(default_factory=dict)
     reservations: Reservations = field(default_factory=Reservations)
+    order: PassingOrder = field(init=False)
     _digest: int | None = None
+
+    def __post_init__(self) -> None:
+        self.order = PassingOrder(self.site)
 
     def on_heartbeat(self, beat: Heartbeat, now_us: int) -> bool:
         """Note a sign of life; True where the sender is new or was restarted, so that its statements are wanted."""
         known = self.peers.get(beat.sender)
-        fresh = known is None or known.boot != beat.boot
+        starts = beat.state is MachineState.STARTING and known is not None and known.state is not MachineState.STARTING
+        fresh = known is None or known.boot != beat.boot or starts
         if fresh:
             self._drop_itinerary(beat.sender)
+            self.boots_before[beat.sender] = known.boot if known is not None else 0
         self.peers[beat.sender] = Peer(
             beat.kind, beat.state, beat.boot, beat.mirror_digest, now_us, beat.contract, beat.site_digest
         )
@@ -86,18 +99,28 @@ class Mirror:
         if known is not None and not is_newer(itinerary.version, known.version, 8):
             return False
         self.itineraries[itinerary.sender] = itinerary
+        plan = self._take_up(itinerary, now_us)
         self.reservations.release(itinerary.sender)
         self.reservations.reserve(
             itinerary.sender,
-            itinerary_windows(self.site, itinerary, now_us),
-            lift_uses(self.site, itinerary, now_us),
+            itinerary_windows(self.site, itinerary, now_us, plan.first_begin_us),
+            lift_uses(self.site, itinerary, now_us, plan.first_begin_us),
         )
         self._digest = None
         return True
 
+    def _take_up(self, itinerary: Itinerary, now_us: int) -> Plan:
+        known = self.plans.get(itinerary.sender)
+        if known is not None:
+            self.replaced[itinerary.sender] = known
+        plan = self.plans[itinerary.sender] = next_plan(known, itinerary, now_us)
+        self.order.on_plan(plan, now_us)
+        return plan
+
     def on_progress(self, progress: Progress) -> None:
-        """Last known position of another machine."""
+        """Last known position of a machine, my own included."""
         self.progress[progress.sender] = progress
+        self.order.on_progress(progress)
 
     def on_car(self, statement: CarAt) -> bool:
         """Take up a custodian's statement; True where it changed anything."""
@@ -105,12 +128,10 @@ class Mirror:
         record = CarRecord(statement.station, statement.sender, statement.version, statement.wheelbase_mm)
         if known == record:
             return False
-        if (
-            known is not None
-            and statement.version != known.version
-            and not is_newer(statement.version, known.version, 16)
-        ):
-            return False
+        if known is not None and not is_newer(statement.version, known.version, 16):
+            # One version of a car's token has one custodian: whoever else speaks under it is wrong.
+            if statement.version != known.version or statement.sender != known.custodian:
+                return False
         self.cars[statement.car] = record
         self._digest = None
         self._prune_gone()
@@ -173,5 +194,7 @@ class Mirror:
 
     def _drop_itinerary(self, node: int) -> None:
         # Its body is still somewhere: the reservation stays until its first new itinerary replaces it.
+        self.plans.pop(node, None)
+        self.replaced.pop(node, None)
         if self.itineraries.pop(node, None) is not None:
             self._digest = None

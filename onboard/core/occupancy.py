@@ -123,23 +123,43 @@ class _Part(NamedTuple):
     end_us: int
 
 
-def itinerary_windows(site: Site, itinerary: Itinerary, now_us: int) -> list[Window]:
+def itinerary_windows(
+    site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
+) -> list[Window]:
     """All windows of an itinerary; after the last leg the machine stands where it ends, without end.
 
-    Legs on tracks that the site does not have, and the times that they would take, are passed over: an itinerary from
-    the wire never raises.
+    The first leg begins at ``first_begin_us``, by default when the task was awarded. Legs on tracks that the site does
+    not have, and the times that they would take, are passed over: an itinerary from the wire never raises.
     """
-    return [window for part in _parts(site, itinerary, now_us) for window in _part_windows(site, part)]
+    parts = _parts(site, itinerary, now_us, first_begin_us)
+    return [window for part in parts for window in _part_windows(site, part)]
 
 
-def lift_uses(site: Site, itinerary: Itinerary, now_us: int) -> list[Use]:
+def leg_windows(
+    site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
+) -> list[tuple[Window, ...]]:
+    """The same windows leg by leg, those of the standing behind the last leg at the end."""
+    return [tuple(_part_windows(site, part)) for part in _parts(site, itinerary, now_us, first_begin_us)]
+
+
+def leg_begins_us(itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> list[int]:
+    """When each leg begins, bus time in us: the first at ``first_begin_us``, each other when the one before ends."""
+    begins_us = []
+    begin_us = _award_us(itinerary, now_us) if first_begin_us is None else first_begin_us
+    for leg in itinerary.legs:
+        begins_us.append(begin_us)
+        begin_us = max(begin_us, from_bus_ms(leg.end_ms, now_us))
+    return begins_us
+
+
+def lift_uses(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> list[Use]:
     """Every use of a lift that an itinerary makes, in order: from the first window on its platform to the last.
 
     Floors are those at which it boards and leaves; for one that begins or ends aboard, those where it then stands.
     """
     uses: list[Use] = []
     aboard = False
-    for part in _parts(site, itinerary, now_us):
+    for part in _parts(site, itinerary, now_us, first_begin_us):
         for window in _part_windows(site, part):
             if window.segment.index != PLATFORM_INDEX:
                 continue
@@ -162,8 +182,12 @@ def final_position(site: Site, itinerary: Itinerary) -> Segment | None:
     return ends[-1] if ends else None
 
 
-def _parts(site: Site, itinerary: Itinerary, now_us: int) -> Iterator[_Part]:
-    begin_us = from_bus_ms(itinerary.stamp.award_ms, now_us)
+def _award_us(itinerary: Itinerary, now_us: int) -> int:
+    return from_bus_ms(itinerary.stamp.award_ms, now_us)
+
+
+def _parts(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> Iterator[_Part]:
+    begin_us = _award_us(itinerary, now_us) if first_begin_us is None else first_begin_us
     here: Segment | None = None
     for leg in itinerary.legs:
         if leg.track not in site.tracks:

@@ -123,6 +123,18 @@ class Timing:
     door_us: int
     grip_us: int
     drive_refresh_us: int
+    #: Share of the time left for a bid that its sub-calls may take, per cent.
+    sub_call_percent: int = 50
+
+
+class RideCalls(Enum):
+    """When a robot asks lifts for the rides of a task (row P39).
+
+    AFTER winning it, when everybody's itineraries have told enough before; BEFORE its bid, by sub-calls as options.
+    """
+
+    AFTER = "after"
+    BEFORE = "before"
 
 
 @dataclass(frozen=True)
@@ -150,6 +162,7 @@ class Site:
     floor_height_mm: int
     cars: CarLimits
     timing: Timing
+    rides: RideCalls = RideCalls.AFTER
 
     @property
     def compartments(self) -> dict[int, Station]:

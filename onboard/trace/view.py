@@ -147,7 +147,7 @@ class SiteView:
         if record is None:
             return
         record.awards += 1
-        if record.result is not None:
+        if record.result is not None or award.result is CallResult.OPTION:
             return
         record.result, record.winner, record.reason = award.result, award.winner, award.reason
         self.calls_closed[award.result] += 1

@@ -12,13 +12,15 @@ from operator import attrgetter
 from typing import Any, NamedTuple, cast, get_type_hints
 
 from onboard.core import messages as m
-from onboard.core.codes import Reason
+from onboard.core.codes import Grade, Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import Leg, Message, Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts
 
 _NODE_MASK = 0xFF
+#: What a call says where no car is meant (dbc/fleet.dbc); no site takes cars so short.
+NO_WHEELBASE_MM = 1500
 #: Decoded frames kept for the other receivers of the same frame: a simulated fleet decodes each frame once.
 _MEMORY = 4096
 
@@ -71,6 +73,7 @@ _PART_TYPES: dict[str, dict[str, Any]] = {
     "Call": get_type_hints(m.CallForProposals),
     "CallTerms": get_type_hints(m.CallForProposals),
     "CallLoad": get_type_hints(m.CallForProposals),
+    "CallParent": get_type_hints(m.CallForProposals),
     "ItineraryHead": get_type_hints(m.Itinerary),
     "ItineraryLeg": get_type_hints(Leg),
 }
@@ -214,17 +217,25 @@ class Codec:
             "criterion": call.criterion,
             "attempt": call.attempt,
             "depth": call.depth,
+            "part": call.part,
             "deadline_ms": call.deadline_ms,
             "from_station": call.from_station,
             "to_station": call.to_station,
             "car_origin": call.car.origin,
             "car_number": call.car.number,
-            "wheelbase_mm": call.wheelbase_mm or 1500,
+            "wheelbase_mm": _wheelbase_mm(call),
+            "parent_origin": call.parent.origin,
+            "parent_number": call.parent.number,
+            "ready_ms": call.ready_ms,
+            "hold_ms": call.hold_ms,
         }
-        return tuple(self._pack(name, call.sender, values) for name in ("Call", "CallTerms", "CallLoad"))
+        names = ("Call", "CallTerms", "CallLoad", "CallParent") if call.depth else ("Call", "CallTerms", "CallLoad")
+        return tuple(self._pack(name, call.sender, values) for name in names)
 
     def _encode_itinerary(self, itinerary: m.Itinerary) -> tuple[Frame, ...]:
         stamp = itinerary.stamp
+        if itinerary.grade is Grade.RELEASED and itinerary.legs:
+            raise ValueError(f"ItineraryHead.legs = {len(itinerary.legs)}: a released itinerary has none")
         head = {
             "version": itinerary.version,
             "grade": itinerary.grade,
@@ -305,6 +316,12 @@ class Codec:
     def field_names(self, name: str) -> tuple[str, ...]:
         """Signal names of a DBC message in the order of ``Part.values``."""
         return tuple(field.name for field in self._by_name[name].fields)
+
+
+def _wheelbase_mm(call: m.CallForProposals) -> int:
+    if call.wheelbase_mm == NO_WHEELBASE_MM:
+        raise ValueError(f"CallLoad.wheelbase_mm = {NO_WHEELBASE_MM}: means no car, which is 0 in a call")
+    return call.wheelbase_mm or NO_WHEELBASE_MM
 
 
 @cache

@@ -4,18 +4,20 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
-from onboard.core.codes import Reason
+from onboard.core.codes import Grade, Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS
-from onboard.wire.codec import Codec, Part
+from onboard.wire.codec import NO_WHEELBASE_MM, Codec, Part
 
 #: A set whose frames do not all come within this is dropped, us. A set is sent in one go: milliseconds.
 SET_TIMEOUT_US = 1_000_000
-#: Most incomplete sets kept; beyond it the oldest is dropped. Bounds the memory that a babbling node can take.
+#: Most incomplete sets kept, and as many whole ones; beyond it the oldest is dropped. Bounds the memory that a babbling
+#: node can take.
 MAX_SETS = 256
 
-_CALL_PARTS = frozenset({"Call", "CallTerms", "CallLoad"})
+_CALL_PARTS = frozenset({"Call", "CallTerms", "CallLoad", "CallParent"})
+_EVERY_CALLS_PARTS = _CALL_PARTS - {"CallParent"}
 
 
 @dataclass
@@ -33,6 +35,8 @@ class Decoder:
         self.drops: Counter[Reason] = Counter()
         self._codec = codec
         self._sets: dict[tuple[str, int, int], _Set] = {}
+        #: Sets that were whole, from then on: what is said twice on a bus may come twice.
+        self._whole: dict[tuple[str, int, int], _Set] = {}
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
@@ -42,7 +46,7 @@ class Decoder:
         if isinstance(part, Reason):
             self.drops[part] += 1
             return None
-        if self._sets:
+        if self._sets or self._whole:
             self._expire(now_us)
         if part.name in _CALL_PARTS:
             return self._feed_call(part, now_us)
@@ -52,14 +56,19 @@ class Decoder:
         key = ("call", part.sender, part.values[0])
         # Another call under this number, from a sender that has lost count: nothing of the older one may complete it.
         self._drop_other(key, part.name, part.values)
-        collected = self._open(key, now_us)
-        collected.parts[part.name] = part.values
-        if len(collected.parts) < len(_CALL_PARTS):
+        if part.name != "Call" and self._is_repeat(key, part.name, part.values):
             return None
-        del self._sets[key]
-        call, task_origin, task_number, operation, kind, criterion, attempt, depth = collected.parts["Call"]
+        collected = self._open(key, now_us, begins=part.name == "Call")
+        collected.parts[part.name] = part.values
+        if not _is_whole_call(collected.parts):
+            return None
+        self._complete(key, now_us)
+        call, task_origin, task_number, operation, kind, criterion, attempt, depth, part_number = collected.parts[
+            "Call"
+        ]
         _, deadline_ms, from_station = collected.parts["CallTerms"]
         _, to_station, car_origin, car_number, wheelbase_mm = collected.parts["CallLoad"]
+        _, parent_origin, parent_number, ready_ms, hold_ms = collected.parts.get("CallParent", (call, 0, 0, 0, 0))
         return CallForProposals(
             part.sender,
             call,
@@ -73,7 +82,11 @@ class Decoder:
             from_station,
             to_station,
             Reference(car_origin, car_number),
-            wheelbase_mm,
+            0 if wheelbase_mm == NO_WHEELBASE_MM else wheelbase_mm,
+            Reference(parent_origin, parent_number),
+            part_number,
+            ready_ms,
+            hold_ms,
         )
 
     def _feed_itinerary(self, part: Part, now_us: int) -> Message | None:
@@ -81,20 +94,24 @@ class Decoder:
         if part.name == "ItineraryHead":
             # Another head under this version begins the set anew: legs of the older one must not complete it.
             self._drop_other(key, -1, part.values)
-            collected = self._open(key, now_us)
+            if part.values[1] is Grade.RELEASED and part.values[2]:
+                self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+                return None
+            collected = self._open(key, now_us, begins=True)
             collected.parts[-1] = part.values
         else:
             self._drop_other(key, part.values[2], part.values)
             found = self._sets.get(key)
             if found is None:
-                self.drops[Reason.INCOMPLETE_SET] += 1
+                if not self._is_repeat(key, part.values[2], part.values):
+                    self.drops[Reason.INCOMPLETE_SET] += 1
                 return None
             collected = found
             collected.parts[part.values[2]] = part.values
         version, grade, count, award_ms, initiator, call = collected.parts[-1]
         if any(number not in collected.parts for number in range(count)):
             return None
-        del self._sets[key]
+        self._complete(key, now_us)
         legs = tuple(_leg(collected.parts[number], award_ms) for number in range(count))
         return Itinerary(part.sender, version, grade, Stamp(award_ms, initiator, call), legs)
 
@@ -105,23 +122,50 @@ class Decoder:
             del self._sets[key]
             self.drops[Reason.INCOMPLETE_SET] += 1
 
-    def _open(self, key: tuple[str, int, int], now_us: int) -> _Set:
-        collected = self._sets.get(key)
+    def _is_repeat(self, key: tuple[str, int, int], name: str | int, values: tuple[Any, ...]) -> bool:
+        """Whether no set is open and the last whole one had this very part: doubled on the wire, or said again."""
+        whole = self._whole.get(key)
+        return key not in self._sets and whole is not None and whole.parts.get(name) == values
+
+    def _open(self, key: tuple[str, int, int], now_us: int, *, begins: bool) -> _Set:
+        """The set of a frame. One that ``begins`` a set and comes again says that all of it is being sent again."""
+        collected = self._sets.pop(key, None) if begins else self._sets.get(key)
         if collected is None:
-            collected = self._sets[key] = _Set(now_us)
-            if len(self._sets) > MAX_SETS:
+            collected = _Set(now_us)
+            if len(self._sets) >= MAX_SETS:
                 del self._sets[next(iter(self._sets))]
                 self.drops[Reason.INCOMPLETE_SET] += 1
+        elif begins:
+            collected.started_us = now_us
+        self._sets[key] = collected
         return collected
+
+    def _complete(self, key: tuple[str, int, int], now_us: int) -> None:
+        self._whole.pop(key, None)
+        self._whole[key] = self._sets.pop(key)
+        self._whole[key].started_us = now_us
+        if len(self._whole) > MAX_SETS:
+            del self._whole[next(iter(self._whole))]
 
     def _expire(self, now_us: int) -> None:
         """Sets are in the order of their start, so only the first ones can be too old."""
-        while self._sets:
-            key = next(iter(self._sets))
-            if now_us - self._sets[key].started_us <= SET_TIMEOUT_US:
-                return
-            del self._sets[key]
+        while self._sets and _is_old(self._sets, now_us):
+            del self._sets[next(iter(self._sets))]
             self.drops[Reason.INCOMPLETE_SET] += 1
+        while self._whole and _is_old(self._whole, now_us):
+            del self._whole[next(iter(self._whole))]
+
+
+def _is_old(sets: dict[tuple[str, int, int], _Set], now_us: int) -> bool:
+    return now_us - sets[next(iter(sets))].started_us > SET_TIMEOUT_US
+
+
+def _is_whole_call(parts: dict[str | int, tuple[Any, ...]]) -> bool:
+    """Whether all frames are there: a sub-call, and no other, has the fourth."""
+    if not all(name in parts for name in _EVERY_CALLS_PARTS):
+        return False
+    depth = parts["Call"][7]
+    return depth == 0 or "CallParent" in parts
 
 
 def _leg(values: tuple[Any, ...], award_ms: int) -> Leg:

@@ -52,7 +52,8 @@ def test_a_request_is_granted_once_and_a_lost_grant_is_said_again() -> None:
     first = said(steward.on_request(request, Reason.NONE, 0))
     again = said(steward.wake(SITE.timing.token_repeat_us))
     assert again == first
-    assert said(steward.on_request(request, Reason.NONE, 10)) == first
+    assert said(steward.on_request(request, Reason.NONE, SITE.timing.token_repeat_us + 10)) == []
+    assert said(steward.on_request(request, Reason.NONE, SITE.timing.token_repeat_us * 3 // 2)) == first
     (grant,) = first
     assert isinstance(grant, TokenGrant)
     (held,) = said(alice.on_grant(grant, 20))
@@ -68,7 +69,7 @@ def test_a_refusal_tells_the_requester_why() -> None:
     assert isinstance(request, TokenRequest)
     (refusal,) = said(steward.on_request(request, Reason.TOKEN_NOT_GRANTABLE_YET, 0))
     assert isinstance(refusal, TokenRefusal)
-    alice.on_refusal(refusal)
+    alice.on_refusal(refusal, 0)
     state = MotionState(alice, position_known=True, stopped=False)
     assert authorised(state, SEGMENT) == (False, Reason.TOKEN_NOT_GRANTABLE_YET)
 

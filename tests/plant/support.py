@@ -8,11 +8,13 @@ from typing import TypeVar
 from bus_sim.plant.bodies import CarBody
 from bus_sim.plant.carrier import Carrier
 from bus_sim.plant.compartment import Compartment
+from bus_sim.plant.lift import LiftDrive
 from bus_sim.plant.link import MessageHandler
 from bus_sim.plant.oracle import Oracle
 from bus_sim.plant.shuttle import Shuttle
 from bus_sim.plant.street import Street
 from bus_sim.plant.world import World
+from onboard.config.site import parse_site
 from onboard.core.codes import DoorAction, DoorName, LightColour, ShuttleAction, Side
 from onboard.core.messages import DoorOrder, DriveOrder, LightOrder, Message, ShuttleOrder
 from onboard.core.site import Site, Station
@@ -22,7 +24,45 @@ M = TypeVar("M", bound=Message)
 SECOND = 1_000_000
 ROBOT = 11
 COMPARTMENT = 1
+#: Lifts of ``three_floors``: at the left and at the right end.
+LEFT, RIGHT = 5, 6
 CAR = CarBody("blue", 2700, 4300, 1500, 1400)
+
+
+THREE_FLOORS = """
+[site]
+name = "test"
+[floors]
+count = 3
+positions = 6
+[floors.3]
+positions = {upper}
+[[compartments]]
+name = "IOC1"
+node = 1
+at = "p(1,4)"
+[[lifts]]
+name = "ER1"
+node = 5
+end = "left"
+[[lifts]]
+name = "ER2"
+node = 6
+end = "right"
+[[robots]]
+name = "MR1"
+node = 11
+home = "{home}"
+[[robots]]
+name = "MR2"
+node = 12
+home = "p(3,4)"
+"""
+
+
+def three_floors(home: str = "p(1,2)", upper: int = 6) -> Site:
+    """Three alleys between two lifts; MR1 (node 11) at ``home``, MR2 at p(3,4); ``upper`` positions on floor 3."""
+    return parse_site(THREE_FLOORS.format(home=home, upper=upper), "test.toml", crowded=True)
 
 
 @dataclass
@@ -103,12 +143,16 @@ class Bench:
         self.shuttles: dict[int, Shuttle] = {}
         self.carriers: dict[int, Carrier] = {}
         self.compartments: dict[int, Compartment] = {}
+        self.lifts: dict[int, LiftDrive] = {}
         for node in self.world.robots:
             link = self.links[node]
             shuttle = self.shuttles[node] = Shuttle(node, self.site, self.world, self.timers, link)
             self.carriers[node] = Carrier(node, self.site, self.world, self.timers, link, shuttle.is_home)
             shuttle.start()
             self.carriers[node].start()
+        for node in self.world.platforms:
+            self.lifts[node] = LiftDrive(node, self.site, self.world, self.timers, self.links[node])
+            self.lifts[node].start()
         for node in self.world.bays:
             self.compartments[node] = Compartment(node, self.site, self.world, self.timers, self.links[node])
             self.compartments[node].start()

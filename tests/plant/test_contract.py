@@ -4,7 +4,7 @@ import cantools.database
 import pytest
 from cantools.database.can import Database
 
-from bus_sim.plant import carrier, compartment, shuttle
+from bus_sim.plant import carrier, compartment, lift, shuttle
 from dbc import device_dbc_text
 
 
@@ -27,6 +27,7 @@ def test_drive_time_out(contract: Database) -> None:
         ("ShuttleState", shuttle.REPEAT_US),
         ("DoorState", compartment.REPEAT_US),
         ("BayState", compartment.REPEAT_US),
+        ("PlatformState", lift.REPEAT_US),
     ],
 )
 def test_cycle_times(contract: Database, message: str, repeat_us: int) -> None:

@@ -38,7 +38,7 @@ def run_program(*words: str, cwd: Path, **environment: str) -> subprocess.Comple
 
 def test_one_car_by_hand_is_parked_and_fetched(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     trace, figures = tmp_path / "trace.log", tmp_path / "figures.json"
-    status = bus_sim(["run", "--one-car", "120", "--trace", str(trace), "--json", str(figures)])
+    status = bus_sim(["run", "level1", "--one-car", "120", "--trace", str(trace), "--json", str(figures)])
     shown = capsys.readouterr().out
     assert status == 0
     assert "cars         in 1   out 1   inside 0" in shown
@@ -51,7 +51,7 @@ def test_one_car_by_hand_is_parked_and_fetched(tmp_path: Path, capsys: pytest.Ca
 
 
 def test_the_real_day_serves_everybody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    status = bus_sim(["run", "--trace", str(tmp_path / "trace.log")])
+    status = bus_sim(["run", "level1", "--trace", str(tmp_path / "trace.log")])
     shown = capsys.readouterr().out
     assert status == 0, shown
     assert "cars         in 33   out 33   inside 0   refused: full 0, too large 0" in shown
@@ -64,7 +64,7 @@ def test_equal_seeds_give_equal_logs_in_processes_with_different_hash_seeds(tmp_
     for hash_seed in ("1", "2"):
         log = tmp_path / f"{hash_seed}.log"
         done = run_program(
-            "bus_sim.cli", "run", "--random", "200", "60", "--cars", "4", "--seed", "5", "--devices",
+            "bus_sim.cli", "run", "level1", "--random", "200", "60", "--cars", "4", "--seed", "5", "--devices",
             "--fault", "omission:receivers=11,probability=0.05,seed=3", "--trace", str(log),
             cwd=tmp_path, PYTHONHASHSEED=hash_seed,
         )  # fmt: skip
@@ -81,7 +81,7 @@ def test_equal_seeds_give_equal_logs_in_processes_with_different_hash_seeds(tmp_
         (["run", "--sessions", "nowhere.csv"], r"nowhere\.csv"),
         (["run", "--stalls", "ZZ-9"], r"ZZ-9"),
         (["run", "--fault", "gremlins"], r"--fault gremlins: "),
-        (["run", "--without", "MR7"], r"--without MR7: no such machine; machines here: IOC1, MR1"),
+        (["run", "level1", "--without", "MR7"], r"--without MR7: no such machine; machines here: IOC1, MR1"),
         (["run", "--speed", "0"], r"--speed 0.0: must be above 0"),
         (["run", "--bus", "vcan0"], r'--bus "vcan0": must be INTERFACE:CHANNEL'),
     ],

@@ -106,7 +106,7 @@ def test_every_message_class_travels_and_nothing_else() -> None:
     classes = {
         name for name, kind in vars(messages).items() if isinstance(kind, type) and issubclass(kind, messages.Message)
     }
-    parts = {"Call", "CallTerms", "CallLoad", "ItineraryHead", "ItineraryLeg"}
+    parts = {"Call", "CallTerms", "CallLoad", "CallParent", "ItineraryHead", "ItineraryLeg"}
     expected = (classes - {"Message", "CallForProposals", "Itinerary"}) | parts
     assert {layout.name for layout in (*fleet_layouts(), *device_layouts())} == expected
 

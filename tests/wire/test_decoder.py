@@ -211,6 +211,78 @@ def test_a_set_ends_at_its_time_out_and_not_before() -> None:
         assert decoder.drops[Reason.INCOMPLETE_SET] == (not whole)
 
 
+def test_a_set_that_is_sent_again_has_its_whole_time_again() -> None:
+    """Said at 0 with one leg lost, said again just before the time-out: the second telling must not be cut off."""
+    head, first, second = fleet_codec().encode(a_plan(11, 9, 2))
+    for lost in (first, second):
+        decoder = Decoder(fleet_codec())
+        for frame in (head, first, second):
+            if frame is not lost:
+                assert decoder.feed(frame, 0) is None
+        again_us = SET_TIMEOUT_US - 10
+        assert decoder.feed(head, again_us) is None
+        heard = [decoder.feed(frame, again_us + 20) for frame in (first, second)]
+        assert [message for message in heard if message is not None] == [a_plan(11, 9, 2)]
+        assert not decoder.drops
+
+
+def test_a_call_that_is_sent_again_has_its_whole_time_again() -> None:
+    head, terms, load = fleet_codec().encode(a_call(1, 5))
+    decoder = Decoder(fleet_codec())
+    for frame, time_us in ((head, 0), (load, 0), (head, SET_TIMEOUT_US - 1)):
+        assert decoder.feed(frame, time_us) is None
+    assert decoder.feed(terms, SET_TIMEOUT_US + 1) == a_call(1, 5)
+    assert decoder.feed(load, SET_TIMEOUT_US + 1) is None
+    assert not decoder.drops
+
+
+@pytest.mark.parametrize("message", [a_plan(11, 9, 3), a_call(1, 5)])
+def test_a_frame_doubled_on_the_wire_after_its_set_was_whole_is_inert(message: Message) -> None:
+    """The last frame of a set comes twice after an inconsistent omission (Rufino et al. 1998)."""
+    frames = fleet_codec().encode(message)
+    decoder = Decoder(fleet_codec())
+    assert [decoder.feed(frame, 0) for frame in frames][-1] == message
+    assert [decoder.feed(frame, 10) for frame in frames[1:]] == [None] * (len(frames) - 1)
+    assert decoder.feed(frames[-1], 5 * SET_TIMEOUT_US // 4) is None
+    assert decoder.feed(frames[0], 6 * SET_TIMEOUT_US) is None
+    # A call's frame opens a set, which is dropped in time; a leg without its head comes to nothing at once.
+    assert decoder.drops == {Reason.INCOMPLETE_SET: 1}, "only the one that came after the memory of the set had ended"
+    assert [decoder.feed(frame, 6 * SET_TIMEOUT_US) for frame in frames[1:]][-1] == message, "said again is heard again"
+
+
+def test_other_legs_after_a_whole_set_are_counted() -> None:
+    plan = a_plan(11, 9, 2)
+    other = dataclasses.replace(plan, legs=(plan.legs[0], plan.legs[1]._replace(to_index=99)))
+    decoder = Decoder(fleet_codec())
+    for frame in fleet_codec().encode(plan):
+        decoder.feed(frame, 0)
+    assert decoder.feed(fleet_codec().encode(other)[2], 0) is None
+    assert decoder.drops == {Reason.INCOMPLETE_SET: 1}
+
+
+def test_a_released_itinerary_with_legs_is_none_of_the_contract() -> None:
+    plan = a_plan(11, 9, 2)
+    with pytest.raises(ValueError, match=r"ItineraryHead\.legs = 2"):
+        fleet_codec().encode(dataclasses.replace(plan, grade=Grade.RELEASED))
+    head, *legs = fleet_codec().encode(plan)
+    grade_bits = 0b11 << 8
+    released = head._replace(data=(int.from_bytes(head.data, "little") & ~grade_bits).to_bytes(8, "little"))
+    decoder = Decoder(fleet_codec())
+    assert [decoder.feed(frame, 0) for frame in (released, *legs)] == [None] * 3
+    assert decoder.drops == {Reason.VALUE_OUT_OF_RANGE: 1, Reason.INCOMPLETE_SET: 2}
+    empty = dataclasses.replace(plan, grade=Grade.RELEASED, legs=())
+    (frame,) = fleet_codec().encode(empty)
+    assert decoder.feed(frame, 0) == empty
+
+
+def test_no_car_stays_no_car_on_its_way_over_the_bus() -> None:
+    call = dataclasses.replace(a_call(1, 5), wheelbase_mm=0)
+    decoder = Decoder(fleet_codec())
+    assert [decoder.feed(frame, 0) for frame in fleet_codec().encode(call)][-1] == call
+    with pytest.raises(ValueError, match=r"CallLoad\.wheelbase_mm = 1500: means no car"):
+        fleet_codec().encode(dataclasses.replace(call, wheelbase_mm=1500))
+
+
 def test_memory_is_bounded_and_the_oldest_sets_are_counted_as_they_go() -> None:
     decoder = Decoder(fleet_codec())
     heads = [
@@ -220,6 +292,11 @@ def test_memory_is_bounded_and_the_oldest_sets_are_counted_as_they_go() -> None:
         assert decoder.feed(frame, 0) is None
     assert len(decoder._sets) == MAX_SETS
     assert decoder.drops == {Reason.INCOMPLETE_SET: len(heads) - MAX_SETS}
+    for sender in range(1, 251):
+        for number in (1, 2):
+            for frame in fleet_codec().encode(a_call(sender, number)):
+                decoder.feed(frame, 0)
+    assert len(decoder._sets) < MAX_SETS == len(decoder._whole)
     memory = fleet_codec()._part.cache_info()
     assert memory.maxsize is not None and memory.currsize <= memory.maxsize
 

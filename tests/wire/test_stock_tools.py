@@ -32,7 +32,7 @@ DEADLINE_S = 150
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log of one car parked and fetched, and the site's DBC."""
     where = tmp_path_factory.mktemp("stock")
-    assert bus_sim(["run", "--one-car", "60", "--trace", str(where / "trace.log")]) == 0
+    assert bus_sim(["run", "level1", "--one-car", "60", "--trace", str(where / "trace.log")]) == 0
     (where / "level1.dbc").write_text(site_dbc(find_site("level1")))
     return where
 
@@ -135,7 +135,7 @@ async def _until_shown(terminal: int, wanted: str) -> str:
 async def test_cantools_monitor_shows_the_served_bus(folder: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "160", "LINES": "50", "TERM": "xterm"}
     simulator = await asyncio.create_subprocess_exec(
-        sys.executable, "-u", "-m", "bus_sim.cli", "run", "--serve", "127.0.0.1:0", "--one-car", "600",
+        sys.executable, "-u", "-m", "bus_sim.cli", "run", "level1", "--serve", "127.0.0.1:0", "--one-car", "600",
         cwd=folder, env=environment, stdout=asyncio.subprocess.PIPE,
     )  # fmt: skip
     assert simulator.stdout is not None

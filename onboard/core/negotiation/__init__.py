@@ -13,11 +13,13 @@ from onboard.core.negotiation.bidding import (
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import (
     EVENT_TYPES,
+    Answer,
     Awarded,
     CallKey,
     CallTerms,
     Closed,
     Estimator,
+    Needs,
     NegotiationEvent,
     PreAssigned,
     Proposal,
@@ -29,6 +31,7 @@ from onboard.core.negotiation.participant import Participant
 
 __all__ = [
     "EVENT_TYPES",
+    "Answer",
     "Awarded",
     "CallKey",
     "CallTerms",
@@ -37,6 +40,7 @@ __all__ = [
     "DelayRule",
     "Estimator",
     "Initiator",
+    "Needs",
     "Negotiation",
     "NegotiationEvent",
     "Participant",

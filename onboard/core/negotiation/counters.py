@@ -9,7 +9,9 @@ class Counters:
 
     ``calls_of_other_kind`` cost nothing more than this count (row P06). ``searches_saved`` and ``bids_saved`` are calls
     in which a better bid, the deadline or the award came before the search or the bid. ``late_bids_ignored`` counts
-    bids of others that came after a call's cut-off, as initiator and as participant (row P05).
+    bids of others that came after a call's cut-off, as initiator and as participant (row P05). Of the options that this
+    machine was given, ``options_confirmed`` were awarded, ``options_given_up`` were not needed, and
+    ``options_expired`` were not decided in time.
     """
 
     calls_heard: int = 0
@@ -26,3 +28,7 @@ class Counters:
     late_bids_ignored: int = 0
     beliefs_without_award: int = 0
     beliefs_lapsed: int = 0
+    sub_calls_opened: int = 0
+    options_confirmed: int = 0
+    options_given_up: int = 0
+    options_expired: int = 0

@@ -1,10 +1,11 @@
 """What the negotiation tells its machine, and what it asks of the machine's task-generation function."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
-from onboard.core.messages import Award, CallForProposals, Itinerary, Reference
+from onboard.core.messages import NO_REFERENCE, Award, CallForProposals, Itinerary, Reference
 
 
 class CallKey(NamedTuple):
@@ -15,17 +16,25 @@ class CallKey(NamedTuple):
 
 
 class Proposal(NamedTuple):
-    """What a task would cost: ``cost`` in the call's unit, the tentative itinerary, and the kind's own data."""
+    """What a task would cost: ``cost`` in the call's unit, the tentative itinerary, and the kind's own data.
+
+    ``parts`` are the sub-calls whose options it rests on, by number; the others are given up when it is bid.
+    """
 
     cost: int
     itinerary: Itinerary | None
     program: tuple[Any, ...]
     alternatives: tuple[Any, ...]
+    parts: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class CallTerms:
-    """What an initiator asks for; the negotiation adds call number, attempt and deadline."""
+    """What an initiator asks for; the negotiation adds call number, attempt and deadline.
+
+    ``ready_us`` (bus time) is when a part can begin at the earliest, 0 for at once. The negotiation numbers the parts
+    of a bid itself: ``parent``, ``part`` and ``depth`` are for calls that a machine opens after winning.
+    """
 
     task: Reference
     operation: Operation
@@ -37,6 +46,30 @@ class CallTerms:
     wheelbase_mm: int
     task_version: int = 1
     depth: int = 0
+    parent: Reference = NO_REFERENCE
+    part: int = 0
+    ready_us: int = 0
+
+
+class Answer(NamedTuple):
+    """What came of a sub-call: its number and terms, the best bid's ``cost``, and its ``winner``, 0 for nobody."""
+
+    part: int
+    terms: CallTerms
+    winner: int
+    cost: int
+
+
+class Needs(NamedTuple):
+    """The cost cannot be named before others have answered ``parts``; it will be ``cost`` or more, as far as is known.
+
+    ``combine`` gets all answers so far, of earlier rounds too, and the time (bus us): the proposal, or what else is
+    needed, or None where there is no solution with these answers.
+    """
+
+    cost: int
+    parts: tuple[CallTerms, ...]
+    combine: "Callable[[tuple[Answer, ...], int], Proposal | Needs | None]"
 
 
 class Estimator(Protocol):
@@ -51,8 +84,8 @@ class Estimator(Protocol):
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """A cheap bound of this machine's cost; None where it cannot do the task at all."""
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """The real cost around everybody's plans; None where there is no solution."""
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+        """The real cost around everybody's plans, or what must be asked first; None where there is no solution."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,12 +109,16 @@ class Released:
 
 @dataclass(frozen=True, slots=True)
 class Awarded:
-    """The task is this machine's. ``award`` is None in the silent form, where the deadline alone decides."""
+    """The task is this machine's. ``award`` is None in the silent form, where the deadline alone decides.
+
+    ``parts`` are the options that the bid rests on and that are confirmed now; one that has lapsed is missing.
+    """
 
     call_key: CallKey
     call: CallForProposals
     proposal: Proposal
     award: Award | None
+    parts: tuple[Answer, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

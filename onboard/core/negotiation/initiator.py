@@ -2,13 +2,15 @@
 
 Nobody answers: the call is opened again, changed as the restart policy says, a bounded number of times, then reported
 as refused. Somebody wins: one award closes the call and is said again until the winner is heard acting on it.
+
+A sub-call before a bid has one attempt, and its best bid is held as an option until it is confirmed or given up.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Reason
+from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, TaskReport
 from onboard.core.negotiation.bidding import beats, cut_off_us
@@ -24,11 +26,16 @@ Outcome = list[Effect | NegotiationEvent]
 QUICK_AWARDS = 10
 SLOW_DOWN = 10
 
+#: Steps and largest values of a sub-call's two durations on the wire (dbc/fleet.dbc, CallParent), in ms.
+READY_STEP_MS, MAX_READY_MS = 100, 1_638_300
+HOLD_STEP_MS, MAX_HOLD_MS = 250, 255_750
+
 
 class State(Enum):
     """Where an initiator stands with one task."""
 
     OPEN = "bids may come"
+    HELD = "the best bid is an option"
     AWARDING = "the winner has not been heard yet"
     CLOSED = "over"
 
@@ -42,6 +49,10 @@ class Event(Enum):
     REPEAT = "the award is to be said again"
     HEARD = "the winner was heard acting on the award"
     WITHDRAW = "the machine no longer wants the task done"
+    DEADLINE_WITH_OPTION = "a sub-call's deadline has passed and there is a best bid"
+    CONFIRM = "what the option hangs on was awarded"
+    EXPIRE = "the option has ended undecided"
+    FORFEIT = "the winner was heard giving the task back"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +94,10 @@ class RestartPolicy:
 
 @dataclass
 class Initiator:
-    """One task that this machine wants done. ``number`` hands out call numbers. All times are bus time in us."""
+    """One task that this machine wants done. ``number`` hands out call numbers. All times are bus time in us.
+
+    A sub-call before a bid has its only ``deadline_us``, and its best bid is an option until ``hold_until_us``.
+    """
 
     node_id: int
     terms: CallTerms
@@ -92,12 +106,15 @@ class Initiator:
     number: Callable[[], int]
     silent: bool = False
     counters: Counters = field(default_factory=Counters)
+    deadline_us: int | None = None
+    hold_until_us: int = 0
     state: State = State.OPEN
     call: CallForProposals | None = None
     attempt: int = 0
     best: tuple[int, int] | None = None
     due_us: int | None = None
     awards_sent: int = 0
+    _lost_reason: Reason = Reason.NONE
 
     # --- events ------------------------------------------------------------------------------------------------
 
@@ -105,7 +122,11 @@ class Initiator:
         """Send the call for the next attempt."""
         self.attempt += 1
         terms = self.policy.step(self.attempt).changed(self.terms)
-        deadline_us = now_us + self.policy.window_us(self.attempt, self.timing)
+        deadline_us = self.deadline_us
+        if deadline_us is None:
+            deadline_us = now_us + self.policy.window_us(self.attempt, self.timing)
+        deadline_ms = to_bus_ms(deadline_us)
+        self.due_us = from_bus_ms(deadline_ms, now_us)
         self.call = CallForProposals(
             self.node_id,
             self.number(),
@@ -115,13 +136,16 @@ class Initiator:
             terms.criterion,
             self.attempt,
             terms.depth,
-            to_bus_ms(deadline_us),
+            deadline_ms,
             terms.from_station,
             terms.to_station,
             terms.car,
             terms.wheelbase_mm,
+            terms.parent,
+            terms.part,
+            _in_steps_ms(terms.ready_us - self.due_us, READY_STEP_MS, MAX_READY_MS),
+            _in_steps_ms(self.hold_until_us - self.due_us, HOLD_STEP_MS, MAX_HOLD_MS),
         )
-        self.due_us = from_bus_ms(self.call.deadline_ms, now_us)
         return [Send(self.call)]
 
     def on_bid(self, bid: Bid, now_us: int) -> Outcome:
@@ -144,13 +168,20 @@ class Initiator:
         return self._fire(Event.HEARD, now_us)
 
     def on_report(self, report: TaskReport, now_us: int) -> Outcome:
-        """A report on the task by its winner ends the award as well."""
+        """A report on the task by its winner ends the award as well; one that gives the task back rejects it."""
         if self.best is None or report.sender != self.best[1] or report.task != self.terms.task:
             return []
+        if report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
+            self._lost_reason = report.reason
+            return self._fire(Event.FORFEIT, now_us)
         return self._fire(Event.HEARD, now_us)
 
+    def confirm(self, now_us: int) -> Outcome:
+        """What the option hangs on was awarded: award the option."""
+        return self._fire(Event.CONFIRM, now_us)
+
     def withdraw(self, now_us: int) -> Outcome:
-        """Close the call for nobody while it is open; an award under way is not taken back."""
+        """Close the call for nobody while it is open or an option; an award under way is not taken back."""
         return self._fire(Event.WITHDRAW, now_us)
 
     def wake(self, now_us: int) -> Outcome:
@@ -159,9 +190,12 @@ class Initiator:
             return []
         if self.state is State.AWARDING:
             return self._fire(Event.REPEAT, now_us)
+        if self.state is State.HELD:
+            return self._fire(Event.EXPIRE, now_us)
         if self.best is not None:
-            return self._fire(Event.DEADLINE_WITH_BID, now_us)
-        last = self.attempt >= self.timing.max_attempts
+            option = self.deadline_us is not None
+            return self._fire(Event.DEADLINE_WITH_OPTION if option else Event.DEADLINE_WITH_BID, now_us)
+        last = self.attempt >= self.timing.max_attempts or self.deadline_us is not None
         return self._fire(Event.EXHAUSTED if last else Event.DEADLINE_EMPTY, now_us)
 
     def _fire(self, event: Event, now_us: int) -> Outcome:
@@ -213,6 +247,32 @@ class Initiator:
         closing = self._closing(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)
         return [Send(closing), *self._closed(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)]
 
+    def hold(self, now_us: int) -> Outcome:
+        """The best bid is an option: its bidder is told once; it holds it by its own belief if that is lost."""
+        assert self.best is not None and self.call is not None and self.due_us is not None
+        self.due_us += self.call.hold_ms * 1000
+        return [Send(self._closing(self.best[1], CallResult.OPTION, Reason.NONE))]
+
+    def take_up(self, now_us: int) -> Outcome:
+        """The option becomes an award."""
+        self.counters.options_confirmed += 1
+        return self.award(now_us)
+
+    def give_up(self, now_us: int) -> Outcome:
+        """The option is not needed."""
+        self.counters.options_given_up += 1
+        return self.cancel(now_us)
+
+    def expire(self, now_us: int) -> Outcome:
+        """Nobody said in time what came of it: it lapses at its bidder in the same moment, without a frame."""
+        self.counters.options_expired += 1
+        return self._closed(NOBODY, CallResult.WITHDRAWN, Reason.LATE)
+
+    def reject(self, now_us: int) -> Outcome:
+        """The winner gave the task back before it was heard taking it on."""
+        closing = self._closing(NOBODY, CallResult.REJECTED, self._lost_reason)
+        return [Send(closing), *self._closed(NOBODY, CallResult.REJECTED, self._lost_reason)]
+
     def _closed(self, winner: int, result: CallResult, reason: Reason) -> Outcome:
         assert self.call is not None
         self.due_us = None
@@ -223,12 +283,22 @@ class Initiator:
         return Award(self.node_id, self.call.call, winner, self.terms.task, self.terms.task_version, result, reason)
 
 
+def _in_steps_ms(duration_us: int, step_ms: int, most_ms: int) -> int:
+    """A duration in whole steps, rounded up; 0 for one that is over, the most that can be said for one too long."""
+    return min(most_ms, -(-max(0, duration_us) // (step_ms * 1000)) * step_ms)
+
+
 #: The whole protocol of an initiator: (state, event) to the next state and what is done on the way.
 TABLE: dict[tuple[State, Event], tuple[State, Callable[[Initiator, int], Outcome]]] = {
     (State.OPEN, Event.DEADLINE_WITH_BID): (State.AWARDING, Initiator.decide),
     (State.OPEN, Event.DEADLINE_EMPTY): (State.OPEN, Initiator.reopen),
     (State.OPEN, Event.EXHAUSTED): (State.CLOSED, Initiator.refuse),
     (State.OPEN, Event.WITHDRAW): (State.CLOSED, Initiator.cancel),
+    (State.OPEN, Event.DEADLINE_WITH_OPTION): (State.HELD, Initiator.hold),
+    (State.HELD, Event.CONFIRM): (State.AWARDING, Initiator.take_up),
+    (State.HELD, Event.WITHDRAW): (State.CLOSED, Initiator.give_up),
+    (State.HELD, Event.EXPIRE): (State.CLOSED, Initiator.expire),
     (State.AWARDING, Event.REPEAT): (State.AWARDING, Initiator.award),
+    (State.AWARDING, Event.FORFEIT): (State.CLOSED, Initiator.reject),
     (State.AWARDING, Event.HEARD): (State.CLOSED, Initiator.end),
 }

@@ -1,6 +1,6 @@
 """All calls of one machine at once, in both roles (rows P02 to P04)."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.core.codes import KindCode
 from onboard.core.effects import Effect
@@ -11,6 +11,7 @@ from onboard.core.negotiation.events import CallKey, CallTerms, Estimator, Negot
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy
 from onboard.core.negotiation.initiator import State as InitiatorState
 from onboard.core.negotiation.participant import Participant
+from onboard.core.negotiation.sub_calls import SubCalls
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Timing
 
@@ -102,6 +103,8 @@ class Negotiation:
             outcome += participant.wake(now_us)
         for initiator in list(self.initiators):
             outcome += initiator.wake(now_us)
+        for participant in list(self.participants.values()):
+            outcome += participant.collect(now_us)
         self._forget(now_us)
         return outcome
 
@@ -138,16 +141,39 @@ class Negotiation:
         participant = Participant(
             self.node_id,
             call,
-            self.timing,
+            self._timing_of(call, deadline_us - now_us),
             self.estimator,
             self.counters,
             self.silent,
             deadline_us,
+            SubCalls(call, deadline_us, self.timing, self._open_sub_call),
             self.delay,
             self.slot,
         )
         self.participants[key] = participant
         return outcome + participant.open(now_us)
+
+    def _timing_of(self, call: CallForProposals, window_us: int) -> Timing:
+        """A sub-call before a bid ends sooner than other calls: its bidders speak sooner by the same ratio."""
+        if not call.hold_ms or window_us >= self.timing.call_window_us:
+            return self.timing
+        return replace(self.timing, bid_delay_us=self.timing.bid_delay_us * window_us // self.timing.call_window_us)
+
+    def _open_sub_call(
+        self, terms: CallTerms, deadline_us: int, hold_until_us: int, now_us: int
+    ) -> tuple[Initiator, Outcome]:
+        initiator = Initiator(
+            self.node_id,
+            terms,
+            self.timing,
+            self.policy,
+            self._next_call,
+            counters=self.counters,
+            deadline_us=deadline_us,
+            hold_until_us=hold_until_us,
+        )
+        self.initiators.append(initiator)
+        return initiator, initiator.open(now_us)
 
     def _on_bid(self, bid: Bid, now_us: int) -> Outcome:
         if bid.initiator == self.node_id:
@@ -183,5 +209,9 @@ class Negotiation:
 
 
 def _is_for_same_task(one: CallForProposals, other: CallForProposals) -> bool:
-    """Whether two calls are attempts at one thing; calls for parts of one task differ in operation or depth."""
-    return (one.sender, one.task, one.operation, one.depth) == (other.sender, other.task, other.operation, other.depth)
+    """Whether two calls are attempts at one thing; parts of one task differ in operation, depth, part or for whom."""
+    return _thing(one) == _thing(other)
+
+
+def _thing(call: CallForProposals) -> tuple[object, ...]:
+    return call.sender, call.task, call.operation, call.depth, call.part, call.parent.origin

@@ -3,6 +3,10 @@
 States and events are below; ``TABLE``, at the end, holds every pair that matters, all others change nothing. The
 participant is lazy: it first waits for what its free-flow bound owes, then searches, then waits for what the real cost
 still owes. A call that it cannot win costs no search and no frame.
+
+Where the cost depends on others, sub-calls open when the delay for the least cost has run out unbeaten; their answers
+make the bid, and the award confirms the options that it rests on. A bid for such a sub-call is itself an option: held
+until it is confirmed, given up or over, and never acted upon before.
 """
 
 from collections.abc import Callable
@@ -27,11 +31,13 @@ from onboard.core.negotiation.events import (
     Awarded,
     CallKey,
     Estimator,
+    Needs,
     NegotiationEvent,
     PreAssigned,
     Proposal,
     Released,
 )
+from onboard.core.negotiation.sub_calls import SubCalls
 from onboard.core.site import Timing
 
 Outcome = list[Effect | NegotiationEvent]
@@ -46,9 +52,11 @@ class State(Enum):
 
     WAITING_BOUND = "waiting for what the free-flow bound owes"
     WAITING_COST = "searched, waiting for what the real cost owes"
+    ASKING = "waiting for the answers to own sub-calls"
     PRE_ASSIGNED = "own bid stands best"
     SILENT = "beaten or unable"
     BELIEVING = "deadline passed with own bid best, no award heard yet"
+    OPTION = "own bid is held as an option of the initiator"
     LAPSED = "no award came for long; one that comes yet still counts"
     ASSIGNED = "awarded"
     LOST = "closed for another, or for nobody"
@@ -58,10 +66,13 @@ class Event(Enum):
     """What can happen to a participant."""
 
     DUE = "own delay has run out"
+    NEED = "own delay has run out, and others must be asked first"
+    ANSWERED = "all own sub-calls have come to their deadlines"
     IMPOSSIBLE = "the search found no solution"
     BEATEN = "a better bid is on the bus than I can make or made"
     DEADLINE = "it is too late to bid, or the call's deadline has passed"
-    LAPSE = "the award is overdue"
+    LAPSE = "the award is overdue, or the option is over"
+    OPTION_ME = "the initiator holds my bid as an option"
     AWARD_ME = "the initiator awards me"
     AWARD_OTHER = "the initiator closes the call for another, or for nobody"
     SUPERSEDED = "the initiator has called anew for the same task"
@@ -69,7 +80,7 @@ class Event(Enum):
 
 @dataclass
 class Participant:
-    """One machine in one call of another. All times are bus time in us."""
+    """One machine in one call of another. All times are bus time in us. ``subs`` are the sub-calls that it may open."""
 
     node_id: int
     call: CallForProposals
@@ -78,6 +89,7 @@ class Participant:
     counters: Counters
     silent: bool
     deadline_us: int
+    subs: SubCalls
     delay: DelayRule = delay_us
     slot: Slot = ANY_TIME
     state: State = State.WAITING_BOUND
@@ -86,6 +98,7 @@ class Participant:
     floor: int = 0
     bound: int = 0
     proposal: Proposal | None = None
+    needs: Needs | None = None
     best: tuple[int, int] | None = None
     award: Award | None = None
     has_bid: bool = False
@@ -96,7 +109,8 @@ class Participant:
     def __post_init__(self) -> None:
         self.last_bid_us = last_bid_us(self.deadline_us, self.timing)
         self.cut_off_us = cut_off_us(self.deadline_us, self.timing)
-        self.lapse_us = self.deadline_us + LAPSE_REPEATS * self.timing.award_repeat_us
+        patience_us = self.call.hold_ms * 1000 or LAPSE_REPEATS * self.timing.award_repeat_us
+        self.lapse_us = self.deadline_us + patience_us
 
     @property
     def key(self) -> CallKey:
@@ -111,7 +125,7 @@ class Participant:
     @property
     def is_committed(self) -> bool:
         """Whether the machine keeps reservations for this call."""
-        return self.state in (State.PRE_ASSIGNED, State.BELIEVING)
+        return self.state in (State.PRE_ASSIGNED, State.BELIEVING, State.OPTION)
 
     # --- events ------------------------------------------------------------------------------------------------
 
@@ -137,9 +151,12 @@ class Participant:
         return self._fire(Event.BEATEN, now_us) if self._is_beaten() else []
 
     def on_award(self, award: Award, now_us: int) -> Outcome:
-        """The initiator closes the call. Idempotent."""
+        """The initiator closes the call, or holds the best bid as an option. Idempotent."""
         self.award = award
-        mine = award.result is CallResult.AWARDED and award.winner == self.node_id and self.has_bid
+        named = award.winner == self.node_id and self.has_bid
+        if named and award.result is CallResult.OPTION:
+            return self._fire(Event.OPTION_ME, now_us)
+        mine = named and award.result is CallResult.AWARDED
         return self._fire(Event.AWARD_ME if mine else Event.AWARD_OTHER, now_us)
 
     def supersede(self, now_us: int) -> Outcome:
@@ -152,12 +169,19 @@ class Participant:
         # A search may owe no further delay, so being due can follow being due; the table ends that after two.
         while self.due_us is not None and min(self.due_us, self.last_bid_us) <= now_us:
             self.due_us = None
-            outcome += self._fire(Event.DUE if now_us < self.last_bid_us else Event.DEADLINE, now_us)
+            due = Event.DUE if self.needs is None else Event.NEED
+            outcome += self._fire(due if now_us < self.last_bid_us else Event.DEADLINE, now_us)
         if now_us >= self.deadline_us:
             outcome += self._fire(Event.DEADLINE, now_us)
         if now_us >= self.lapse_us:
             outcome += self._fire(Event.LAPSE, now_us)
         return outcome
+
+    def collect(self, now_us: int) -> Outcome:
+        """Go on where the last sub-call asked for has come to its deadline."""
+        if self.state is not State.ASKING or not self.subs.is_answered:
+            return []
+        return self._fire(Event.ANSWERED, now_us)
 
     def next_wake(self) -> int | None:
         """The delay's end, or the moment at which waiting for something else ends."""
@@ -165,27 +189,49 @@ class Participant:
             return min(self.due_us, self.last_bid_us)
         if self.state is State.PRE_ASSIGNED:
             return self.deadline_us
-        return self.lapse_us if self.state is State.BELIEVING else None
+        return self.lapse_us if self.state in (State.BELIEVING, State.OPTION) else None
 
     def _fire(self, event: Event, now_us: int) -> Outcome:
         entry = TABLE.get((self.state, event))
         if entry is None:
             return []
         self.state, action = entry
-        return action(self, now_us)
+        outcome = action(self, now_us)
+        # Whatever ends the hope of winning ends the options that the bid would have rested on.
+        return outcome + self.subs.drop(now_us) if self.state in _HOPELESS else outcome
 
     # --- actions -----------------------------------------------------------------------------------------------
 
     def search(self, now_us: int) -> Outcome:
         """Ask for the real cost, then wait for what it owes beyond the bound."""
         self.counters.searches += 1
-        self.proposal = self.estimator.estimate(self.call, now_us)
-        if self.proposal is None:
+        return self._weigh(self.estimator.estimate(self.call, now_us), now_us)
+
+    def _weigh(self, found: Proposal | Needs | None, now_us: int) -> Outcome:
+        if found is None:
             return self._fire(Event.IMPOSSIBLE, now_us)
+        self.proposal, self.needs = (None, found) if isinstance(found, Needs) else (found, None)
+        self.bound = found.cost
         if self._is_beaten():
             return self._fire(Event.BEATEN, now_us)
-        self.due_us = max(now_us, self.heard_us + self._delay_us(self.proposal.cost))
+        self.due_us = self._turn_us(self._delay_us(found.cost), now_us)
         return []
+
+    def ask(self, now_us: int) -> Outcome:
+        """Nobody was better so far: open the sub-calls. Where there is no time or depth left for them: silence."""
+        assert self.needs is not None
+        outcome = self.subs.ask(self.needs.parts, now_us)
+        if outcome is None:
+            return self._fire(Event.IMPOSSIBLE, now_us)
+        self.counters.sub_calls_opened += len(self.needs.parts)
+        self.due_us = self.last_bid_us
+        return outcome
+
+    def combine(self, now_us: int) -> Outcome:
+        """All have answered: the proposal, or a second round."""
+        assert self.needs is not None
+        self.due_us = None
+        return self._weigh(self.needs.combine(self.subs.answers(), now_us), now_us)
 
     def bid(self, now_us: int) -> Outcome:
         """Release the bid, and with it the reservations that it rests on (rows P10, P48)."""
@@ -200,20 +246,26 @@ class Participant:
         if itinerary is not None:
             outcome.append(Send(itinerary))
         outcome.append(PreAssigned(self.key, self.call, self.proposal))
-        return outcome
+        return outcome + self.subs.drop(now_us, keep=self.proposal.parts)
 
     def believe(self, now_us: int) -> Outcome:
         """The deadline passed with my bid best. I may prepare; I act only on the award (but in the silent form)."""
-        if self.silent:
+        if self.silent and not self.call.hold_ms:
             return self._fire(Event.AWARD_ME, now_us)
         self.counters.beliefs_without_award += 1
         return []
 
     def assign(self, now_us: int) -> Outcome:
-        """The task is mine."""
+        """The task is mine, and with it the options that the bid rests on."""
         assert self.proposal is not None
         self.counters.won += 1
-        return [Awarded(self.key, self.call, self.proposal, self.award)]
+        confirmed, outcome = self.subs.confirm(self.proposal.parts, now_us)
+        return [Awarded(self.key, self.call, self.proposal, self.award, confirmed), *outcome]
+
+    def hold_again(self, now_us: int) -> Outcome:
+        """I took myself for beaten, and the initiator holds my bid: reserve anew."""
+        assert self.proposal is not None
+        return [PreAssigned(self.key, self.call, self.proposal)]
 
     def release_beaten(self, now_us: int) -> Outcome:
         """A better bid frees what mine reserved."""
@@ -230,7 +282,7 @@ class Participant:
         return self._release(Reason.CANCELLED)
 
     def release_lapsed(self, now_us: int) -> Outcome:
-        """So does an award that does not come; nobody waits for ever (row P14)."""
+        """So does an award, or the decision on an option, that does not come; nobody waits for ever (row P14)."""
         self.counters.beliefs_lapsed += 1
         return self._release(Reason.LATE)
 
@@ -265,11 +317,26 @@ class Participant:
         """Whether the best bid heard is at least as good as what I made or could make (row P07)."""
         if self.best is None or self.best[1] == self.node_id:
             return False
-        cost = self.bound if self.proposal is None else self.proposal.cost
-        return not beats(cost, self.node_id, *self.best, self.call.criterion)
+        return not beats(self.bound, self.node_id, *self.best, self.call.criterion)
 
     def _delay_us(self, cost: int) -> int:
         return in_slot(self.delay(cost, self.floor, self.call.criterion, self.timing), self.slot)
+
+    def _turn_us(self, delay_us: int, now_us: int) -> int:
+        """When a delay since hearing the call has run out; once answers have come, not before the own slot's turn.
+
+        Others may have asked at the same time: their answers, and so their bids, would come at one moment.
+        """
+        due_us = self.heard_us + delay_us
+        if due_us >= now_us or not self.subs.asked:
+            return max(now_us, due_us)
+        round_us = self.slot.slots * self.slot.length_us
+        late_us = now_us - due_us
+        return due_us + -(-late_us // round_us) * round_us if round_us else now_us
+
+
+#: States in which nothing more is hoped for from a call.
+_HOPELESS = (State.SILENT, State.LAPSED, State.LOST)
 
 
 #: The whole protocol of a participant: (state, event) to the next state and what is done on the way.
@@ -286,18 +353,32 @@ TABLE: dict[tuple[State, Event], tuple[State, Callable[[Participant, int], Outco
     (State.WAITING_COST, Event.DEADLINE): (State.SILENT, Participant.save_bid),
     (State.WAITING_COST, Event.AWARD_OTHER): (State.LOST, Participant.save_bid),
     (State.WAITING_COST, Event.SUPERSEDED): (State.LOST, Participant.save_bid),
+    (State.WAITING_COST, Event.NEED): (State.ASKING, Participant.ask),
+    (State.ASKING, Event.ANSWERED): (State.WAITING_COST, Participant.combine),
+    (State.ASKING, Event.IMPOSSIBLE): (State.SILENT, Participant.give_up),
+    (State.ASKING, Event.BEATEN): (State.SILENT, Participant.save_bid),
+    (State.ASKING, Event.DEADLINE): (State.SILENT, Participant.save_bid),
+    (State.ASKING, Event.AWARD_OTHER): (State.LOST, Participant.save_bid),
+    (State.ASKING, Event.SUPERSEDED): (State.LOST, Participant.save_bid),
     (State.PRE_ASSIGNED, Event.BEATEN): (State.SILENT, Participant.release_beaten),
     (State.PRE_ASSIGNED, Event.DEADLINE): (State.BELIEVING, Participant.believe),
+    (State.PRE_ASSIGNED, Event.OPTION_ME): (State.OPTION, Participant.rest),
     (State.PRE_ASSIGNED, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
     (State.PRE_ASSIGNED, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
     (State.PRE_ASSIGNED, Event.SUPERSEDED): (State.LOST, Participant.release_void),
+    (State.SILENT, Event.OPTION_ME): (State.OPTION, Participant.hold_again),
     (State.SILENT, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
     (State.SILENT, Event.AWARD_OTHER): (State.LOST, Participant.rest),
     (State.SILENT, Event.SUPERSEDED): (State.LOST, Participant.rest),
     (State.BELIEVING, Event.LAPSE): (State.LAPSED, Participant.release_lapsed),
+    (State.BELIEVING, Event.OPTION_ME): (State.OPTION, Participant.rest),
     (State.BELIEVING, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
     (State.BELIEVING, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
     (State.BELIEVING, Event.SUPERSEDED): (State.LOST, Participant.release_void),
+    (State.OPTION, Event.LAPSE): (State.LAPSED, Participant.release_lapsed),
+    (State.OPTION, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
+    (State.OPTION, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
+    (State.OPTION, Event.SUPERSEDED): (State.LOST, Participant.release_void),
     (State.LAPSED, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
     (State.LAPSED, Event.AWARD_OTHER): (State.LOST, Participant.rest),
     (State.LAPSED, Event.SUPERSEDED): (State.LOST, Participant.rest),

@@ -273,7 +273,12 @@ class Compartment:
         return []
 
     def _is_stored(self, car: Reference) -> bool:
-        return self.fleet.mirror.car_station(car) is not None
+        return self._place_of(car) is not None
+
+    def _place_of(self, car: Reference) -> Station | None:
+        """The place that a car stands in; None while it is in a bay or aboard: its entry is still under way."""
+        station = self.fleet.mirror.car_station(car)
+        return station if station not in self.fleet.site.compartments.values() else None
 
     def _admit(self, now_us: int) -> list[Effect]:
         """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
@@ -322,7 +327,7 @@ class Compartment:
         return [Record({"record": "number", "number": self._number}), *self._fetch(self.job, now_us)]
 
     def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
-        where = self.fleet.mirror.car_station(job.car)
+        where = self._place_of(job.car)
         if where is None:
             job.retry_at_us = now_us + RETRY_US
             return [Report(f"car {job.car.number} is nowhere to be fetched from")]

@@ -13,7 +13,7 @@ from onboard.core.codes import ANY_STATION, Criterion, Grade, LegAction, Operati
 from onboard.core.kinematics import run_duration_us
 from onboard.core.messages import CallForProposals, Stamp
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Proposal
+from onboard.core.negotiation import Needs, Proposal
 from onboard.core.refuges import open_refuges
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
@@ -83,11 +83,18 @@ class CarParkGeneration:
         ends = [self._lower_us(call, place, segment, start_us) for place in self._candidates(call, now_us)]
         return to_bus_ms(min(ends)) if ends else None
 
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
         """First request: the best solution as a bid with a tentative itinerary, or None: silence (row P45)."""
         solution, alternatives = self.solve(call, now_us)
-        if solution is None:
-            return None
+        return None if solution is None else self.proposal(call, solution, alternatives)
+
+    def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
+        """Second request, once the call is awarded: what is really carried out, around what is known by now."""
+        solution, _ = self.solve(call, now_us)
+        return promised if solution is None else solution
+
+    def proposal(self, call: CallForProposals, solution: Solution, alternatives: list[Alternative]) -> Proposal:
+        """A solution as a bid."""
         deadline_ms = call.deadline_ms
         stamp = Stamp(deadline_ms, call.sender, call.call & 0xFF)
         # Legs name only the version: a tentative set must never complete a firm one.
@@ -147,6 +154,29 @@ class CarParkGeneration:
             self.mirror.lift_floors(now_us, start_us),
         )
         return None if isinstance(route, NoRoute) else route
+
+    def reroute(self, origin: Segment, start_us: int, works: list[Work], now_us: int) -> tuple[Step, ...] | None:
+        """The same work by another way, from standing at ``origin`` at bus time ``start_us``; None where there is none.
+
+        Without work the way to another refuge: so a machine that only stands gives way.
+        """
+        route = plan_route(
+            self.site,
+            self.mirror.reservations,
+            self.machine.node_id,
+            origin,
+            start_us,
+            tuple(self._work_visit(work, now_us) for work in works),
+            self._refuges(),
+            MAX_EXPANSIONS,
+            self.mirror.lift_floors(now_us, start_us),
+        )
+        return None if isinstance(route, NoRoute) else _steps_of(route, works)
+
+    def _work_visit(self, work: Work, now_us: int) -> Visit:
+        if work.handling is Handling.TAKE and work.station in self.site.compartments.values():
+            return self._visits(work.call, work.station, now_us)[0]
+        return Visit(work.station.segment, self._handling_us(work.station))
 
     def _refuges(self) -> frozenset[Segment]:
         """Where this robot may end. Spurs are left out: its carrier cannot turn into one yet."""
@@ -210,24 +240,28 @@ class CarParkGeneration:
 
     def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[Step, ...]:
         source, sink = self.ends(call, place)
-        works = iter(
-            (
-                Work(Handling.TAKE, source, call.car, call.wheelbase_mm, call),
-                Work(Handling.LEAVE, sink, call.car, call.wheelbase_mm, call),
-            )
-        )
-        return tuple(
-            Step(
-                leg.action,
-                leg.track,
-                leg.from_index,
-                leg.to_index,
-                leg.begin_us,
-                leg.end_us,
-                next(works) if leg.action is LegAction.WORK else None,
-            )
-            for leg in route.legs
-        )
+        works = [
+            Work(Handling.TAKE, source, call.car, call.wheelbase_mm, call),
+            Work(Handling.LEAVE, sink, call.car, call.wheelbase_mm, call),
+        ]
+        return _steps_of(route, works)
 
     def _deadline_us(self, call: CallForProposals, now_us: int) -> int:
         return from_bus_ms(call.deadline_ms, now_us)
+
+
+def _steps_of(route: Route, works: list[Work]) -> tuple[Step, ...]:
+    """The legs of a route as steps, each WORK leg with the next work."""
+    ahead = iter(works)
+    return tuple(
+        Step(
+            leg.action,
+            leg.track,
+            leg.from_index,
+            leg.to_index,
+            leg.begin_us,
+            leg.end_us,
+            next(ahead) if leg.action is LegAction.WORK else None,
+        )
+        for leg in route.legs
+    )

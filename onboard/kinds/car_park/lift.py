@@ -16,7 +16,7 @@ from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.lifts import gate, platform
 from onboard.core.messages import DriveOrder, DriveState, Itinerary, Leg, Message, PlatformState, Progress, TaskReport
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent
+from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine, Site
 from onboard.kinds.car_park.lift_generation import LiftGeneration
@@ -57,7 +57,7 @@ class LiftFactory:
         """The lift's steps; ``estimator`` is the one made above."""
         if not isinstance(estimator, LiftGeneration):
             raise TypeError("a lift needs its own task-generation function")
-        return Lift(fleet)
+        return Lift(fleet, estimator)
 
 
 @dataclass
@@ -65,6 +65,7 @@ class Lift:
     """One elevator. ``ride`` is the ride in hand, from the grant of the platform until it is back."""
 
     fleet: Fleet
+    generation: LiftGeneration
     kind: KindCode = KindCode.LIFT
     phase: LiftPhase = LiftPhase.STARTING
     ride: Ride | None = None
@@ -122,6 +123,7 @@ class Lift:
         if self.drive is None:
             self._sequence = message.sequence
         self.drive = message
+        self.generation.index = self._index()
         told = (self._index(), message.mode)
         if told == self._told:
             return []
@@ -134,11 +136,22 @@ class Lift:
         return self.stewardship.hear(message)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
-        """A ride that was awarded stands in the robot's itinerary already; a word ends the award's repeats."""
-        if not isinstance(event, Awarded):
-            return []
-        call = event.call
-        return [Send(TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE))]
+        """An option is kept while it stands, and never driven for: only the robots' firm itineraries move the lift.
+
+        A ride that was awarded stands in the robot's itinerary already; a word ends the award's repeats.
+        """
+        match event:
+            case PreAssigned(call_key=key, proposal=proposal):
+                self.generation.promises.update((key, promise) for promise in proposal.program)
+                return []
+            case Released(call_key=key):
+                self.generation.promises.pop(key, None)
+                return []
+            case Awarded(call_key=key, call=call):
+                self.generation.promises.pop(key, None)
+                taken = TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE)
+                return [Send(taken)]
+        return []
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Platform: to the robot of the next ride, at its floor. Gate: to the robot of the ride, at its floor."""
@@ -190,7 +203,7 @@ class Lift:
             self._gate_was_out = True
             return Reason.NONE
         if self.phase is LiftPhase.LEAVING and self._stands_at(ride.leave):
-            # As often as it is asked for: who waits aboard gives the gate back meanwhile. The ride ends with the platform.
+            # As often as it is asked for: who waits aboard gives the gate back. The ride ends with the platform.
             return Reason.NONE
         return Reason.DOOR_NOT_READY
 

@@ -121,6 +121,25 @@ class Program:
         last = remaining[kept - 1]
         return kept, last.destination, max(last.end_us, now_us)
 
+    def turning(self, now_us: int) -> tuple[int, Segment, int]:
+        """From where the rest can be done by another way: the number of remaining steps kept, the segment and the time.
+
+        The step in hand is kept, and what follows aboard a lift; a wait in hand is given up. Raises ``ValueError``
+        where the robot's position is not known yet.
+        """
+        if self.standing is None:
+            raise ValueError("no position is known yet")
+        remaining = self.remaining
+        if not remaining:
+            return 0, self.standing, now_us
+        if remaining[0].action is LegAction.STAND and not self._is_on_platform(remaining[0]):
+            return 0, remaining[0].destination, now_us
+        kept = 1
+        while kept < len(remaining) and self._is_on_platform(remaining[kept - 1]):
+            kept += 1
+        last = remaining[kept - 1]
+        return kept, last.destination, max(last.end_us, now_us)
+
     def _is_on_platform(self, step: Step) -> bool:
         """Whether a step ends aboard a lift: nobody changes plans there."""
         return step.action is LegAction.RIDE or lift_at(self.site, step.destination) is not None
@@ -139,14 +158,32 @@ class Program:
 
         A planned wait keeps its end, as it waits for something else: it takes up a delay as far as it is long enough.
         """
-        shifted: list[Step] = []
-        for step in self.remaining:
-            moved = step.shifted(by_us)
-            if step.action is LegAction.STAND:
-                moved = moved._replace(end_us=max(moved.begin_us, step.end_us))
-                by_us = moved.end_us - step.end_us
-            shifted.append(moved)
-        self.steps = shifted
+        self._tell_anew(_later(self.remaining, by_us))
+
+    def delay(self, number: int, by_us: int) -> None:
+        """Let remaining step ``number`` begin later by ``by_us`` > 0 and stand before it; that in hand lasts longer.
+
+        Stamp and order stay, the version grows. Where no step more can be told, the one before lasts longer instead.
+        """
+        steps = self.remaining
+        before, after = steps[:number], steps[number:]
+        if number == 0:
+            first = after[0]
+            rest = _later(after[1:], by_us)
+            self._tell_anew([first._replace(end_us=first.end_us + by_us), *rest])
+            return
+        last = before[-1]
+        if last.action is LegAction.STAND or len(steps) >= MAX_STEPS:
+            before[-1] = last._replace(end_us=last.end_us + by_us)
+        else:
+            place, begin_us = last.destination, after[0].begin_us
+            if last.action is LegAction.RIDE:
+                place = Segment(after[0].track, after[0].from_index)
+            before.append(Step(LegAction.STAND, place.track, place.index, place.index, begin_us, begin_us + by_us))
+        self._tell_anew([*before, *_later(after, by_us)])
+
+    def _tell_anew(self, steps: list[Step]) -> None:
+        self.steps = steps
         self.current = 0
         self.version = successor(self.version, 8)
 
@@ -161,6 +198,18 @@ class Program:
             # What was awarded is long done: an old award time could not be reached by the leg's 24 bits.
             stamp = stamp._replace(award_ms=to_bus_ms(now_us))
         return to_itinerary(sender, self.version, Grade.FIRM, stamp, steps)
+
+
+def _later(steps: list[Step], by_us: int) -> list[Step]:
+    """The same steps later (or earlier); a planned wait keeps its end and takes up a delay as far as it can."""
+    shifted: list[Step] = []
+    for step in steps:
+        moved = step.shifted(by_us)
+        if step.action is LegAction.STAND:
+            moved = moved._replace(end_us=max(moved.begin_us, step.end_us))
+            by_us = moved.end_us - step.end_us
+        shifted.append(moved)
+    return shifted
 
 
 def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: list[Step]) -> Itinerary:

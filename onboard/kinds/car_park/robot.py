@@ -5,12 +5,10 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
-    Criterion,
     Grade,
     KindCode,
     LegAction,
     MachineState,
-    Operation,
     Reason,
     TaskPhase,
 )
@@ -19,6 +17,7 @@ from onboard.core.lifts import sill
 from onboard.core.messages import (
     CallForProposals,
     DriveState,
+    Itinerary,
     Message,
     Reference,
     ShuttleState,
@@ -26,14 +25,19 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Awarded, CallTerms, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.negotiation import Answer as LiftAnswer
+from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import to_bus_ms
-from onboard.core.site import Machine, Segment, Site
+from onboard.core.site import Machine, RideCalls, Segment, Site
+from onboard.kinds.car_park.asking import AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
+from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
+from onboard.kinds.car_park.ride_calls import calls_after_winning
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.travel import Carriage
+from onboard.kinds.car_park.way import way_to_refuge
 
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
 REPLAN_TOLERANCE_US = 500_000
@@ -46,7 +50,8 @@ class RobotFactory:
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
         """The robot's task-generation function."""
-        return CarParkGeneration(site, machine, mirror, Program(site))
+        generation = AskingGeneration if site.rides is RideCalls.BEFORE else CarParkGeneration
+        return generation(site, machine, mirror, Program(site))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Robot":
         """The robot's steps; ``estimator`` is the one made above."""
@@ -65,13 +70,16 @@ class Robot:
     carriage: Carriage = field(init=False)
     shuttle: ShuttleWork = field(init=False)
     riding: Riding = field(init=False)
+    giving_way: GivingWay = field(init=False)
     _begun: bool = False
     _fault: Reason = Reason.NONE
 
     def __post_init__(self) -> None:
         self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
         self.shuttle = ShuttleWork(self.fleet)
+        self.carriage.way_on = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
+        self.giving_way = GivingWay(self.fleet, self.program)
 
     @property
     def program(self) -> Program:
@@ -112,8 +120,30 @@ class Robot:
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """Nothing beyond what tokens, mirror and negotiation take from the bus."""
-        return []
+        """Another machine's plan may mean that mine has to come later, or to take another way."""
+        if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or self.program.standing is None:
+            return []
+        if self.fleet.mirror.itineraries.get(message.sender) is not message:
+            return []
+        answer = self.giving_way.heed(message.sender, now_us)
+        if answer is Answer.ANEW:
+            return self._reroute(message.sender, now_us)
+        return self._publish(now_us) if answer is Answer.LATER else []
+
+    def _reroute(self, sender: int, now_us: int) -> list[Effect]:
+        """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
+        kept, origin, start_us = self.program.turning(now_us)
+        works = [step.work for step in self.program.remaining[kept:] if step.work is not None]
+        steps = self.generation.reroute(origin, start_us, works, now_us)
+        if steps is None:
+            return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is Answer.LATER else []
+        calls = [work.call for work in works]
+        if not kept:
+            self._begun = False
+        self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp)
+        effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
+        effects += self._publish(now_us)
+        return effects + (self._call_lifts(calls[0], steps, now_us) if calls else [])
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Pre-assignment keeps a tentative solution, being outbid drops it, an award makes it firm (row P47)."""
@@ -125,10 +155,10 @@ class Robot:
             case Released(call_key=key):
                 self.generation.tentative.pop(key, None)
                 return []
-            case Awarded(call_key=key, call=call, proposal=proposal):
+            case Awarded(call_key=key, call=call, proposal=proposal, parts=parts):
                 self.generation.tentative.pop(key, None)
                 (solution,) = proposal.program
-                return self._take_on(call, solution, now_us)
+                return self._take_on(call, solution, parts, now_us)
         return []
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
@@ -165,10 +195,11 @@ class Robot:
         return min(due) if due else None
 
     def statements(self, now_us: int) -> list[Effect]:
-        """My firm itinerary, and the car in my custody."""
+        """My firm itinerary as I told it under its version, where I am in it, and the tokens that I hold."""
         effects: list[Effect] = []
-        if self.program.version:
-            effects.append(Send(self.program.itinerary(self.fleet.node_id, now_us)))
+        itinerary = self.fleet.mirror.itineraries.get(self.fleet.node_id)
+        if itinerary is not None:
+            effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.current)]
         return effects + self.fleet.tokens.statements()
 
     # --- steps -------------------------------------------------------------------------------------------------
@@ -180,11 +211,11 @@ class Robot:
         self.carriage.go(here)
         return self._publish(now_us)
 
-    def _take_on(self, call: CallForProposals, promised: Solution, now_us: int) -> list[Effect]:
+    def _take_on(
+        self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], now_us: int
+    ) -> list[Effect]:
         """Second request of the task-generation function: the operating sequence that is really carried out."""
-        solution, _ = self.generation.solve(call, now_us)
-        if solution is None:
-            solution = promised
+        solution = self.generation.renewed(call, promised, now_us)
         kept = self.program.remaining[: solution.kept]
         if not kept:
             self._begun = False
@@ -195,25 +226,14 @@ class Robot:
         ]
         effects += self._publish(now_us)
         effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
-        return effects + self._call_lifts(call, solution, now_us)
+        return effects + self._call_lifts(call, solution.steps, now_us, parts)
 
-    def _call_lifts(self, call: CallForProposals, solution: Solution, now_us: int) -> list[Effect]:
-        """Each ride is a call of its own, made after winning, as the mirror told enough before (step 15)."""
+    def _call_lifts(
+        self, call: CallForProposals, steps: tuple[Step, ...], now_us: int, parts: tuple[LiftAnswer, ...] = ()
+    ) -> list[Effect]:
+        """Each ride is a call, made after winning (step 15) where no lift has promised it before (row P39)."""
         effects: list[Effect] = []
-        site = self.fleet.site
-        rides = [step for step in solution.steps if step.action is LegAction.RIDE]
-        for number, step in enumerate(rides, start=1):
-            terms = CallTerms(
-                task=call.task,
-                operation=Operation.RIDE,
-                kind=KindCode.LIFT,
-                criterion=Criterion.FINISH_TIME,
-                from_station=sill(site, step.track, step.from_index).number,
-                to_station=sill(site, step.track, step.to_index).number,
-                car=call.car,
-                wheelbase_mm=call.wheelbase_mm,
-                depth=number,
-            )
+        for terms in calls_after_winning(self.fleet.site, call, steps, parts):
             effects += self.fleet.negotiation.open(terms, now_us)
         return effects
 

@@ -7,6 +7,7 @@ from onboard.core.behaviour import Fleet
 from onboard.core.codes import OUTSIDE, CallResult, Operation, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TokenGrant
+from onboard.core.petitions import UNORDERED
 from onboard.core.site import Segment
 
 #: Calls remembered to know which car an award is about; older ones are long closed.
@@ -39,7 +40,7 @@ class Stewardship:
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """NONE where the token may go to ``requester`` now."""
         if key.kind is TokenKind.SEGMENT:
-            return self._passing_order(Segment(key.number >> 8, key.number & 0xFF), requester, now_us)
+            return self._passing_order(Segment(key.number >> 8, key.number & 0xFF), key, requester, now_us)
         if key.kind is TokenKind.CAR:
             car = Reference(key.number >> 16, key.number & 0xFFFF)
             return Reason.NONE if self.winners.get(car) == requester else Reason.TOKEN_NOT_GRANTABLE_YET
@@ -61,14 +62,13 @@ class Stewardship:
         statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
         return [Send(statement)] if self.fleet.mirror.on_car(statement) else []
 
-    def _passing_order(self, segment: Segment, requester: int, now_us: int) -> Reason:
-        """Tokens go in the plan's order: nobody else's firm window on the segment begins before the requester's."""
-        reservations = self.fleet.mirror.reservations
-        mine_us = reservations.first_start(requester, segment, now_us)
-        if mine_us is None:
-            # Standing there after power-up, or a plan not heard yet: only where nobody plans to be.
-            return Reason.NONE if reservations.is_free(segment, now_us, excluding=requester) else Reason.MIRROR_BEHIND
-        other_us = reservations.earliest_other_start(requester, segment, now_us)
-        if other_us is not None and other_us < mine_us:
+    def _passing_order(self, segment: Segment, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Tokens go in the plan's order, as its holder and the requester both see it; without one to the oldest."""
+        claim = self.fleet.petitions.claim(key, requester)
+        if claim is None:
             return Reason.TOKEN_NOT_GRANTABLE_YET
-        return Reason.NONE
+        if claim.itinerary_version == UNORDERED:
+            oldest = self.fleet.petitions.is_oldest_unordered(key, requester, now_us)
+            return Reason.NONE if oldest else Reason.TOKEN_NOT_GRANTABLE_YET
+        order = self.fleet.mirror.order
+        return order.verdict(requester, segment, claim.itinerary_version, claim.predecessor)

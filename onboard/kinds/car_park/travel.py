@@ -5,13 +5,16 @@ inside its authority at any moment; orders are repeated only while ``authorised`
 nothing brakes by itself.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from onboard.core.all_or_none import AllOrNone
 from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
+from onboard.core.refuges import refuges
 from onboard.core.serial import successor
 from onboard.core.site import Segment
 from onboard.kinds.car_park.axis import AlleyAxis
@@ -19,6 +22,8 @@ from onboard.kinds.car_park.axis import AlleyAxis
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
 #: journal writes and frames. Ours.
 LOOKAHEAD_US = 3_000_000
+#: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us. Ours.
+ORDER_PATIENCE_US = 5_000_000
 #: A machine stands at a segment's centre within this, mm (fine sensor, dbc/device.dbc).
 MARK_TOLERANCE_MM = 5
 
@@ -40,6 +45,12 @@ class Carriage:
     _axes: dict[int, AlleyAxis] = field(default_factory=dict)
     #: What ``advance`` looked at when it last found nothing to do.
     _settled: tuple[object, ...] | None = None
+    #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
+    way_on: Callable[[], list[Segment]] = list
+    whole: AllOrNone = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.whole = AllOrNone(self.fleet.tokens)
 
     @property
     def axis(self) -> AlleyAxis:
@@ -52,10 +63,12 @@ class Carriage:
     def standing_at(self) -> Segment | None:
         """The position at whose mark the carrier stands still, or None while it moves or stands between marks.
 
+        Both must say so: the measured way, which tells the marks apart, and the fine sensor, which sees one (row P34).
+
         On a lift's platform it is index 0 or length + 1 of the alley.
         """
         state = self.sensed
-        if state is None or state.mode is not DriveMode.STANDING:
+        if state is None or state.mode is not DriveMode.STANDING or not state.at_mark:
             return None
         index = self.axis.index_at(state.position_mm)
         off_mm = abs(state.position_mm - self.axis.position_mm(index))
@@ -91,11 +104,19 @@ class Carriage:
         started_or_stopped = before is None or before.mode is not state.mode
         if here == self._reported and not started_or_stopped:
             return []
+        return self.statement(itinerary_version, leg)
+
+    def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
+        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known."""
+        if self.sensed is None:
+            return []
+        here = Segment(self.track, self.axis.index_at(self.sensed.position_mm))
         self._reported = here
-        offset_mm = state.position_mm - self.axis.position_mm(here.index)
+        offset_mm = self.sensed.position_mm - self.axis.position_mm(here.index)
         progress = Progress(
-            self.fleet.node_id, itinerary_version, leg, here.track, here.index, offset_mm, state.speed_mm_s
+            self.fleet.node_id, itinerary_version, leg, here.track, here.index, offset_mm, self.sensed.speed_mm_s
         )
+        self.fleet.mirror.on_progress(progress)
         return [Send(progress)]
 
     def go(self, goal: Segment) -> None:
@@ -104,10 +125,13 @@ class Carriage:
             self.goal = goal
             self.target = None
             self.blocked = None
+            if goal not in self.whole.slots:
+                self.whole.end()
 
     def advance(self, now_us: int) -> list[Effect]:
         """Ask for the segments ahead, extend the drive's target as far as they are held, and repeat its order."""
-        due = self.refresh_at_us is not None and self.refresh_at_us <= now_us
+        due_us = self.next_wake()
+        due = due_us is not None and due_us <= now_us
         if not due and self._settled == self._outlook():
             return []
         effects = self._go_on(now_us)
@@ -122,11 +146,10 @@ class Carriage:
         if self.goal is None or self.sensed is None or self.arrived:
             return self._rest(now_us)
         ahead = self._ahead()
-        effects: list[Effect] = []
-        for slots in self.axis.rights(ahead)[: self._lookahead_segments()]:
-            for slot in slots:
-                effects += self.fleet.tokens.want(segment_token(slot), now_us)
+        effects = self._ask(ahead, now_us)
         reach, reason = self._reach(ahead)
+        if self.whole.slots and not self.whole.is_complete:
+            reach, reason = None, Reason.NOT_AUTHORISED
         if reach is None:
             return effects + self._hold(ahead, reason)
         if reach != self.target:
@@ -138,8 +161,39 @@ class Carriage:
         return effects + self._give_back(now_us)
 
     def next_wake(self) -> int | None:
-        """When the drive's order is to be repeated."""
-        return self.refresh_at_us
+        """When the drive's order is to be repeated, or something is to be done about missing tokens."""
+        asks = self.goal is not None and self.sensed is not None and not self.arrived
+        times = [self.refresh_at_us, *([self.whole.due_us, self._patience_over_us()] if asks else [])]
+        due = [time for time in times if time is not None]
+        return min(due) if due else None
+
+    def _ask(self, ahead: list[int], now_us: int) -> list[Effect]:
+        """Ask for the segments ahead; all of them to the next refuge where the order of passing cannot be agreed."""
+        over_us = self._patience_over_us()
+        if over_us is not None and over_us <= now_us:
+            self.whole.begin(self._way_to_refuge(ahead), now_us)
+        self.whole.passed(self.occupied())
+        if self.whole.slots:
+            return self.whole.advance(self.occupied(), now_us)
+        effects: list[Effect] = []
+        for slots in self.axis.rights(ahead)[: self._lookahead_segments()]:
+            for slot in slots:
+                effects += self.fleet.tokens.want(segment_token(slot), now_us)
+        return effects
+
+    def _patience_over_us(self) -> int | None:
+        """When to give up agreeing on an order with the holder of a wanted token, or None."""
+        behind = self.fleet.tokens.behind_since_us
+        return min(behind.values()) + ORDER_PATIENCE_US if behind and not self.whole.slots else None
+
+    def _way_to_refuge(self, ahead: list[int]) -> tuple[Segment, ...]:
+        places = refuges(self.fleet.site)
+        way: list[Segment] = []
+        for index in ahead:
+            way.append(self.axis.slot(index))
+            if way[-1] in places and len(way) > 1:
+                return tuple(way)
+        return (*way, *self.way_on())
 
     def _rest(self, now_us: int) -> list[Effect]:
         self.refresh_at_us = None
@@ -207,7 +261,7 @@ class Carriage:
 
     def _give_back(self, now_us: int) -> list[Effect]:
         """Return segments that the body has left and does not need again before its goal."""
-        needed = set(self.occupied())
+        needed = {*self.occupied(), *self.whole.slots}
         if self.goal is not None and not self.arrived:
             needed.update(slot for slots in self.axis.rights(self._ahead()) for slot in slots)
         effects: list[Effect] = []
@@ -220,6 +274,7 @@ class Carriage:
             steward = self.fleet.site.stewards[segment.track]
             if segment not in needed and steward != self.fleet.node_id:
                 effects += tokens.give(key, steward, now_us)
+                self.fleet.mirror.order.on_return(self.fleet.node_id, segment)
         return effects
 
     def _held_segments(self) -> list[TokenKey]:

@@ -13,10 +13,12 @@ from onboard.core.codes import Criterion, Grade, KindCode, Operation, Reason
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, Reference, Stamp
 from onboard.core.negotiation import (
+    Answer,
     Awarded,
     CallKey,
     CallTerms,
     Closed,
+    Estimator,
     Negotiation,
     NegotiationEvent,
     PreAssigned,
@@ -52,7 +54,11 @@ def terms(number: int = 1, **changes: int) -> CallTerms:
     """A call for a robot to park car ``number``; ``changes`` are whole numbers such as stations."""
     car = Reference(CALLER, number)
     values = {"from_station": 0x104, "to_station": 0xFFFF, "wheelbase_mm": 2_500} | changes
-    return CallTerms(car, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, car=car, **values)
+    station, goal, wheelbase_mm = values.pop("from_station"), values.pop("to_station"), values.pop("wheelbase_mm")
+    assert not values, "only these three may be changed here"
+    return CallTerms(
+        car, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, station, goal, car=car, wheelbase_mm=wheelbase_mm
+    )
 
 
 def a_call(call: int = 1, deadline_us: int = START_US + 1_000_000, **changes: object) -> CallForProposals:
@@ -125,17 +131,19 @@ class Machine:
     def __init__(
         self,
         node_id: int,
-        costs: Costs,
+        costs: Estimator,
         *,
         kind: KindCode = KindCode.ROBOT,
         silent: bool = False,
         slot: Slot = ANY_TIME,
     ) -> None:
-        costs.node = node_id
+        if isinstance(costs, Costs):
+            costs.node = node_id
         self.node_id = node_id
         self.negotiation = Negotiation(node_id, kind, TIMING, costs, silent=silent, slot=slot)
         self.committed: set[CallKey] = set()
         self.assigned: list[CallForProposals] = []
+        self.parts: list[tuple[Answer, ...]] = []
         self.released: list[Reason] = []
         self.closed: list[Closed] = []
         self.reports: list[str] = []
@@ -175,9 +183,10 @@ class Machine:
                 case Released(call_key=key, reason=reason):
                     self.committed.remove(key)
                     self.released.append(reason)
-                case Awarded(call_key=key, call=call):
+                case Awarded(call_key=key, call=call, parts=parts):
                     self.committed.discard(key)
                     self.assigned.append(call)
+                    self.parts.append(parts)
                     stamp = Stamp(call.deadline_ms, call.sender, call.call & 0xFF)
                     self._plans[key] = Itinerary(self.node_id, 8, Grade.FIRM, stamp, ())
                     self._restate_us = now_us + self.RESTATE_US

@@ -38,7 +38,7 @@ def test_every_state_is_reached_and_only_the_last_ones_end() -> None:
 def test_time_alone_ends_every_wait_and_every_reservation() -> None:
     """Row P14: whoever waits, or keeps reservations, stops by the clock; silent and lapsed machines keep nothing."""
     by_time = {PE.DUE, PE.DEADLINE, PE.LAPSE}
-    waits = {P.WAITING_BOUND, P.WAITING_COST, P.PRE_ASSIGNED, P.BELIEVING}
+    waits = {P.WAITING_BOUND, P.WAITING_COST, P.ASKING, P.PRE_ASSIGNED, P.BELIEVING, P.OPTION}
     assert {before for before, event in participant.TABLE if event in by_time} == waits
 
 

@@ -1,0 +1,77 @@
+"""Response times on the fleet bus, from queueing a frame to its end: measured on the simulated bus beside their bounds.
+
+Each shipped site runs an hour of random arrivals at 125, 250 and 500 kbit/s. Printed for each message: worst measured,
+the bound of our nodes' first-in first-out queues, and what priority queues would guarantee. A measured time above its
+bound, or traffic that the bounds do not allow for, ends the run with status 1.
+
+    python -m bench.response_times [SITE ...] [--minutes 60] [--rates 125000,250000,500000]
+"""
+
+import argparse
+import sys
+
+from bus_sim.response import Measured, measure
+from bus_sim.sites import find_site
+from onboard.trace.response import utilisation
+from onboard.trace.traffic import operation
+
+SITES = ("level1", "small", "standard")
+RATES = (125_000, 250_000, 500_000)
+
+
+def _ms(value_us: int | None) -> str:
+    return "none" if value_us is None else f"{value_us / 1000:.2f}"
+
+
+def report(runs: list[Measured]) -> list[str]:
+    """Tables of one site at several bit rates."""
+    site = runs[0].site
+    lines = [f"### {site.name}: {len(site.machines)} machines", ""]
+    heads = [f"{run.site.bitrate // 1000} kbit/s" for run in runs]
+    lines.append(
+        "| message, ms | " + " | ".join(f"{head}: measured | FIFO bound | priority bound" for head in heads) + " |"
+    )
+    lines.append("|---|" + "---|" * (3 * len(runs)))
+    for name in runs[0].bounds:
+        cells = [
+            (
+                _ms(run.meter.worst[False, name]) if (False, name) in run.meter.worst else "-",
+                *map(_ms, run.bounds[name]),
+            )
+            for run in runs
+        ]
+        lines.append(f"| {name} | " + " | ".join(text for cell in cells for text in cell) + " |")
+    starts = [max(worst for (at_start, _), worst in run.meter.worst.items() if at_start) for run in runs]
+    cells = [(_ms(start), _ms(run.power_up_us), "") for start, run in zip(starts, runs, strict=True)]
+    lines.append("| all start together | " + " | ".join(text for cell in cells for text in cell) + " |")
+    lines.append("")
+    for run in runs:
+        meter, tasks = run.meter, max(run.meter.tasks, 1)
+        share = utilisation(operation(run.site), run.site.bitrate)
+        frames = f"{meter.frames} frames, {meter.tasks} tasks done, {meter.frames / tasks:.0f} frames a task, "
+        frames += f"{(meter.frames - meter.periodic) / tasks:.0f} without heartbeats"
+        load = f"bus load mean {run.load:.2%}, worst second {run.worst_second:.1%}"
+        lines.append(f"{run.site.bitrate // 1000} kbit/s: {frames}; {load}; most that the streams allow {share:.0%}")
+        lines += [f"WRONG: {line}" for line in run.wrong]
+    return [*lines, ""]
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sites", nargs="*", default=SITES, metavar="SITE")
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--rates", default=",".join(map(str, RATES)))
+    parser.add_argument("--seed", type=int, default=1)
+    options = parser.parse_args()
+    wrong = 0
+    for name in options.sites:
+        rates = [int(rate) for rate in options.rates.split(",")]
+        runs = [measure(find_site(name), rate, options.minutes, options.seed) for rate in rates]
+        wrong += sum(len(run.wrong) for run in runs)
+        print("\n".join(report(runs)), flush=True)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

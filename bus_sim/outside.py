@@ -1,0 +1,56 @@
+"""What joins a simulated site from outside: clients of the served buses, and interfaces of python-can."""
+
+from rich.console import Console
+
+from bus_sim.run import FLEET, Simulation
+from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
+from bus_sim.serve.socketcand import ServeError, SocketcandServer
+
+
+class Outside:
+    """Everything that joins the buses from outside, for the time of a run.
+
+    ``serve`` is HOST:PORT for socketcand clients, ``buses`` are python-can interfaces as ``--bus`` names them. Entering
+    raises ``ServeError`` and ``BusOpenError`` for a person's mistakes.
+    """
+
+    def __init__(self, simulation: Simulation, serve: str | None, buses: tuple[str, ...], console: Console) -> None:
+        self._simulation = simulation
+        self._address = serve
+        self._buses = buses
+        self._console = console
+        self._server: SocketcandServer | None = None
+        self._bridges: list[Bridge] = []
+
+    async def __aenter__(self) -> None:
+        if self._address is not None or self._buses:
+            # Somebody acknowledges from the start: a lone controller would repeat its first frame for ever.
+            self._simulation.fleet.attach("gateway")
+        if self._address is not None:
+            await self._serve(self._address)
+        bitrate = self._simulation.site.bitrate
+        for settings in parse_bus_specs(self._buses, bitrate):
+            bridge, _ = await open_bridge(self._simulation.fleet.attach(str(settings), None), settings)
+            self._bridges.append(bridge)
+            self._console.print(f"the fleet bus is on {settings}", highlight=False)
+
+    async def __aexit__(self, *_: object) -> None:
+        for bridge in self._bridges:
+            await bridge.close()
+        if self._server is not None:
+            await self._server.close()
+
+    async def _serve(self, address: str) -> None:
+        host, _, port = address.rpartition(":")
+        if not port.isdigit():
+            raise ServeError(f"--serve {address}: must be HOST:PORT, such as 127.0.0.1:29536")
+        epoch_us = self._simulation.options.epoch_us
+        server = SocketcandServer(
+            self._simulation.join, lambda time_us: epoch_us + time_us, host or "127.0.0.1", int(port)
+        )
+        bound = await server.start()
+        self._server = server
+        channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
+        self._console.print(
+            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False
+        )

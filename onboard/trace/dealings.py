@@ -1,0 +1,191 @@
+"""Calls, bids, tasks, promises and plans told anew: what the machines of a site dealt out among themselves.
+
+All of it from messages of the fleet bus. A task is a call to park or to fetch that no other call stands behind; calls
+for a part of it (a ride) are sub-calls.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from onboard.core.codes import CallResult, Criterion, Grade, LegAction, Operation, TaskPhase
+from onboard.core.messages import (
+    Award,
+    Bid,
+    BusTime,
+    CallForProposals,
+    Itinerary,
+    Leg,
+    Message,
+    Reference,
+    Stamp,
+    TaskReport,
+    Waiting,
+)
+
+TASKS = (Operation.PARK, Operation.RETRIEVE)
+#: A plan told anew so soon after another machine's plan is the answer to it, us. Machines answer within one turn, and a
+#: plan of 31 legs takes 10 ms on a bus of 500 kbit/s.
+ANSWER_US = 50_000
+#: Why a plan was told anew: in answer to another's.
+ANSWER = "another's plan"
+_HALF_MS = 1 << 31
+
+
+@dataclass
+class Plan:
+    """The last firm itinerary of one machine, and what was heard since that may change it."""
+
+    version: int
+    stamp: Stamp
+    legs: tuple[Leg, ...]
+    waited: str | None = None
+
+
+@dataclass
+class Task:
+    """A task from its first call to its end."""
+
+    operation: Operation
+    owner: int = 0
+    promised_ms: int | None = None
+
+
+@dataclass
+class Counts:
+    """Everything counted since the last ``begin``; times in us of the log, slack in ms."""
+
+    messages: Counter[str] = field(default_factory=Counter)
+    calls: int = 0
+    sub_calls: int = 0
+    opened_again: int = 0
+    refused: int = 0
+    give_way_calls: int = 0
+    bids: int = 0
+    parked_us: list[int] = field(default_factory=list)
+    fetched_us: list[int] = field(default_factory=list)
+    #: Promised minus actual finishing time of each task done.
+    slack_ms: list[int] = field(default_factory=list)
+    #: By what changed (``times`` or ``way``) and why (``own time``, ``another's plan``, ``wait: REASON``).
+    replans: Counter[tuple[str, str]] = field(default_factory=Counter)
+    #: Ways taken without a task and not in answer to another's plan.
+    unasked_moves: int = 0
+
+
+class Dealings:
+    """A fold over the fleet bus: feed every message in the order of the log."""
+
+    def __init__(self) -> None:
+        self.counts = Counts()
+        self._calls: dict[tuple[int, int], CallForProposals] = {}
+        self._bids: dict[tuple[int, int], dict[int, int]] = {}
+        self._tasks: dict[Reference, Task] = {}
+        self._plans: dict[int, Plan] = {}
+        #: Stamps of awards whose winner has not told its plan yet.
+        self._fresh: set[tuple[int, int, int]] = set()
+        self._told_us: tuple[int, int] = (0, -ANSWER_US)
+        self._offset_us = 0
+
+    def begin(self) -> None:
+        """Count from now on; open calls and tasks are kept."""
+        self.counts = Counts()
+
+    def feed(self, message: Message, time_us: int) -> None:
+        """Take up one message."""
+        self.counts.messages[type(message).__name__] += 1
+        match message:
+            case BusTime():
+                self._offset_us = time_us - message.bus_time_us
+            case CallForProposals():
+                self._on_call(message)
+            case Bid():
+                self.counts.bids += 1
+                if (message.initiator, message.call) in self._calls:
+                    self._bids.setdefault((message.initiator, message.call), {})[message.sender] = message.cost
+            case Award():
+                self._on_award(message)
+            case TaskReport():
+                self._on_report(message, time_us)
+            case Waiting():
+                plan = self._plans.get(message.sender)
+                if plan is not None:
+                    plan.waited = message.reason.name
+            case Itinerary() if message.grade is Grade.FIRM:
+                self._on_plan(message, time_us)
+
+    # --- calls and tasks ---------------------------------------------------------------------------------------
+
+    def _on_call(self, call: CallForProposals) -> None:
+        key = (call.sender, call.call)
+        if key in self._calls:
+            return
+        self._calls[key] = call
+        counts = self.counts
+        counts.calls += 1
+        counts.sub_calls += call.depth > 0
+        counts.opened_again += call.attempt > 1
+        counts.give_way_calls += call.operation is Operation.GIVE_WAY
+        if call.depth == 0 and call.operation in TASKS:
+            self._tasks.setdefault(call.task, Task(call.operation))
+
+    def _on_award(self, award: Award) -> None:
+        if award.result is CallResult.OPTION:
+            return
+        key = (award.sender, award.call)
+        call, bids = self._calls.pop(key, None), self._bids.pop(key, {})
+        if call is None:
+            return
+        self.counts.refused += award.result is CallResult.REFUSED
+        task = self._tasks.get(call.task)
+        if award.result is not CallResult.AWARDED or call.depth or task is None:
+            return
+        task.owner = award.winner
+        task.promised_ms = bids.get(award.winner) if call.criterion is Criterion.FINISH_TIME else None
+        self._fresh.add((award.winner, award.sender, award.call & 0xFF))
+
+    def _on_report(self, report: TaskReport, time_us: int) -> None:
+        if report.phase is TaskPhase.REFUSED:
+            self._tasks.pop(report.task, None)
+        if report.phase is not TaskPhase.DONE or report.task not in self._tasks:
+            return
+        task = self._tasks.pop(report.task)
+        done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
+        done.append(time_us)
+        if task.promised_ms is not None and task.owner == report.sender:
+            late_ms = (time_us - self._offset_us) // 1000 - task.promised_ms
+            self.counts.slack_ms.append(-((late_ms + _HALF_MS) % (2 * _HALF_MS) - _HALF_MS))
+
+    # --- plans -------------------------------------------------------------------------------------------------
+
+    def _on_plan(self, itinerary: Itinerary, time_us: int) -> None:
+        old = self._plans.get(itinerary.sender)
+        if old is not None and old.version == itinerary.version:
+            return
+        self._plans[itinerary.sender] = Plan(itinerary.version, itinerary.stamp, itinerary.legs)
+        teller, told_us = self._told_us
+        self._told_us = (itinerary.sender, time_us)
+        award = (itinerary.sender, itinerary.stamp.initiator, itinerary.stamp.call)
+        if award in self._fresh:
+            self._fresh.discard(award)
+            return
+        if old is None:
+            return
+        why = "own time" if old.waited is None else f"wait: {old.waited}"
+        if teller != itinerary.sender and time_us - told_us <= ANSWER_US:
+            why = ANSWER
+        what = "times" if _is_rest_of(itinerary.legs, old.legs) else "way"
+        self.counts.replans[what, why] += 1
+        if what == "way" and why != ANSWER and not self._has_task(itinerary.sender):
+            self.counts.unasked_moves += 1
+
+    def _has_task(self, node: int) -> bool:
+        return any(task.owner == node for task in self._tasks.values())
+
+
+def _is_rest_of(new: tuple[Leg, ...], old: tuple[Leg, ...]) -> bool:
+    """Whether the new plan goes the old one's way from somewhere on; waits may come, go and change."""
+    after, before = ([_way(leg) for leg in legs if leg.action is not LegAction.STAND] for legs in (new, old))
+    return before[len(before) - len(after) :] == after if len(after) <= len(before) else False
+
+
+def _way(leg: Leg) -> tuple[int, int, int, int]:
+    return leg.action, leg.track, leg.to_index, leg.side

@@ -1,0 +1,230 @@
+"""How much the machines of a site may put on the fleet bus, message by message: what response-time bounds start from.
+
+Most messages are sent on events, so their bounds need a stated most. Each row below says how many frames may be queued
+at once and after which time as many again, and why; ``excess`` tells whether a bus kept to that. Two rows of life:
+``operation`` (all machines run, nobody asks anybody to say everything again) and ``power_up`` (all start together).
+Gateways, whose orders a person gives, and lost frames, which are sent again, are not counted.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from onboard.core.codes import KindCode
+from onboard.core.site import Site
+from onboard.trace.frame_length import longest_frame_bits
+from onboard.trace.response import ANYBODY, Stream
+from onboard.wire.dbc_file import MessageLayout, fleet_layouts
+
+_SECOND_US = 1_000_000
+#: Legs that an itinerary's head can announce (dbc/fleet.dbc).
+_MOST_LEGS = 31
+#: A robot asks for the segments that it covers while it brakes and in this time (kinds/car_park/travel.py), us.
+_LOOKAHEAD_US = 3_000_000
+#: Beside segments ahead: a lift's platform and gate. A car and a place are asked for where no way is ahead.
+_OTHER_RIGHTS = 2
+#: Rides of one task: to the car and to its place, each by two lifts where another floor's alley is crossed.
+_RIDES = 4
+#: A timer may be late by a journal write and what is decided before it, us.
+_TIMER_JITTER_US = 100_000
+
+_ALL = (KindCode.ROBOT, KindCode.LIFT, KindCode.COMPARTMENT)
+_ROBOT = (KindCode.ROBOT,)
+_LIFT = (KindCode.LIFT,)
+_COMPARTMENT = (KindCode.COMPARTMENT,)
+
+
+class Numbers(NamedTuple):
+    """What bursts and periods are made of: machines by kind, rights that a robot asks for at once, times in us."""
+
+    nodes: int
+    robots: int
+    compartments: int
+    rights: int
+    token_repeat_us: int
+    heartbeat_us: int
+    bus_time_us: int
+    call_window_us: int
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """At most ``burst`` frames of ``message`` at once from each machine of ``kinds``, or from all together (``()``)."""
+
+    message: str
+    kinds: tuple[KindCode, ...]
+    burst: Callable[[Numbers], int]
+    period_us: Callable[[Numbers], int]
+    why: str
+    jitter_us: Callable[[Numbers], int] = lambda _: 0
+
+
+def _one(_: Numbers) -> int:
+    return 1
+
+
+def _two(_: Numbers) -> int:
+    return 2
+
+
+def _second(_: Numbers) -> int:
+    return _SECOND_US
+
+
+def _window(numbers: Numbers) -> int:
+    return numbers.call_window_us
+
+
+def _rides(numbers: Numbers) -> int:
+    return _RIDES * numbers.compartments
+
+
+def _late(_: Numbers) -> int:
+    return _TIMER_JITTER_US
+
+
+_OPERATION = (
+    Row("EmergencyStop", _ALL, _one, _second, "a person presses a button"),
+    Row(
+        "TokenRequest",
+        _ROBOT,
+        lambda n: n.rights,
+        lambda n: n.token_repeat_us,
+        "each right is asked for again so often",
+    ),
+    Row(
+        "TokenRefusal",
+        (),
+        lambda n: n.robots * n.rights,
+        lambda n: n.token_repeat_us,
+        "the holder answers each request",
+    ),
+    Row("TokenGrant", (), lambda n: 2 * n.robots * n.rights, _second, "all rights of all robots come and go"),
+    Row("TokenHeld", (), lambda n: 2 * n.robots * n.rights, _second, "one for each grant"),
+    Row("BusTime", (), _one, lambda n: n.bus_time_us, "its period; one machine sends it", _late),
+    Row("Heartbeat", _ALL, _one, lambda n: n.heartbeat_us, "its period", _late),
+    Row("Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "with a heartbeat, for each reason that grew", _late),
+    *(
+        row
+        for part in ("Call", "CallTerms", "CallLoad")
+        for row in (
+            Row(part, _COMPARTMENT, _one, _window, "a desk has one call open at a time"),
+            Row(part, (), _rides, _window, "all rides of the tasks that desks call for"),
+        )
+    ),
+    Row("CallParent", (), _rides, _window, "with each ride's call"),
+    Row("Award", _COMPARTMENT, _two, _window, "one for each call, said again once"),
+    Row("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride, said again once"),
+    Row("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
+    Row("Bid", (), _rides, _window, "one for each ride called for"),
+    Row("ItineraryHead", _ROBOT, _one, _window, "tentative with a bid, firm with its award, or a delay", _window),
+    Row("ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs with each head", _window),
+    Row(
+        "Progress", (KindCode.ROBOT, KindCode.LIFT), _two, lambda _: _SECOND_US // 2, "segments at top speed, and stops"
+    ),
+    Row("Waiting", _ROBOT, _two, _second, "once for each thing waited for"),
+    Row("TaskReport", _ROBOT, _two, _second, "one phase ends and the next begins"),
+    Row("TaskReport", (), _rides, _window, "one for each ride won"),
+    Row("TaskReport", _COMPARTMENT, _two, _second, "as a robot"),
+    Row("CarAt", _ALL, _two, _second, "a car changes hands"),
+)
+
+#: Every machine says all it has to each of the others as it hears of it, which is twice for those that ask all at
+#: first. Nobody holds cars or has plans yet.
+_POWER_UP = (
+    Row("SyncRequest", _ALL, lambda n: n.nodes, lambda n: 5 * n.heartbeat_us, "to all, and to each new peer"),
+    Row("TokenHeld", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
+    Row("ItineraryHead", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
+    Row("ItineraryLeg", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "an idle robot's one leg"),
+    Row(
+        "Progress", (KindCode.ROBOT, KindCode.LIFT), lambda n: 2 * n.nodes + 2, lambda n: 5 * n.heartbeat_us, "the same"
+    ),
+    Row("BusTime", (), lambda n: 3 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks, by two for a moment"),
+    Row("Heartbeat", _ALL, _two, lambda n: n.heartbeat_us, "at once, when bus time is heard, then its period", _late),
+    Row("Diagnostic", _ALL, _two, lambda n: n.heartbeat_us, "as in operation", _late),
+)
+
+
+def numbers_of(site: Site) -> Numbers:
+    """A site's numbers; the lookahead is that of the shortest segments."""
+    kinds = [machine.kind for machine in site.machines.values()]
+    carrier = site.carrier
+    braking_mm = carrier.speed_mm_s**2 // (2 * carrier.acceleration_mm_s2)
+    ahead_mm = braking_mm + carrier.speed_mm_s * _LOOKAHEAD_US // _SECOND_US
+    shortest_mm = min(track.pitch_mm for number, track in site.tracks.items() if number not in site.lifts)
+    return Numbers(
+        len(kinds),
+        kinds.count(KindCode.ROBOT),
+        kinds.count(KindCode.COMPARTMENT),
+        2 + -(-ahead_mm // shortest_mm) + _OTHER_RIGHTS,
+        site.timing.token_repeat_us,
+        site.timing.heartbeat_us,
+        site.timing.bus_time_us,
+        site.timing.call_window_us,
+    )
+
+
+def operation(site: Site) -> list[Stream]:
+    """Everything that may be queued while a site runs."""
+    return list(_streams(site, _OPERATION))
+
+
+def power_up(site: Site) -> list[Stream]:
+    """Everything that may be queued when all machines of a site start together."""
+    return list(_streams(site, _POWER_UP))
+
+
+def reasons() -> Iterator[tuple[str, str]]:
+    """Message and reason of each row of operation, for documents."""
+    return ((row.message, row.why) for row in _OPERATION)
+
+
+def _streams(site: Site, rows: Iterable[Row]) -> Iterator[Stream]:
+    layouts = {layout.name: layout for layout in fleet_layouts()}
+    numbers = numbers_of(site)
+    for row in rows:
+        senders = [m.node_id for m in site.machines.values() if m.kind in row.kinds] if row.kinds else [ANYBODY]
+        for node in senders:
+            yield _stream(row, node, layouts[row.message], numbers)
+
+
+def _stream(row: Row, node: int, layout: MessageLayout, numbers: Numbers) -> Stream:
+    # Whoever it is that sends, no node-ID makes the frame longer than the longest.
+    ids = range(1, 256) if node == ANYBODY else (node,)
+    bits = max(longest_frame_bits(layout.frame_id | one, layout.length) for one in ids)
+    burst, period_us, jitter_us = row.burst(numbers), row.period_us(numbers), row.jitter_us(numbers)
+    return Stream(node, layout.name, layout.frame_id | node, bits, period_us, burst, jitter_us)
+
+
+def excess(streams: Iterable[Stream], queued: Iterable[tuple[int, int, str]]) -> list[str]:
+    """Where a bus was asked for more than its streams allow: one line for each stream; none is as it should be.
+
+    ``queued``: time in us, node-ID and message of each frame as it was queued, in order of time. Frames of
+    messages that no stream is for are told, too.
+    """
+    by_node = {(stream.node, stream.name): stream for stream in streams}
+    times: dict[tuple[int, str], list[int]] = {}
+    for time_us, node, name in queued:
+        key = (node, name) if (node, name) in by_node else (ANYBODY, name)
+        times.setdefault(key, []).append(time_us)
+    found = []
+    for key, seen in sorted(times.items()):
+        stream = by_node.get(key)
+        line = f"no stream for {key[1]}" if stream is None else _too_many(stream, seen)
+        if line:
+            found.append(line)
+    return found
+
+
+def _too_many(stream: Stream, times: list[int]) -> str:
+    """A bucket that holds as many bursts as may come at once, and is filled by one each period."""
+    for last, until_us in enumerate(times):
+        for first in range(last, -1, -1):
+            span_us = until_us - times[first] + 1
+            allowed = stream.burst * -(-(span_us + stream.jitter_us) // stream.period_us)
+            if last - first + 1 > allowed:
+                at = f"{last - first + 1} frames within {span_us} us up to {until_us / 1e6:.6f} s"
+                return f"{stream.name} of node {stream.node}: {at}, at most {allowed} expected"
+            if span_us > 10 * stream.period_us:
+                break
+    return ""

@@ -1,0 +1,118 @@
+"""One image on every machine, nobody above another (row P01); what a task costs is each kind's own (row P21)."""
+
+import pytest
+
+from bus_sim.run import Simulation
+from bus_sim.sites import find_site
+from onboard.controller.shell import Controller
+from onboard.core.codes import ANY_STATION, CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
+from onboard.core.holon import Holon
+from onboard.core.messages import Award, CallForProposals, Heartbeat, Reference, Stamp, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Estimator
+from onboard.core.serial import to_bus_ms
+from onboard.core.site import Segment
+from onboard.kinds.car_park.bay_generation import BayGeneration
+from onboard.kinds.car_park.generation import CarParkGeneration
+from onboard.kinds.car_park.program import Program, Step, to_itinerary
+from onboard.kinds.registry import factory_for
+from tests.sites import one_floor
+from tests.system.scene import Scene, play, stays
+
+SITE = find_site("small")
+#: All have found each other by then, and no customer has come, s.
+KILLED_S = 9.0
+
+
+def without(name: str | None) -> Scene:
+    """A car comes to the small site; one machine's controller, if any, loses its power before."""
+
+    def cut(simulation: Simulation) -> None:
+        if name is None:
+            return
+        node_id = SITE.machine(name).node_id
+        for medium in (simulation.fleet, simulation.devices[node_id]):
+            node = next(one for one in medium._nodes if one.name == name)
+            simulation.loop.call_at(KILLED_S, node.power_off)
+        # Somebody acknowledges what the devices say: a lone sensor would repeat its frame for ever.
+        simulation.devices[node_id].attach("listener")
+
+    return play(SITE, stays((0, None)), before=cut, limit_s=600, extra_s=200)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Scene:
+    return without(None)
+
+
+def test_p01_every_machine_runs_the_same_code_and_says_so(whole: Scene) -> None:
+    """The same classes drive all; they differ by what the registry has for the kind in the machine file."""
+    controllers = whole.simulation.controllers
+    assert {type(one) for one in controllers.values()} == {Controller}
+    assert {type(one.holon) for one in controllers.values()} == {Holon}
+    assert {one.holon.site.digest for one in controllers.values()} == {SITE.digest}
+    beats = [beat for _, beat in whole.all(Heartbeat)]
+    assert {beat.sender for beat in beats} == set(SITE.machines)
+    assert len({(beat.contract, beat.site_digest) for beat in beats}) == 1
+
+
+@pytest.mark.parametrize("name", ["MR1", "MR2", "ER2"])
+def test_p01_a_machine_dies_and_the_others_park_the_car(name: str) -> None:
+    scene = without(name)
+    assert scene.simulation.plant.oracle.finish() == []
+    dead = SITE.machine(name).node_id
+    last_word_us = max(time_us for time_us, beat in scene.all(Heartbeat) if beat.sender == dead)
+    assert last_word_us < KILLED_S * 1e6
+    _, award = scene.first(Award, lambda m: m.result is CallResult.AWARDED)
+    assert award.winner != dead and SITE.machines[award.winner].kind is KindCode.ROBOT
+    scene.first(TaskReport, lambda m: m.task == award.task and m.phase is TaskPhase.DONE)
+    summary = scene.simulation.plant.street.summary()
+    assert (summary.parked, summary.inside) == (1, 1)
+
+
+# --- row P21 ---------------------------------------------------------------------------------------------------------
+
+
+def foreseen(mirror: Mirror) -> None:
+    """Robot 12 is going to stand before the compartment for two minutes from now on."""
+    program = Program(one_floor(robots=2), Segment(1, 6))
+    steps = [
+        Step(LegAction.TRAVEL, 1, 6, 4, 0, 5_000_000),
+        Step(LegAction.STAND, 1, 4, 4, 5_000_000, 120_000_000),
+        Step(LegAction.TRAVEL, 1, 4, 12, 120_000_000, 140_000_000),
+    ]
+    program.replace(steps, Stamp(0, 1, 2))
+    mirror.on_itinerary(to_itinerary(12, 7, Grade.FIRM, Stamp(0, 1, 2), steps), 0)
+
+
+def a_call(operation: Operation, kind: KindCode) -> CallForProposals:
+    task = Reference(1, 1)
+    return CallForProposals(
+        1, 1, task, operation, kind, Criterion.FINISH_TIME, 1, 0, to_bus_ms(2_000_000),
+        one_floor().compartments[1].number, ANY_STATION, task, 2700,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("node", "operation", "depends"), [(11, Operation.PARK, True), (1, Operation.RECEIVE, False)], ids=["robot", "bay"]
+)
+def test_p21_one_interface_two_kinds_of_cost_with_and_without_the_others_plans(
+    node: int, operation: Operation, depends: bool
+) -> None:
+    """The negotiation asks both by the same three questions; only the vehicle's answer depends on what others plan."""
+    site = one_floor(robots=2)
+    machine = site.machines[node]
+    costs = []
+    for others in (False, True):
+        mirror = Mirror(site, node)
+        if others:
+            foreseen(mirror)
+        estimator: Estimator = factory_for(machine.kind).estimator(site, machine, mirror)
+        if isinstance(estimator, CarParkGeneration):
+            estimator.program.standing = Segment(1, 2)
+        proposal = estimator.estimate(a_call(operation, machine.kind), 1_000_000)
+        assert proposal is not None
+        costs.append(proposal.cost)
+        assert isinstance(estimator, CarParkGeneration if depends else BayGeneration)
+    assert (costs[1] > costs[0] + 60_000) is depends
+    assert (costs[1] == costs[0]) is not depends

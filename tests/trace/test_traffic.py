@@ -1,0 +1,75 @@
+"""What the machines may put on the bus, and whether a running site keeps to it and to the bounds that follow."""
+
+import pytest
+
+from bus_sim.response import Measured, measure
+from bus_sim.sites import find_site
+from onboard.core.codes import KindCode
+from onboard.trace.response import ANYBODY, Stream, fifo_bounds
+from onboard.trace.traffic import excess, operation, power_up, reasons
+from onboard.wire.dbc_file import fleet_layouts
+
+#: Sent by gateways, or to those who ask for everything again.
+NOT_IN_OPERATION = {"OperatorOrder", "SyncRequest"}
+
+
+def test_every_message_of_the_contract_has_its_stream_from_those_who_may_send_it() -> None:
+    site = find_site("standard")
+    streams = operation(site)
+    assert {stream.name for stream in streams} == {layout.name for layout in fleet_layouts()} - NOT_IN_OPERATION
+    senders = {layout.name: layout.senders for layout in fleet_layouts()}
+    roles = {KindCode.ROBOT: "Robot", KindCode.LIFT: "Lift", KindCode.COMPARTMENT: "Compartment"}
+    for stream in [*streams, *power_up(site)]:
+        if stream.node != ANYBODY:
+            assert roles[site.machines[stream.node].kind] in senders[stream.name]
+    assert all(why for _, why in reasons())
+
+
+def test_streams_are_told_once_and_have_the_priority_of_their_identifiers() -> None:
+    streams = operation(find_site("small"))
+    assert len({(stream.node, stream.name) for stream in streams}) == len(streams)
+    by_priority = sorted({(stream.priority >> 16, stream.name) for stream in streams})
+    assert [name for _, name in by_priority][:2] == ["EmergencyStop", "TokenGrant"]
+
+
+def test_more_than_a_stream_allows_is_told_with_the_time() -> None:
+    stream = Stream(11, "Bid", 5, 150, 1_000_000, burst=2)
+    assert excess([stream], [(time_us, 11, "Bid") for time_us in (0, 0, 1_000_000, 1_000_000)]) == []
+    (line,) = excess([stream], [(0, 11, "Bid"), (5, 11, "Bid"), (999_999, 11, "Bid")])
+    assert line == "Bid of node 11: 3 frames within 1000000 us up to 0.999999 s, at most 2 expected"
+    assert excess([stream], [(0, 12, "Bid"), (0, 12, "Bid")]) == ["no stream for Bid"]
+
+
+def test_jitter_lets_two_bursts_come_together_but_not_three() -> None:
+    stream = Stream(ANYBODY, "Bid", 5, 150, 1_000_000, jitter_us=1_000_000)
+    assert excess([stream], [(0, 11, "Bid"), (1, 12, "Bid")]) == []
+    assert len(excess([stream], [(0, 11, "Bid"), (1, 12, "Bid"), (2, 13, "Bid")])) == 1
+
+
+@pytest.mark.parametrize("site", ["level1", "small", "standard", "large"])
+def test_every_shipped_site_has_bounds_at_its_own_bit_rate(site: str) -> None:
+    loaded = find_site(site)
+    bounds = fifo_bounds(operation(loaded), loaded.bitrate)
+    assert all(bound.response_us is not None for bound in bounds)
+
+
+@pytest.fixture(scope="module", params=[125_000, 500_000])
+def run(request: pytest.FixtureRequest) -> Measured:
+    """Ten minutes of the small site: robots share lifts, cars come and go."""
+    return measure(find_site("small"), request.param, 10)
+
+
+def test_no_response_on_a_running_site_is_above_its_bound_and_no_traffic_beyond_its_streams(run: Measured) -> None:
+    assert run.wrong == []
+    assert run.meter.tasks >= 5
+    seen = {name for at_start, name in run.meter.worst if not at_start}
+    assert seen >= {"Heartbeat", "Call", "CallLoad", "Bid", "Award", "ItineraryLeg", "TokenGrant", "TokenHeld", "CarAt"}
+
+
+def test_what_is_measured_is_at_least_a_frames_length_and_a_bound_that_is_too_low_would_be_noticed(
+    run: Measured,
+) -> None:
+    shortest_us = 100 * 1_000_000 // run.site.bitrate
+    assert all(worst_us > shortest_us for worst_us in run.meter.worst.values())
+    legs = run.meter.worst[False, "ItineraryLeg"]
+    assert legs > 4 * shortest_us, "the legs of an itinerary wait for each other"
