@@ -69,6 +69,8 @@ class Measured:
     load: float
     worst_second: float
     bounds: dict[str, tuple[int | None, int | None]]
+    #: Messages of which a second may be queued before the first is out, by both kinds of queue.
+    late: tuple[list[str], list[str]]
     power_up_us: int | None
     wrong: list[str]
 
@@ -110,7 +112,9 @@ def judge(site: Site, meter: Meter, load: float, worst_second: float) -> Measure
         bound_us = power_up_us if at_start else bounds.get(name, (None, None))[0]
         if bound_us is not None and worst_us > bound_us:
             wrong.append(f"{name}: {worst_us} us measured, above its bound of {bound_us} us")
-    return Measured(site, meter, load, worst_second, bounds, power_up_us, wrong)
+    queues = (fifo_bounds(running, site.bitrate), priority_bounds(running, site.bitrate))
+    fifo, priority = (list(dict.fromkeys(b.stream.name for b in found if not b.is_met)) for found in queues)
+    return Measured(site, meter, load, worst_second, bounds, (fifo, priority), power_up_us, wrong)
 
 
 def worst_by_message(streams: list[Stream], bit_rate: int) -> dict[str, tuple[int | None, int | None]]:

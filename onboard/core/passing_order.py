@@ -46,8 +46,8 @@ class Meeting(NamedTuple):
 class _Way:
     """One machine's plan: its turns, and how far it has come.
 
-    ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is at index
-    ``body`` and has left the segments ``left``.
+    ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is at
+    index ``body`` and has left the segments ``left``.
     """
 
     itinerary: Itinerary

@@ -88,6 +88,35 @@ class Reservations:
             gaps.append(Interval(free_us, FOREVER))
         return gaps
 
+    def with_way_given(self, after_us: int) -> "Reservations":
+        """A copy in which machines that stand for ever have given way by ``after_us``, and where they stand is free."""
+        found = Reservations()
+        found._uses = {lift_track: list(uses) for lift_track, uses in self._uses.items()}
+        found._segments = {owner: set(segments) for owner, segments in self._segments.items()}
+        for segment, windows in self._windows.items():
+            kept = [(start, min(end, after_us) if end >= FOREVER else end, owner) for start, end, owner in windows]
+            found._windows[segment] = [window for window in kept if window[0] < window[1]]
+        return found
+
+    def standing_in(self, owner: int, windows: Iterable[Window]) -> list[int]:
+        """Nodes other than ``owner`` that stand for ever where one of ``windows`` is, in order."""
+        found = set()
+        for window in windows:
+            for start_us, end_us, holder in self._windows.get(window.segment, ()):
+                if holder != owner and end_us >= FOREVER and start_us < window.to_us:
+                    found.add(holder)
+        return sorted(found)
+
+    def standing_since(self, owner: int) -> int | None:
+        """When ``owner`` begins to stand for ever, by its plan; None where it never does."""
+        starts = [
+            start_us
+            for segment in self._segments.get(owner, ())
+            for start_us, end_us, holder in self._windows.get(segment, ())
+            if holder == owner and end_us >= FOREVER
+        ]
+        return min(starts, default=None)
+
     def uses(self, lift_track: int, excluding: int) -> list[Use]:
         """Uses of one lift by all but ``excluding``, sorted by begin, end and owner."""
         return [use for use in self._uses.get(lift_track, ()) if use.owner != excluding]

@@ -21,7 +21,6 @@ rounded up; inside, ticks of 1 / (bit rate) us, so that nothing is rounded twice
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import count
 
 #: One bit time and one microsecond in ticks are ``_TICKS_PER_BIT`` and the bit rate.
 _TICKS_PER_BIT = 1_000_000
@@ -227,8 +226,5 @@ def _fifo_response(ticks: _Ticks, node: int, responses: dict[int, int], ceiling:
 
 def _next_release(ticks: _Ticks, stream: Stream, after: int) -> int:
     """When a stream that began at 0 with its full jitter queues again, later than ``after``."""
-    for number in count((after + ticks.jitter(stream)) // ticks.period(stream) + 1):
-        release = number * ticks.period(stream) - ticks.jitter(stream)
-        if release > after:
-            return release
-    raise AssertionError("count does not end")
+    number = (after + ticks.jitter(stream)) // ticks.period(stream) + 1
+    return number * ticks.period(stream) - ticks.jitter(stream)

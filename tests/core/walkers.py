@@ -91,7 +91,6 @@ class Walker:
     path: list[tuple[Segment, int, int]] = field(default_factory=list)
     done: int = 0
     may_move_at_us: int = 0
-    _dropped: int = 0
 
     @property
     def state(self) -> MachineState:
@@ -157,10 +156,16 @@ class Walker:
         return Reason.TOKEN_NOT_GRANTABLE_YET
 
     def advance(self, now_us: int) -> list[Effect]:
-        if self.at is None or self.done == len(self.path):
+        if self.at is None:
+            return []
+        tokens = self.fleet.tokens
+        wanted = self.path[self.done][0] if self.done < len(self.path) else self.at
+        for key in [key for key in tokens.held if key not in (segment_token(self.at), segment_token(wanted))]:
+            # A request that came late was granted.
+            return tokens.give(key, STEWARD, now_us)
+        if self.is_home:
             return []
         following, _, number = self.path[self.done]
-        tokens = self.fleet.tokens
         if not tokens.holds(segment_token(following)):
             return tokens.want(segment_token(following), now_us)
         if now_us < self.may_move_at_us:

@@ -6,13 +6,14 @@ import pytest
 
 from bus_sim.baselines.session_lock import SessionLocks
 from bus_sim.sites import find_site
-from onboard.core.codes import ANY_STATION, Criterion, KindCode, LegAction, Operation
+from onboard.core.codes import ANY_STATION, Criterion, Grade, KindCode, LegAction, Operation, Side
 from onboard.core.lift_uses import GATE_US, ride_us, run_up_us
-from onboard.core.messages import CallForProposals, Itinerary, Reference, Stamp
+from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.core.site import RideCalls, Site
+from onboard.core.sipp import Route, Visit, plan_route
+from onboard.core.site import RideCalls, Segment, Site
 from onboard.kinds.car_park.asking import TOLERANCE_US, AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.lift_generation import LiftGeneration, Promise
@@ -255,14 +256,30 @@ def test_p39_a_session_begins_with_the_call_and_a_planned_ride_with_boarding(loc
 
 
 def test_p39_nobody_rides_in_between_a_call_and_its_ride_under_a_session_lock() -> None:
-    """The same task planned around the same other robot: the lock can only make it later."""
-    finish_us = {}
+    """Robot 11 calls the left lift and waits a minute on its way; robot 12 could ride in that minute."""
+    site = site_with(RideCalls.AFTER)
+    legs = (
+        _leg(LegAction.STAND, 2, 8, 8, 60_000),
+        _leg(LegAction.TRAVEL, 2, 8, 0, 76_000),
+        _leg(LegAction.RIDE, 128, 2, 1, 82_000),
+        _leg(LegAction.TRAVEL, 1, 0, 3, 90_000),
+    )
+    planned = Itinerary(11, 1, Grade.FIRM, Stamp(to_bus_ms(NOW_US), 1, 1), legs)
+    done_us = {}
     for locked in (False, True):
-        mirror = Mirror(site_with(RideCalls.AFTER), 12)
+        mirror = Mirror(site, 12)
         if locked:
             mirror.reservations = SessionLocks(mirror)
-        mirror.on_itinerary(firm(11), NOW_US)
-        solution, _ = robot(12, RideCalls.AFTER, mirror).solve(park(2), NOW_US)
-        assert solution is not None
-        finish_us[locked] = solution.finish_us
-    assert finish_us[True] > finish_us[False], finish_us
+        mirror.on_itinerary(planned, NOW_US)
+        visits = (Visit(Segment(2, 2), 1_000_000),)
+        route = plan_route(
+            site, mirror.reservations, 12, Segment(3, 1), NOW_US, visits, frozenset({Segment(3, 8)}), 4_000
+        )
+        assert isinstance(route, Route)
+        done_us[locked] = route.finish_us - NOW_US
+    assert done_us[False] < 30_000_000
+    assert done_us[True] > 70_000_000, "by the other lift, as soon as robot 11 has left the alley, or behind it"
+
+
+def _leg(action: LegAction, track: int, begin: int, end: int, end_ms: int) -> Leg:
+    return Leg(action, track, begin, end, Side.NEAR, to_bus_ms(NOW_US + end_ms * 1000))

@@ -105,6 +105,20 @@ def test_what_is_no_stream_is_refused(name: str, value: int) -> None:
         Stream(1, "M", 1, **values)
 
 
+def test_a_bus_without_a_bit_rate_is_refused() -> None:
+    with pytest.raises(ValueError, match="bit rate 0"):
+        priority_bounds([a_stream(1, 1, 1_000)], 0)
+
+
+def test_a_bus_so_full_that_it_is_busy_for_a_minute_counts_as_never_idle() -> None:
+    """9,999 of 10,000 bit times taken, in bursts of several minutes."""
+    streams = [a_stream(node, node, 100_000_000, burst=33_330) for node in (1, 2, 3)]
+    assert utilisation(streams, RATE) < 1
+    assert busy_period_us(streams, RATE) is None
+    assert of(streams, fifo=True) == [None] * 3
+    assert of(streams)[2] is None
+
+
 # --- against the simulated bus ---------------------------------------------------------------------------------------
 
 

@@ -118,6 +118,9 @@ class Negotiation:
     # --- calls of others ---------------------------------------------------------------------------------------
 
     def _on_call(self, call: CallForProposals, now_us: int) -> Outcome:
+        whole = self.participants.get(CallKey(call.parent.origin, call.parent.number)) if call.hold_ms else None
+        if whole is not None:
+            whole.on_rival(from_bus_ms(call.deadline_ms, now_us))
         if call.kind not in (KindCode.ANY, self.kind):
             self.counters.calls_of_other_kind += 1
             return []

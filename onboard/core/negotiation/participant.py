@@ -101,6 +101,7 @@ class Participant:
     needs: Needs | None = None
     best: tuple[int, int] | None = None
     award: Award | None = None
+    rivals_until_us: int = 0
     has_bid: bool = False
     last_bid_us: int = field(init=False)
     cut_off_us: int = field(init=False)
@@ -149,6 +150,15 @@ class Participant:
         if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):
             self.best = (bid.cost, bid.sender)
         return self._fire(Event.BEATEN, now_us) if self._is_beaten() else []
+
+    def on_rival(self, deadline_us: int) -> None:
+        """Another bidder asks others first, until ``deadline_us``: it was sooner, so its cost is likely to be less.
+
+        Where there is still time afterwards, own sub-calls wait for its bid: most bidders then ask nobody.
+        """
+        self.rivals_until_us = max(self.rivals_until_us, deadline_us)
+        if self.state is State.WAITING_COST and self.needs is not None and self.due_us is not None:
+            self.due_us = self._behind_rivals_us(self.due_us)
 
     def on_award(self, award: Award, now_us: int) -> Outcome:
         """The initiator closes the call, or holds the best bid as an option. Idempotent."""
@@ -214,7 +224,8 @@ class Participant:
         self.bound = found.cost
         if self._is_beaten():
             return self._fire(Event.BEATEN, now_us)
-        self.due_us = self._turn_us(self._delay_us(found.cost), now_us)
+        due_us = self._turn_us(self._delay_us(found.cost), now_us)
+        self.due_us = due_us if self.needs is None else self._behind_rivals_us(due_us)
         return []
 
     def ask(self, now_us: int) -> Outcome:
@@ -333,6 +344,11 @@ class Participant:
         round_us = self.slot.slots * self.slot.length_us
         late_us = now_us - due_us
         return due_us + -(-late_us // round_us) * round_us if round_us else now_us
+
+    def _behind_rivals_us(self, due_us: int) -> int:
+        """When to ask others: once the bid of whoever asked before could be heard, unless that is too late."""
+        heard_us = self.rivals_until_us + self.slot.slots * self.slot.length_us + self.timing.deadline_guard_us
+        return heard_us if heard_us > due_us and self.subs.may_ask(heard_us) else due_us
 
 
 #: States in which nothing more is hoped for from a call.

@@ -68,6 +68,10 @@ class SubCalls:
             outcome += said
         return outcome
 
+    def may_ask(self, now_us: int) -> bool:
+        """Whether sub-calls that open at ``now_us`` leave anybody the time to answer."""
+        return inner_deadline_us(self.deadline_us, now_us, self.timing) is not None
+
     @property
     def is_answered(self) -> bool:
         """Whether every sub-call has come to its deadline."""

@@ -14,7 +14,9 @@ from onboard.core.kinematics import run_duration_us
 from onboard.core.messages import CallForProposals, Stamp
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Needs, Proposal
+from onboard.core.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.core.refuges import open_refuges
+from onboard.core.reservations import FOREVER, Reservations
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Machine, Segment, Site, Station, TrackKind
@@ -29,6 +31,9 @@ HANDLING_OVERHEAD_US = 400_000
 CUSTOMER_US = 9_500_000
 #: How long past its planned end another robot's work still keeps its place promised: it may be late. Ours.
 PROMISE_GRACE_US = 60_000_000
+#: Whoever only stands in the way is out of it so long after the award: planning, tokens, and a way to another refuge.
+#: Ours.
+YIELDING_US = 45_000_000
 #: Bound of one route search, in expansions (a wall-time bound would not replay).
 MAX_EXPANSIONS = 4_000
 
@@ -108,8 +113,54 @@ class CarParkGeneration:
     def solve(self, call: CallForProposals, now_us: int) -> tuple[Solution | None, list[Alternative]]:
         """All solutions evaluated, the earliest finish first; ties by the site's order of places.
 
-        Candidates whose free-flow bound is no better than the best found are not searched.
+        Candidates whose free-flow bound is no better than the best found are not searched. Where there is no solution
+        around machines that only stand there, one that counts on their giving way (design, section 5: idle machines
+        yield); they hear of it with the firm itinerary.
         """
+        best, alternatives = self._search(call, now_us, self.mirror.reservations)
+        if best is None and alternatives:
+            asked_us = max(self._deadline_us(call, now_us), now_us) + YIELDING_US
+            best, more = self._search(call, now_us, self.mirror.reservations.with_way_given(asked_us))
+            alternatives += more
+            if best is not None and not self._can_give_way(best, now_us):
+                best = None
+        return best, alternatives
+
+    def _can_give_way(self, solution: Solution, now_us: int) -> bool:
+        """Whether each machine that stands in the way finds another refuge in time, around this and all plans."""
+        mine = to_itinerary(self.machine.node_id, 1, Grade.FIRM, Stamp(to_bus_ms(now_us), 0, 0), list(solution.steps))
+        windows = itinerary_windows(self.site, mine, now_us, solution.start_us)
+        standing = self.mirror.reservations.standing_in(self.machine.node_id, windows)
+        taken = self.mirror.reservations.with_way_given(FOREVER)
+        taken.release(self.machine.node_id)
+        taken.reserve(self.machine.node_id, windows, lift_uses(self.site, mine, now_us, solution.start_us))
+        for node in standing:
+            place = final_position(self.site, self.mirror.itineraries[node])
+            others = [one for one in self.mirror.others_standing() if one != place]
+            if place is None or not self._finds_refuge(
+                node, place, taken, [*others, solution.steps[-1].destination], now_us
+            ):
+                return False
+        return True
+
+    def _finds_refuge(self, node: int, place: Segment, taken: Reservations, others: list[Segment], now_us: int) -> bool:
+        start_us = max(now_us, taken.standing_since(node) or now_us)
+        found = plan_route(
+            self.site,
+            taken,
+            node,
+            place,
+            start_us,
+            (),
+            open_refuges(self.site, others),
+            MAX_EXPANSIONS,
+            self.mirror.lift_floors(now_us, start_us),
+        )
+        return not isinstance(found, NoRoute)
+
+    def _search(
+        self, call: CallForProposals, now_us: int, reservations: Reservations
+    ) -> tuple[Solution | None, list[Alternative]]:
         kept, segment, start_us = self._start(call, now_us)
         bounds = sorted(
             (self._lower_us(call, place, segment, start_us), number, place)
@@ -120,7 +171,7 @@ class CarParkGeneration:
         for bound_us, _, place in bounds:
             if best is not None and bound_us >= best.finish_us:
                 break
-            route = self._route(call, place, segment, start_us, now_us)
+            route = self._route(call, place, segment, start_us, now_us, reservations)
             if route is None:
                 alternatives.append(Alternative(place, None))
                 continue
@@ -140,11 +191,17 @@ class CarParkGeneration:
         return kept, segment, max(start_us, earliest_us)
 
     def _route(
-        self, call: CallForProposals, place: Station, origin: Segment, start_us: int, now_us: int
+        self,
+        call: CallForProposals,
+        place: Station,
+        origin: Segment,
+        start_us: int,
+        now_us: int,
+        reservations: Reservations,
     ) -> Route | None:
         route = plan_route(
             self.site,
-            self.mirror.reservations,
+            reservations,
             self.machine.node_id,
             origin,
             start_us,

@@ -149,6 +149,28 @@ def test_what_cannot_win_asks_nobody() -> None:
     assert bus.machines[11].negotiation.counters.searches_saved == 1
 
 
+def test_who_hears_a_better_one_ask_waits_for_its_bid() -> None:
+    """Node 12 would need 4.5 s more at least: it hears node 11 ask, then its bid, and never asks."""
+    bus = works(TWO_LEVELS)
+    bus.call(wanted(CAR))
+    bus.run(3)
+    assert {call.sender for call in bus.calls() if call.depth} == {11}
+    assert bus.machines[12].negotiation.counters.bids_saved == 1
+
+
+def test_who_waited_for_a_bid_that_never_comes_asks_then() -> None:
+    bus = works(TWO_LEVELS)
+    bus.lose = lambda message, receiver: message.sender == 11 and isinstance(message, Bid)
+    bus.call(wanted(CAR))
+    bus.run(3)
+    askers = [call for call in bus.calls() if call.depth]
+    assert [call.sender for call in askers] == [11, 11, 12, 12]
+    assert sent_at(bus, askers[2]) > deadline_of(bus, askers[0])
+    assert [made_by(bus, good) for good in (CAR, BODY, ENGINE)] == [[12], [22], [23]]
+    assert_nested(bus)
+    assert_never_acted_upon_early(bus)
+
+
 def test_an_outbid_machine_gives_its_options_up() -> None:
     """It asked first, and somebody without need of others was better than its parts came out."""
     makers = TWO_LEVELS | {13: {CAR: (2_000, ())}}
