@@ -1,6 +1,6 @@
 """How lifts are shared: planned on the mirror, asked before the bid, or locked for a session; on the same arrivals.
 
-Run: ``python bench/lift_modes.py [SITE] [CARS] [SEEDS]``, by default 20 cars on ``standard``, 3 seeds. (On a site with
+Run: ``python bench/lift_modes.py [SITE] [CARS] [SEEDS]``, by default 12 cars on ``standard``, 5 seeds. (On a site with
 one compartment robots do not meet at lifts.) Virtual time: the figures are the same on every machine.
 """
 
@@ -130,8 +130,8 @@ def _share(values: list[int], per_cent: int) -> int:
 def main() -> None:
     """Print a table for each site."""
     names = sys.argv[1:2] or ["standard"]
-    cars = int(sys.argv[2]) if len(sys.argv) > 2 else 20
-    seeds = range(1, 1 + (int(sys.argv[3]) if len(sys.argv) > 3 else 3))
+    cars = int(sys.argv[2]) if len(sys.argv) > 2 else 12
+    seeds = range(1, 1 + (int(sys.argv[3]) if len(sys.argv) > 3 else 5))
     for name in names:
         intervals = f"intervals {INTERVAL_S[0]:.0f} s +- {INTERVAL_S[1]:.0f} s"
         print(f"{name}: {cars} cars in and out, {intervals}, {len(seeds)} seeds")

@@ -10,6 +10,7 @@ bound, or traffic that the bounds do not allow for, ends the run with status 1.
 
 import argparse
 import sys
+from collections.abc import Sequence
 
 from bus_sim.response import Measured, measure
 from bus_sim.sites import find_site
@@ -31,28 +32,28 @@ def report(runs: list[Measured]) -> list[str]:
     heads = [f"{run.site.bitrate // 1000} kbit/s" for run in runs]
     lines.append("| ms | " + " | ".join(f"{head}: measured | by priority" for head in heads) + " |")
     lines.append("|---|" + "---|" * (2 * len(runs)))
-    for name in runs[0].bounds:
-        lines.append(_row(name, [(run.meter.worst.get((False, name)), run.bounds[name][1]) for run in runs]))
-    worst = [max(us for (at_start, _), us in run.meter.worst.items() if not at_start) for run in runs]
-    fifo = [None if None in (found := _fifo(run)) else max(us for us in found if us is not None) for run in runs]
-    lines.append(
-        "| **any, FIFO bound** | " + " | ".join(f"{_ms(w)} | **{_ms(f)}**" for w, f in zip(worst, fifo)) + " |"
-    )
-    starts = [max(us for (at_start, _), us in run.meter.worst.items() if at_start) for run in runs]
-    powers = [run.power_up_us for run in runs]
-    lines.append(
-        "| all start, FIFO bound | " + " | ".join(f"{_ms(w)} | {_ms(f)}" for w, f in zip(starts, powers)) + " |"
-    )
+    by_priority = [
+        _row(name, [(run.meter.worst.get((False, name)), run.bounds[name][1]) for run in runs])
+        for name in runs[0].bounds
+    ]
+    running = [(_worst(run, at_start=False), _fifo(run)) for run in runs]
+    starting = [(_worst(run, at_start=True), run.power_up_us) for run in runs]
+    lines += [*by_priority, _row("**any: FIFO bound**", running), _row("all start: FIFO bound", starting)]
     return [*lines, "", *(line for run in runs for line in _summary(run)), ""]
 
 
-def _row(name: str, cells: list[tuple[int | None, int | None]]) -> str:
+def _row(name: str, cells: Sequence[tuple[int | None, int | None]]) -> str:
     told = [("-" if measured is None else _ms(measured), _ms(bound)) for measured, bound in cells]
     return f"| {name} | " + " | ".join(text for pair in told for text in pair) + " |"
 
 
-def _fifo(run: Measured) -> list[int | None]:
-    return [bound for bound, _ in run.bounds.values()]
+def _worst(run: Measured, *, at_start: bool) -> int:
+    return max(worst_us for (starting, _), worst_us in run.meter.worst.items() if starting is at_start)
+
+
+def _fifo(run: Measured) -> int | None:
+    bounds = [bound_us for bound_us, _ in run.bounds.values()]
+    return None if None in bounds else max(bound_us for bound_us in bounds if bound_us is not None)
 
 
 def _summary(run: Measured) -> list[str]:

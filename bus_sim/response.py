@@ -1,5 +1,6 @@
 """Response times of a site's fleet bus while it runs, beside their bounds: what ``bench/response_times.py`` prints."""
 
+import asyncio
 import dataclasses
 from collections import deque
 from dataclasses import dataclass, field
@@ -97,6 +98,10 @@ async def _play(site: Site, minutes: float, seed: int, loop: VirtualTimeLoop) ->
     await run_until(simulation, lambda: False, round(minutes * 60e6), 1_000_000)
     violations = simulation.plant.oracle.finish()
     assert not violations, violations[0]
+    # Journals that are being written when the time is over.
+    for task in asyncio.all_tasks() - {asyncio.current_task()}:
+        task.cancel()
+    await asyncio.sleep(0)
     return simulation, meter
 
 

@@ -49,11 +49,12 @@ class AllOrNone:
 
     def passed(self, occupied: Collection[Segment]) -> None:
         """Let go of slots that lie behind the body; the last one ends the set."""
-        at = [number for number, slot in enumerate(self.slots) if slot in occupied]
-        if at and at[-1] == len(self.slots) - 1:
+        # A way may come back to a slot: only the first of them is where the body is.
+        at = next((number for number, slot in enumerate(self.slots) if slot in occupied), 0)
+        if at and at == len(self.slots) - 1:
             self.end()
-        elif at:
-            self.slots = self.slots[at[0] :]
+        else:
+            self.slots = self.slots[at:]
 
     def advance(self, occupied: Collection[Segment], now_us: int) -> list[Effect]:
         """Ask for what is missing; after a while without success give back all but what the body is in, and rest."""

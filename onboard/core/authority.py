@@ -107,6 +107,8 @@ class TokenBook:
     #: Tokens asked for without an agreed order, and since when the holder's view of the order has differed from mine.
     unordered: set[TokenKey] = field(default_factory=set)
     behind_since_us: dict[TokenKey, int] = field(default_factory=dict)
+    #: Whether tokens never seen to move count as with their first holders: not while my journal may be lost.
+    genesis_counts: bool = True
     #: Grows with every change of the tables above, so that nobody need look twice at the same state.
     changes: int = 0
     _genesis: dict[TokenKey, int] = field(default_factory=dict)
@@ -131,13 +133,20 @@ class TokenBook:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
         if key in self.held:
             return True
-        return key not in self.seen and self._first_holder(key) == self.node_id
+        return self.genesis_counts and key not in self.seen and self._first_holder(key) == self.node_id
 
     def holder_of(self, key: TokenKey) -> int:
         """Who holds a token as far as this node heard: exact for its own, a hint for others."""
         if self.holds(key):
             return self.node_id
         return self.holder.get(key, self._first_holder(key))
+
+    def trust_genesis(self) -> None:
+        """Nobody knew an earlier life of this node: what the site file gives it first is its own."""
+        self.genesis_counts = True
+        self.changes += 1
+        for key in [key for key in self.wanted if self.holds(key)]:
+            self.forget(key)
 
     def create(self, key: TokenKey) -> list[Effect]:
         """Bring a new token (of a car) into the world, held by this node. Raises ``ValueError`` where it exists."""

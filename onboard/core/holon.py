@@ -73,6 +73,8 @@ class Holon:
         entries = tuple(entries)
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
+        self.tokens.genesis_counts = self._has_past
+        self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
@@ -114,6 +116,9 @@ class Holon:
 
     def start(self, local_us: int) -> list[Effect]:
         """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
+        if not self._has_past:
+            # A first life, or a lost journal: peers that knew an earlier one have so long to say so.
+            self._trust_at_us = local_us + self.site.timing.heartbeat_us
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self._elect_time_source(local_us)
         now_us = self.clock.bus_us(local_us)
@@ -149,6 +154,9 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         self._elect_time_source(local_us)
+        if self._trust_at_us is not None and self._trust_at_us <= local_us:
+            self._trust_at_us = None
+            self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
         effects = self.tokens.wake(now_us) + self._serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
@@ -167,8 +175,10 @@ class Holon:
             self._negotiation_due(),
             self.behaviour.next_wake(),
         ]
-        due = [time for time in times if time is not None]
-        return self.clock.local_us(min(due)) if due and self.halted is None else None
+        due = [self.clock.local_us(time) for time in times if time is not None]
+        if self._trust_at_us is not None:
+            due.append(self._trust_at_us)
+        return min(due) if due and self.halted is None else None
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
         if message.sender == self.node_id:
@@ -300,7 +310,8 @@ class Holon:
             self.drops[Reason.OTHER_CONTRACT if beat.contract != CONTRACT_VERSION else Reason.OTHER_SITE] += 1
             return []
         fresh = self.mirror.on_heartbeat(beat, now_us)
-        self._elect_time_source(self.clock.local_us(now_us))
+        if fresh or (self.clock.is_source and beat.sender < self.node_id):
+            self._elect_time_source(self.clock.local_us(now_us))
         if fresh:
             return [Send(SyncRequest(self.node_id, beat.sender, self.mirror.boots_before[beat.sender]))]
         if beat.mirror_digest == self.mirror.digest():
@@ -321,6 +332,14 @@ class Holon:
                 "a person must regenerate its tokens"
             )
         effects = self.behaviour.statements(now_us)
+        known = self.mirror.peers.get(request.sender)
+        if (
+            request.whom == NOBODY
+            and known is not None
+            and known.since_us + self.site.timing.heartbeat_us // 2 < now_us
+        ):
+            # All are asked at power-up only: I knew it before, even where its counter is the same again.
+            effects.append(Send(SyncRequest(self.node_id, request.sender, known.boot)))
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
             effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]

@@ -33,6 +33,8 @@ class Peer:
     heard_at_us: int
     contract: int
     site_digest: int
+    #: When the first heartbeat of its present life was heard.
+    since_us: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +88,9 @@ class Mirror:
         if fresh:
             self._drop_itinerary(beat.sender)
             self.boots_before[beat.sender] = known.boot if known is not None else 0
+        since_us = now_us if known is None or fresh else known.since_us
         self.peers[beat.sender] = Peer(
-            beat.kind, beat.state, beat.boot, beat.mirror_digest, now_us, beat.contract, beat.site_digest
+            beat.kind, beat.state, beat.boot, beat.mirror_digest, now_us, beat.contract, beat.site_digest, since_us
         )
         return fresh
 

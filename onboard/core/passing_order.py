@@ -220,9 +220,9 @@ class PassingOrder:
             self._agreed.pop((low, high), None)
 
     def _has_passed(self, node: int, segment: Segment) -> bool:
-        """Whether a machine's present plan, or a token that it gave back, tells that it was here."""
+        """Whether a machine's plan, or a token that it gave back, tells that it was here and does not come again."""
         way = self._ways.get(node)
-        return way is not None and (segment in way.turns or segment in way.left)
+        return way is not None and self._first(node, segment) is None and segment in {*way.turns, *way.left}
 
     def _behind(self, leg: Leg, progress: Progress) -> set[Segment]:
         """Segments of a moving leg that the body, clearance included, has left."""

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from onboard.config.site import parse_site
+from onboard.core.all_or_none import AllOrNone
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
@@ -29,6 +30,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Machine, Segment, Site
+from onboard.kinds.car_park.travel import ORDER_PATIENCE_US
 from onboard.kinds.registry import factory_for
 
 STEP_US = 20_000
@@ -91,6 +93,10 @@ class Walker:
     path: list[tuple[Segment, int, int]] = field(default_factory=list)
     done: int = 0
     may_move_at_us: int = 0
+    whole: AllOrNone = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.whole = AllOrNone(self.fleet.tokens)
 
     @property
     def state(self) -> MachineState:
@@ -160,26 +166,44 @@ class Walker:
             return []
         tokens = self.fleet.tokens
         wanted = self.path[self.done][0] if self.done < len(self.path) else self.at
-        for key in [key for key in tokens.held if key not in (segment_token(self.at), segment_token(wanted))]:
+        needed = {segment_token(slot) for slot in (self.at, wanted, *self.whole.slots)}
+        for key in [key for key in tokens.held if key not in needed]:
             # A request that came late was granted.
             return tokens.give(key, STEWARD, now_us)
         if self.is_home:
             return []
         following, _, number = self.path[self.done]
+        behind = tokens.behind_since_us
+        if behind and not self.whole.slots and min(behind.values()) + ORDER_PATIENCE_US <= now_us:
+            way = [segment for segment, _, one in self.path[self.done :] if one == number]
+            self.whole.begin((self.at, *way), now_us)
+        self.whole.passed((self.at,))
+        if self.whole.slots:
+            effects = self.whole.advance((self.at,), now_us)
+            if effects or not self.whole.is_complete:
+                return effects
         if not tokens.holds(segment_token(following)):
             return tokens.want(segment_token(following), now_us)
         if now_us < self.may_move_at_us:
             return []
-        behind, self.at = self.at, following
+        left, self.at = self.at, following
         self.done += 1
         self.may_move_at_us = now_us + PACE_US
         self.log.append((following, number, self.fleet.node_id))
-        effects = self.where() + tokens.give(segment_token(behind), STEWARD, now_us)
-        self.fleet.mirror.order.on_return(self.fleet.node_id, behind)
+        effects = self.where()
+        self.whole.passed((following,))
+        if left not in self.whole.slots:
+            effects += tokens.give(segment_token(left), STEWARD, now_us)
+            self.fleet.mirror.order.on_return(self.fleet.node_id, left)
         return effects
 
     def next_wake(self) -> int | None:
-        return self.may_move_at_us if self.at is not None and self.done < len(self.path) else None
+        if self.at is None or self.is_home:
+            return None
+        behind = self.fleet.tokens.behind_since_us
+        times = [self.may_move_at_us, self.whole.due_us]
+        times.append(min(behind.values()) + ORDER_PATIENCE_US if behind and not self.whole.slots else None)
+        return min(time for time in times if time is not None)
 
     def statements(self, now_us: int) -> list[Effect]:
         if self.at is None:
@@ -287,7 +311,7 @@ class Alley:
         """On every segment the rounds came in the order of the plans."""
         for index in range(1, 13):
             rounds = [number for segment, number, _ in self.log if segment.index == index]
-            assert rounds == sorted(rounds), f"p(1,{index}): {self.log}"
+            assert rounds == sorted(rounds), f"p(1,{index}): {rounds}"
 
     def requests(self) -> list[TokenRequest]:
         return [message for message in self.heard if isinstance(message, TokenRequest)]

@@ -101,7 +101,7 @@ def test_p28_a_foreseen_task_of_another_delays_my_bid() -> None:
 
 def test_p23_p46_the_program_is_data_and_every_solution_was_looked_at() -> None:
     proposal = a_robot(Segment(1, 2)).estimate(a_call(), 1_000_000)
-    assert proposal is not None
+    assert isinstance(proposal, Proposal)
     (solution,) = proposal.program
     assert [str(step).split("] ")[1] for step in solution.steps][:2] == ["travel p(1,2) to p(1,4)", "stand at p(1,4)"]
     ends = [step.end_us for step in solution.steps]

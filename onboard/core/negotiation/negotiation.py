@@ -7,7 +7,7 @@ from onboard.core.effects import Effect
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us
 from onboard.core.negotiation.counters import Counters
-from onboard.core.negotiation.events import CallKey, CallTerms, Estimator, NegotiationEvent
+from onboard.core.negotiation.events import Awarded, CallKey, CallTerms, Estimator, NegotiationEvent, PreAssigned
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy
 from onboard.core.negotiation.initiator import State as InitiatorState
 from onboard.core.negotiation.participant import Participant
@@ -86,7 +86,7 @@ class Negotiation:
                 outcome = self._on_bid(message, now_us)
             case Award():
                 participant = self.participants.get(CallKey(message.sender, message.call))
-                outcome = participant.on_award(message, now_us) if participant is not None else []
+                outcome = self._spread(participant.on_award(message, now_us), now_us) if participant is not None else []
             case Itinerary():
                 for initiator in self.initiators:
                     outcome += initiator.on_itinerary(message, now_us)
@@ -100,11 +100,11 @@ class Negotiation:
         """Do what has fallen due in any call."""
         outcome: Outcome = []
         for participant in list(self.participants.values()):
-            outcome += participant.wake(now_us)
+            outcome += self._spread(participant.wake(now_us), now_us)
         for initiator in list(self.initiators):
             outcome += initiator.wake(now_us)
         for participant in list(self.participants.values()):
-            outcome += participant.collect(now_us)
+            outcome += self._spread(participant.collect(now_us), now_us)
         self._forget(now_us)
         return outcome
 
@@ -155,6 +155,15 @@ class Negotiation:
         )
         self.participants[key] = participant
         return outcome + participant.open(now_us)
+
+    def _spread(self, outcome: Outcome, now_us: int) -> Outcome:
+        """Tell all other participations of a bid or an award: their searches knew nothing of it."""
+        for item in list(outcome):
+            if isinstance(item, PreAssigned | Awarded):
+                for key, participant in self.participants.items():
+                    if key != item.call_key:
+                        outcome += participant.on_change(now_us)
+        return outcome
 
     def _timing_of(self, call: CallForProposals, window_us: int) -> Timing:
         """A sub-call before a bid ends sooner than other calls: its bidders speak sooner by the same ratio."""

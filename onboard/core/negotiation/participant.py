@@ -71,6 +71,7 @@ class Event(Enum):
     IMPOSSIBLE = "the search found no solution"
     BEATEN = "a better bid is on the bus than I can make or made"
     DEADLINE = "it is too late to bid, or the call's deadline has passed"
+    CHANGED = "a bid or task of my own in another call makes what I searched stale"
     LAPSE = "the award is overdue, or the option is over"
     OPTION_ME = "the initiator holds my bid as an option"
     AWARD_ME = "the initiator awards me"
@@ -102,6 +103,7 @@ class Participant:
     best: tuple[int, int] | None = None
     award: Award | None = None
     rivals_until_us: int = 0
+    is_stale: bool = False
     has_bid: bool = False
     last_bid_us: int = field(init=False)
     cut_off_us: int = field(init=False)
@@ -159,6 +161,10 @@ class Participant:
         self.rivals_until_us = max(self.rivals_until_us, deadline_us)
         if self.state is State.WAITING_COST and self.needs is not None and self.due_us is not None:
             self.due_us = self._behind_rivals_us(self.due_us)
+
+    def on_change(self, now_us: int) -> Outcome:
+        """This machine has bid, or won, in another call: what it does there, it does first."""
+        return self._fire(Event.CHANGED, now_us)
 
     def on_award(self, award: Award, now_us: int) -> Outcome:
         """The initiator closes the call, or holds the best bid as an option. Idempotent."""
@@ -242,7 +248,21 @@ class Participant:
         """All have answered: the proposal, or a second round."""
         assert self.needs is not None
         self.due_us = None
+        if self.is_stale:
+            self.is_stale = False
+            return self.subs.begin_anew(now_us) + self.search(now_us)
         return self._weigh(self.needs.combine(self.subs.answers(), now_us), now_us)
+
+    def search_again(self, now_us: int) -> Outcome:
+        """Search anew as soon as the machine has taken the change up: with its next turn."""
+        self.proposal = self.needs = None
+        self.due_us = now_us + 1
+        return self.subs.begin_anew(now_us)
+
+    def note_change(self, now_us: int) -> Outcome:
+        """Search anew when the answers have come."""
+        self.is_stale = True
+        return []
 
     def bid(self, now_us: int) -> Outcome:
         """Release the bid, and with it the reservations that it rests on (rows P10, P48)."""
@@ -370,6 +390,8 @@ TABLE: dict[tuple[State, Event], tuple[State, Callable[[Participant, int], Outco
     (State.WAITING_COST, Event.AWARD_OTHER): (State.LOST, Participant.save_bid),
     (State.WAITING_COST, Event.SUPERSEDED): (State.LOST, Participant.save_bid),
     (State.WAITING_COST, Event.NEED): (State.ASKING, Participant.ask),
+    (State.WAITING_COST, Event.CHANGED): (State.WAITING_BOUND, Participant.search_again),
+    (State.ASKING, Event.CHANGED): (State.ASKING, Participant.note_change),
     (State.ASKING, Event.ANSWERED): (State.WAITING_COST, Participant.combine),
     (State.ASKING, Event.IMPOSSIBLE): (State.SILENT, Participant.give_up),
     (State.ASKING, Event.BEATEN): (State.SILENT, Participant.save_bid),

@@ -52,6 +52,7 @@ class SubCalls:
     timing: Timing
     open: Open
     asked: dict[int, Initiator] = field(default_factory=dict)
+    _before: int = 0
 
     def ask(self, parts: tuple[CallTerms, ...], now_us: int) -> Outcome | None:
         """Open a sub-call for each part; None where depth, part numbers or time do not allow any."""
@@ -79,7 +80,16 @@ class SubCalls:
 
     def answers(self) -> tuple[Answer, ...]:
         """The answers so far, in the order of part numbers."""
-        return tuple(_answer(number, one) for number, one in self.asked.items() if one.state is not State.OPEN)
+        return tuple(
+            _answer(number, one)
+            for number, one in self.asked.items()
+            if number > self._before and one.state is not State.OPEN
+        )
+
+    def begin_anew(self, now_us: int) -> Outcome:
+        """Give up all that was asked: the search that asked was stale, so are its answers."""
+        self._before = len(self.asked)
+        return self.drop(now_us)
 
     def confirm(self, parts: Iterable[int], now_us: int) -> tuple[tuple[Answer, ...], Outcome]:
         """Award the options that the bid rests on; those that have lapsed are not among the answers."""

@@ -38,17 +38,16 @@ class AskingGeneration(CarParkGeneration):
 
     def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
         """What was promised, as the lifts hold it for that, unless the robot or the others have moved meanwhile."""
-        kept, origin, _ = self._start(call, now_us)
+        kept, origin, _ = self._start(call, now_us, behind_bids=False)
         if origin == promised.origin and now_us <= promised.start_us and not self._is_taken(call, promised, now_us):
             return promised._replace(kept=kept)
         return super().renewed(call, promised, now_us)
 
     def _is_taken(self, call: CallForProposals, promised: Solution, now_us: int) -> bool:
-        itinerary = self.proposal(call, promised, []).itinerary
+        itinerary = self.proposal(call, promised._replace(kept=0), []).itinerary
         assert itinerary is not None
-        windows = itinerary_windows(self.site, itinerary, now_us)
-        ahead = [window for window in windows if window.from_us >= promised.start_us]
-        return bool(self.mirror.reservations.conflicts(self.machine.node_id, ahead))
+        windows = itinerary_windows(self.site, itinerary, now_us, promised.start_us)
+        return bool(self.mirror.reservations.conflicts(self.machine.node_id, windows))
 
     # --- questions ---------------------------------------------------------------------------------------------
 

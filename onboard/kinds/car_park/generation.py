@@ -95,7 +95,7 @@ class CarParkGeneration:
 
     def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
         """Second request, once the call is awarded: what is really carried out, around what is known by now."""
-        solution, _ = self.solve(call, now_us)
+        solution, _ = self.solve(call, now_us, behind_bids=False)
         return promised if solution is None else solution
 
     def proposal(self, call: CallForProposals, solution: Solution, alternatives: list[Alternative]) -> Proposal:
@@ -110,17 +110,22 @@ class CarParkGeneration:
 
     # --- the search --------------------------------------------------------------------------------------------
 
-    def solve(self, call: CallForProposals, now_us: int) -> tuple[Solution | None, list[Alternative]]:
+    def solve(
+        self, call: CallForProposals, now_us: int, *, behind_bids: bool = True
+    ) -> tuple[Solution | None, list[Alternative]]:
         """All solutions evaluated, the earliest finish first; ties by the site's order of places.
+
+        A bid comes behind what this machine has bid for already (``behind_bids``); a task that is won does not.
 
         Candidates whose free-flow bound is no better than the best found are not searched. Where there is no solution
         around machines that only stand there, one that counts on their giving way (design, section 5: idle machines
         yield); they hear of it with the firm itinerary.
         """
-        best, alternatives = self._search(call, now_us, self.mirror.reservations)
+        start = self._start(call, now_us, behind_bids=behind_bids)
+        best, alternatives = self._search(call, now_us, start, self.mirror.reservations)
         if best is None and alternatives:
             asked_us = max(self._deadline_us(call, now_us), now_us) + YIELDING_US
-            best, more = self._search(call, now_us, self.mirror.reservations.with_way_given(asked_us))
+            best, more = self._search(call, now_us, start, self.mirror.reservations.with_way_given(asked_us))
             alternatives += more
             if best is not None and not self._can_give_way(best, now_us):
                 best = None
@@ -159,9 +164,9 @@ class CarParkGeneration:
         return not isinstance(found, NoRoute)
 
     def _search(
-        self, call: CallForProposals, now_us: int, reservations: Reservations
+        self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
     ) -> tuple[Solution | None, list[Alternative]]:
-        kept, segment, start_us = self._start(call, now_us)
+        kept, segment, start_us = start
         bounds = sorted(
             (self._lower_us(call, place, segment, start_us), number, place)
             for number, place in enumerate(self._candidates(call, now_us))
@@ -181,9 +186,9 @@ class CarParkGeneration:
                 best = Solution(kept, segment, start_us, steps, route.finish_us, place)
         return best, alternatives
 
-    def _start(self, call: CallForProposals, now_us: int) -> tuple[int, Segment, int]:
+    def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
         kept, segment, start_us = self.program.branch(now_us)
-        for solution in self.tentative.values():
+        for solution in self.tentative.values() if behind_bids else ():
             # What I may win before counts as won: one robot does one thing after the other.
             if solution.finish_us > start_us:
                 segment, start_us = solution.place.segment, solution.finish_us

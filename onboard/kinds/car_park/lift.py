@@ -78,6 +78,7 @@ class Lift:
     _told: tuple[int, DriveMode] | None = None
     _gate_was_out: bool = False
     _made: dict[int, int] = field(default_factory=dict)
+    _rides_with_me: dict[int, tuple[Itinerary, bool]] = field(default_factory=dict)
     _table: dict[LiftPhase, Callable[[int], list[Effect]]] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -212,10 +213,19 @@ class Lift:
         rides = [
             ride
             for node, itinerary in self.fleet.mirror.itineraries.items()
+            if self._ride_legs(itinerary)
             for ride in rides_of(self.track, node, itinerary, now_us)
         ]
         rides = [ride for ride in rides if self._made.get(ride.robot) != ride.begin_us]
         return min(rides, key=lambda ride: (ride.begin_us, ride.robot), default=None)
+
+    def _ride_legs(self, itinerary: Itinerary) -> bool:
+        """Whether an itinerary rides with this lift at all: few do, and it is asked for at every message."""
+        known = self._rides_with_me.get(itinerary.sender)
+        if known is None or known[0] is not itinerary:
+            rides = any(leg.action is LegAction.RIDE and leg.track == self.track for leg in itinerary.legs)
+            known = self._rides_with_me[itinerary.sender] = (itinerary, rides)
+        return known[1]
 
     # --- the phases --------------------------------------------------------------------------------------------
 

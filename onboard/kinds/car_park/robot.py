@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
+    NOBODY,
     Grade,
     KindCode,
     LegAction,
@@ -27,8 +28,9 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.reservations import FOREVER, Window
 from onboard.core.serial import to_bus_ms
-from onboard.core.site import Machine, RideCalls, Segment, Site
+from onboard.core.site import Machine, RideCalls, Segment, Site, TrackKind
 from onboard.kinds.car_park.asking import AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
@@ -50,6 +52,9 @@ class RobotFactory:
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
         """The robot's task-generation function."""
+        # No carrier turns into a spur yet: none is planned for.
+        spurs = [track for track in site.tracks.values() if track.kind is TrackKind.SPUR]
+        mirror.reservations.reserve(NOBODY, (Window(Segment(track.number, 1), 0, FOREVER) for track in spurs))
         generation = AskingGeneration if site.rides is RideCalls.BEFORE else CarParkGeneration
         return generation(site, machine, mirror, Program(site))
 

@@ -45,6 +45,8 @@ class Carriage:
     _axes: dict[int, AlleyAxis] = field(default_factory=dict)
     #: What ``advance`` looked at when it last found nothing to do.
     _settled: tuple[object, ...] | None = None
+    #: Where the carrier stood by the last word of its sensors.
+    _stood: tuple[DriveState | None, int, Segment | None] | None = None
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
     way_on: Callable[[], list[Segment]] = list
     whole: AllOrNone = field(init=False)
@@ -67,6 +69,11 @@ class Carriage:
 
         On a lift's platform it is index 0 or length + 1 of the alley.
         """
+        if self._stood is None or self._stood[0] is not self.sensed or self._stood[1] != self.track:
+            self._stood = (self.sensed, self.track, self._mark())
+        return self._stood[2]
+
+    def _mark(self) -> Segment | None:
         state = self.sensed
         if state is None or state.mode is not DriveMode.STANDING or not state.at_mark:
             return None

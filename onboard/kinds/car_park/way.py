@@ -10,7 +10,7 @@ from onboard.kinds.car_park.program import Step
 
 
 def way_to_refuge(site: Site, steps: Iterable[Step]) -> list[Segment]:
-    """Slots of ``steps`` in their order up to the first refuge, that included; each slot once.
+    """Slots of ``steps`` in their order up to the first refuge, that included.
 
     A ride is the platform, then the sill beyond and the way onward: whoever boards can leave the platform again.
     """
@@ -18,7 +18,7 @@ def way_to_refuge(site: Site, steps: Iterable[Step]) -> list[Segment]:
     way: list[Segment] = []
     for step in steps:
         for slot in _slots(site, step):
-            if slot not in way:
+            if slot not in way[-1:]:
                 way.append(slot)
             if slot in places:
                 return way

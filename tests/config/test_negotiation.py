@@ -1,0 +1,25 @@
+"""``[negotiation]`` of a site file."""
+
+import pytest
+
+from onboard.config.problems import ConfigError
+from onboard.core.site import RideCalls
+from tests.sites import one_floor
+
+
+def test_rides_are_called_after_winning_unless_the_site_says_otherwise() -> None:
+    assert one_floor().rides is RideCalls.AFTER
+    assert one_floor().timing.sub_call_percent == 50
+    site = one_floor(extra='[negotiation]\nrides = "before"\nsub_call_percent = 30\n')
+    assert (site.rides, site.timing.sub_call_percent) == (RideCalls.BEFORE, 30)
+    assert site.digest != one_floor().digest, "machines that ask at different times do not bid together"
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [('rides = "never"', '"never"'), ("sub_call_percent = 90", "from 20 to 80"), ("ride = 1", "ride")],
+)
+def test_a_mistake_is_told_with_its_line(line: str, told: str) -> None:
+    with pytest.raises(ConfigError, match=r"test\.toml:\d+: negotiation\.") as caught:
+        one_floor(extra=f"[negotiation]\n{line}\n")
+    assert told in str(caught.value)

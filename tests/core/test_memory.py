@@ -1,0 +1,86 @@
+"""A machine that has lost its journal, and statements that only one node may make."""
+
+import pytest
+
+from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState
+from onboard.core.effects import Halt
+from onboard.core.holon import Holon
+from onboard.core.messages import CarAt, Heartbeat, Reference, SyncRequest
+from onboard.core.mirror import Mirror
+from onboard.kinds.registry import factory_for
+from tests.core.walkers import Alley
+from tests.sites import one_floor
+
+SITE = one_floor(robots=1)
+STEWARD, ROBOT = 1, 11
+
+
+def holon(boot: int, *entries: dict[str, str | int]) -> Holon:
+    made = Holon(SITE, SITE.machines[STEWARD], factory_for(KindCode.COMPARTMENT), boot=boot, entries=entries)
+    made.start(0)
+    return made
+
+
+@pytest.mark.parametrize(
+    ("journalled", "boot", "before", "silent"),
+    [
+        ([], 1, 0, False),
+        ([], 1, 7, True),
+        ([1], 2, 1, False),
+        ([1], 2, 2, False),
+        ([1], 2, 5, True),
+        ([254, 255], 1, 255, False),
+    ],
+)
+def test_a_node_without_the_journal_of_a_life_that_others_knew_falls_silent(
+    journalled: list[int], boot: int, before: int, silent: bool
+) -> None:
+    entries: list[dict[str, str | int]] = [{"record": "boot", "boot": one} for one in journalled]
+    machine = holon(boot, *entries)
+    effects = machine.receive(SyncRequest(ROBOT, STEWARD, before), 10)
+    assert any(isinstance(effect, Halt) and "regenerate" in effect.why for effect in effects) is silent
+
+
+def test_peers_tell_a_restarted_node_which_life_they_knew() -> None:
+    machine = holon(1)
+
+    def beat(boot: int, state: MachineState) -> list[SyncRequest]:
+        word = Heartbeat(ROBOT, CONTRACT_VERSION, SITE.digest, 0, boot, KindCode.ROBOT, state)
+        said = machine.receive(word, 10)
+        return [e.message for e in said if hasattr(e, "message") and isinstance(e.message, SyncRequest)]
+
+    assert beat(4, MachineState.STARTING) == [SyncRequest(STEWARD, ROBOT, 0)]
+    assert beat(4, MachineState.IDLE) == []
+    assert beat(4, MachineState.STARTING) == [SyncRequest(STEWARD, ROBOT, 4)], "it started again under the same counter"
+    assert beat(5, MachineState.IDLE) == [SyncRequest(STEWARD, ROBOT, 4)]
+
+
+def test_a_steward_whose_journal_is_gone_grants_nothing() -> None:
+    """It would think that it holds tokens which it gave to walkers that stand there."""
+    alley = Alley({11: [9], 12: [3]}, {11: [1], 12: [2]}, seed=1)
+    alley.run(3)
+    alley.journals[1].clear()
+    alley.restart(1, 1)
+    with pytest.raises(AssertionError, match="regenerate"):
+        alley.run(3)
+
+
+def test_a_steward_with_its_journal_goes_on_where_it_was() -> None:
+    alley = Alley({11: [9], 12: [3]}, {11: [1], 12: [2]}, seed=1)
+    alley.run(3)
+    alley.restart(1, 2)
+    alley.run(60)
+    alley.assert_in_order()
+    assert alley.walker(11).is_home and alley.walker(12).is_home
+
+
+def test_one_version_of_a_cars_token_has_one_custodian() -> None:
+    mirror = Mirror(SITE, 1)
+    car = Reference(1, 5)
+    place, other = SITE.places[0].number, SITE.places[1].number
+    assert mirror.on_car(CarAt(1, car, place, 3, 2500))
+    assert not mirror.on_car(CarAt(11, car, other, 3, 2500)), "somebody else under the same version"
+    assert not mirror.on_car(CarAt(11, car, other, 2, 2500)), "an older one"
+    assert mirror.on_car(CarAt(1, car, other, 3, 2500)), "the custodian itself may move it"
+    assert mirror.on_car(CarAt(11, car, place, 4, 2500))
+    assert mirror.cars[car].custodian == 11

@@ -1,0 +1,121 @@
+"""Who comes first on a segment, from plans and from what machines tell of where they are."""
+
+from collections.abc import Sequence
+
+from onboard.core.codes import NOBODY, Grade, LegAction, Reason, Side
+from onboard.core.messages import Itinerary, Leg, Progress, Stamp
+from onboard.core.passing import Plan
+from onboard.core.passing_order import PassingOrder
+from onboard.core.site import Segment
+from tests.sites import one_floor
+
+SITE = one_floor(robots=2)
+ALICE, BOB = 11, 12
+
+
+def order_of(*plans: Itinerary) -> PassingOrder:
+    order = PassingOrder(SITE)
+    for itinerary in plans:
+        tell(order, itinerary)
+    return order
+
+
+def tell(order: PassingOrder, itinerary: Itinerary) -> None:
+    order.on_plan(Plan(itinerary, itinerary.stamp.award_ms * 1000), 0)
+
+
+def plan(node: int, way: Sequence[tuple[int, int, int]], version: int = 1, begin_s: int = 0) -> Itinerary:
+    """Legs on the one alley as (from, to, end in s); equal ends of a leg mean a wait."""
+    legs = tuple(
+        Leg(LegAction.STAND if one == other else LegAction.TRAVEL, 1, one, other, Side.NEAR, end_s * 1000)
+        for one, other, end_s in way
+    )
+    return Itinerary(node, version, Grade.FIRM, Stamp(begin_s * 1000, node, 0), legs)
+
+
+def progress(node: int, leg: int, index: int, version: int = 1, offset_mm: int = 0) -> Progress:
+    return Progress(node, version, leg, 1, index, offset_mm, 0)
+
+
+def passing() -> PassingOrder:
+    """Alice goes from 2 to 8 and back to 4; Bob then comes from 12 to 6."""
+    there_and_back = plan(ALICE, [(2, 8, 20), (8, 4, 40)])
+    return order_of(there_and_back, plan(BOB, [(12, 12, 60), (12, 6, 80)]))
+
+
+def test_the_plans_times_give_the_order() -> None:
+    order = passing()
+    assert order.predecessor(BOB, Segment(1, 7)) == ALICE
+    assert order.predecessor(ALICE, Segment(1, 7)) == NOBODY
+    assert order.predecessor(BOB, Segment(1, 11)) == NOBODY
+    assert order.predecessor(BOB, Segment(1, 3)) is None
+
+
+def test_only_its_own_word_or_token_ends_a_machines_turn() -> None:
+    order = passing()
+    order.on_progress(progress(ALICE, 0, 8))
+    assert order.predecessor(BOB, Segment(1, 7)) == ALICE, "it comes once more, on its way back"
+    order.on_progress(progress(ALICE, 1, 7, offset_mm=1_200))
+    assert order.predecessor(BOB, Segment(1, 8)) == ALICE, "its rear is not over the border yet"
+    order.on_return(ALICE, Segment(1, 8))
+    assert order.predecessor(BOB, Segment(1, 8)) == NOBODY
+    order.on_progress(progress(ALICE, 1, 5))
+    assert [order.predecessor(BOB, Segment(1, index)) for index in (6, 7)] == [NOBODY, NOBODY]
+
+
+def test_a_token_given_back_on_the_way_there_is_not_taken_for_the_way_back() -> None:
+    """The grant was lost and is said again only now, when the machine has turned round."""
+    order = passing()
+    order.on_progress(progress(ALICE, 1, 8))
+    order.on_return(ALICE, Segment(1, 6))
+    assert order.predecessor(BOB, Segment(1, 6)) == ALICE
+
+
+def test_progress_of_another_version_tells_nothing() -> None:
+    order = passing()
+    order.on_progress(progress(ALICE, 1, 4, version=9))
+    assert order.predecessor(BOB, Segment(1, 7)) == ALICE
+
+
+def test_a_plan_told_anew_drops_what_is_over() -> None:
+    order = passing()
+    order.on_progress(progress(ALICE, 1, 7))
+    tell(order, plan(ALICE, [(8, 4, 41)], version=2))
+    order.on_progress(progress(ALICE, 0, 5, version=2))
+    assert order.predecessor(BOB, Segment(1, 7)) == NOBODY
+
+
+def test_a_released_plan_is_nobodys_predecessor() -> None:
+    order = passing()
+    order.on_plan(Plan(Itinerary(ALICE, 2, Grade.RELEASED, Stamp(0, ALICE, 0), ()), 0), 0)
+    assert order.predecessor(BOB, Segment(1, 7)) == NOBODY
+
+
+def test_a_delay_into_anothers_time_keeps_the_order_and_a_new_way_does_not() -> None:
+    order = order_of(
+        plan(ALICE, [(2, 2, 10), (2, 8, 30), (8, 2, 50)]), plan(BOB, [(12, 12, 60), (12, 6, 80), (6, 12, 99)])
+    )
+    tell(order, plan(ALICE, [(2, 2, 70), (2, 8, 90), (8, 2, 110)], version=2))
+    assert order.predecessor(BOB, Segment(1, 7)) == ALICE
+    tell(order, plan(ALICE, [(2, 2, 70), (2, 9, 91), (9, 2, 112)], version=3))
+    assert order.predecessor(BOB, Segment(1, 7)) == NOBODY, "it planned anew and has come behind"
+
+
+def test_a_request_of_a_plan_not_heard_yet_is_refused_as_behind() -> None:
+    order = passing()
+    assert order.verdict(BOB, Segment(1, 11), 2, NOBODY) is Reason.MIRROR_BEHIND
+    assert order.verdict(BOB, Segment(1, 11), 1, NOBODY) is Reason.NONE
+    assert order.verdict(99, Segment(1, 11), 1, NOBODY) is Reason.MIRROR_BEHIND
+
+
+def test_another_predecessor_than_mine_is_refused_as_behind() -> None:
+    order = passing()
+    assert order.verdict(BOB, Segment(1, 7), 1, ALICE) is Reason.TOKEN_NOT_GRANTABLE_YET
+    assert order.verdict(BOB, Segment(1, 7), 1, NOBODY) is Reason.MIRROR_BEHIND
+    assert order.verdict(ALICE, Segment(1, 7), 1, BOB) is Reason.MIRROR_BEHIND, "Bob is still to come"
+
+
+def test_a_predecessor_that_has_passed_settles_the_question() -> None:
+    order = passing()
+    order.on_progress(progress(ALICE, 1, 4))
+    assert order.verdict(BOB, Segment(1, 7), 1, ALICE) is Reason.NONE
