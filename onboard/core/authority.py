@@ -133,7 +133,7 @@ class TokenBook:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
         if key in self.held:
             return True
-        return self.genesis_counts and key not in self.seen and self._first_holder(key) == self.node_id
+        return self.genesis_counts and self._is_own_at_first(key)
 
     def holder_of(self, key: TokenKey) -> int:
         """Who holds a token as far as this node heard: exact for its own, a hint for others."""
@@ -145,8 +145,6 @@ class TokenBook:
         """Nobody knew an earlier life of this node: what the site file gives it first is its own."""
         self.genesis_counts = True
         self.changes += 1
-        for key in [key for key in self.wanted if self.holds(key)]:
-            self.forget(key)
 
     def create(self, key: TokenKey) -> list[Effect]:
         """Bring a new token (of a car) into the world, held by this node. Raises ``ValueError`` where it exists."""
@@ -158,7 +156,7 @@ class TokenBook:
 
     def want(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Ask for a token until it is granted or no longer wanted. Nothing happens where it is held or asked for."""
-        if self.holds(key) or key in self.wanted:
+        if self.holds(key) or key in self.wanted or self._is_own_at_first(key):
             return []
         self.wanted[key] = now_us
         self.changes += 1
@@ -263,6 +261,9 @@ class TokenBook:
     def is_news(self, key: TokenKey, version: int) -> bool:
         """Whether ``version`` of a token is newer than anything seen of it."""
         return key not in self.seen or is_newer(version, self.seen[key], _VERSION_BITS)
+
+    def _is_own_at_first(self, key: TokenKey) -> bool:
+        return key not in self.seen and self._first_holder(key) == self.node_id
 
     def _first_holder(self, key: TokenKey) -> int:
         found = self._genesis.get(key)

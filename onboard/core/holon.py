@@ -326,7 +326,7 @@ class Holon:
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
             return []
-        if request.whom == self.node_id and self._has_forgotten(request.boot_before):
+        if request.whom == self.node_id and self._has_forgotten(request):
             return self._halt(
                 f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
                 "a person must regenerate its tokens"
@@ -345,9 +345,12 @@ class Holon:
             effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
         return effects
 
-    def _has_forgotten(self, boot_before: int) -> bool:
+    def _has_forgotten(self, request: SyncRequest) -> bool:
         """Whether my journal lacks a life that a peer knew: tokens that I gave away then would seem to be mine."""
-        return boot_before != 0 and (not self._has_past or is_newer(boot_before, self.boot, 8))
+        before = request.boot_before
+        if before == 0 or request.sender not in self.site.machines:
+            return False
+        return not self._has_past or is_newer(before, self.boot, 8)
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")

@@ -133,7 +133,8 @@ class Mirror:
             return False
         if known is not None and not is_newer(statement.version, known.version, 16):
             # One version of a car's token has one custodian: whoever else speaks under it is wrong.
-            if statement.version != known.version or statement.sender != known.custodian:
+            again = statement.version == known.version and statement.sender == known.custodian
+            if not again:
                 return False
         self.cars[statement.car] = record
         self._digest = None

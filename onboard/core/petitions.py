@@ -30,9 +30,11 @@ class Petitions:
 
     repeat_us: int
     open: dict[TokenKey, dict[int, Petition]] = field(default_factory=dict)
+    _prune_at_us: int = 0
 
     def hear(self, key: TokenKey, request: TokenRequest, now_us: int) -> None:
         """Take up a request, whoever holds the token: it may come to me."""
+        self._prune(now_us)
         known = self.open.setdefault(key, {}).get(request.sender)
         since_us = now_us
         if known is not None and not self._is_over(known, now_us):
@@ -84,6 +86,15 @@ class Petitions:
         for _, node in found:
             waiting[node] = waiting[node]._replace(due_us=now_us + self.repeat_us)
         return [node for _, node in sorted(found)]
+
+    def _prune(self, now_us: int) -> None:
+        """Close what lapsed, also for tokens that never come here: memory stays bounded whatever is asked for."""
+        if now_us < self._prune_at_us:
+            return
+        self._prune_at_us = now_us + self.repeat_us
+        lapsed = [(key, one) for key, by in self.open.items() for one in by if self._is_over(by[one], now_us)]
+        for key, requester in lapsed:
+            self.close(key, requester)
 
     def _is_over(self, petition: Petition, now_us: int) -> bool:
         # Two repeats may be lost.

@@ -320,7 +320,8 @@ class Codec:
 
 def _wheelbase_mm(call: m.CallForProposals) -> int:
     if call.wheelbase_mm == NO_WHEELBASE_MM:
-        raise ValueError(f"CallLoad.wheelbase_mm = {NO_WHEELBASE_MM}: means no car, which is 0 in a call")
+        # A car so short, as somebody stated it: the next value says the same, that no robot can grip it.
+        return NO_WHEELBASE_MM + 10
     return call.wheelbase_mm or NO_WHEELBASE_MM
 
 

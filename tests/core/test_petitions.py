@@ -2,7 +2,7 @@
 
 from onboard.core.all_or_none import PATIENCE_REPEATS, AllOrNone
 from onboard.core.authority import REFUSED_REPEATS, Claim, TokenBook, TokenKey, segment_token
-from onboard.core.codes import Reason
+from onboard.core.codes import Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import TokenGrant, TokenRefusal, TokenRequest
 from onboard.core.petitions import UNORDERED, Petitions
@@ -61,6 +61,9 @@ def test_a_request_that_is_not_repeated_lapses() -> None:
     petitions.hear(KEYS[0], request(BOB, KEYS[0], 3), 0)
     assert petitions.due(KEYS[0], 13 * REPEAT_US) == []
     assert petitions.open == {}
+    for number in range(1000):
+        petitions.hear(TokenKey(TokenKind.CAR, number), request(BOB, KEYS[0], 3), number * REPEAT_US)
+    assert len(petitions.open) < 20, "also of tokens that are never held here"
 
 
 def test_all_holders_serve_the_machine_that_has_asked_longest() -> None:

@@ -69,7 +69,7 @@ def test_every_plan_ends_as_early_as_with_stops_everywhere(chunk: int, monkeypat
             assert pruned.visit_ends_us[-1] == whole.visit_ends_us[-1], number
             assert pruned.legs[-1].end_us == whole.legs[-1].end_us, number
             delayed += any(leg.action.name == "STAND" for leg in whole.legs)
-    assert shorter >= 3 and delayed >= 10, (shorter, delayed)
+    assert shorter >= 3 and delayed >= 4, (shorter, delayed)
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,16 @@ def test_p39_nothing_is_held_once_all_is_done(scene: Scene) -> None:
         assert closed[key] in (CallResult.AWARDED, CallResult.WITHDRAWN, CallResult.REFUSED), key
 
 
+@pytest.mark.parametrize("rides", list(RideCalls))
+def test_p04_five_cars_asked_for_in_the_same_seconds_are_all_fetched(rides: RideCalls) -> None:
+    """Robots bid for several of them at once, each bid behind the ones before."""
+    site = dataclasses.replace(find_site("standard"), rides=rides)
+    found = play(site, stays(*[(float(number), 400.0) for number in range(5)]), limit_s=1_500)
+    found.assert_sound()
+    summary = found.simulation.plant.street.summary()
+    assert (summary.parked, summary.served, summary.inside) == (5, 5, 0)
+
+
 def test_p39_four_robots_ask_two_lifts_for_cars_that_come_at_one_moment() -> None:
     demand = stays(*[(float(number // 3), None) for number in range(6)])
     found = play(asking("standard"), demand, extra_s=150)

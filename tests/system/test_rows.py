@@ -96,7 +96,10 @@ def test_p28_a_foreseen_task_of_another_delays_my_bid() -> None:
     blocking = Program(SITE, Segment(1, 7))
     blocking.replace([], Stamp(0, 1, 3))
     crowded.mirror.on_itinerary(dataclasses.replace(blocking.itinerary(12, 0), version=2), 0)
-    assert crowded.estimate(call, 1_000_000) is None, "row P45: who cannot do it has nothing to say"
+    asked = crowded.estimate(call, 1_000_000)
+    assert asked is not None and asked.cost > free.cost, "whoever only stands there can go further in, in its time"
+    end = a_call(to_station=Station(1, 12, BAY.side).number)
+    assert crowded.estimate(end, 1_000_000) is None, "row P45: who cannot do it has nothing to say"
 
 
 def test_p23_p46_the_program_is_data_and_every_solution_was_looked_at() -> None:

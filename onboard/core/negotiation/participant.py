@@ -104,6 +104,7 @@ class Participant:
     award: Award | None = None
     rivals_until_us: int = 0
     is_stale: bool = False
+    searched: Proposal | Needs | None = None
     has_bid: bool = False
     last_bid_us: int = field(init=False)
     cut_off_us: int = field(init=False)
@@ -220,8 +221,16 @@ class Participant:
 
     def search(self, now_us: int) -> Outcome:
         """Ask for the real cost, then wait for what it owes beyond the bound."""
+        if self._is_new(now_us):
+            return self.subs.begin_anew(now_us) + self._weigh(self.searched, now_us)
+        return self._weigh(self.proposal or self.needs, now_us)
+
+    def _is_new(self, now_us: int) -> bool:
+        """Search, and tell whether that has found anything else than the search before."""
         self.counters.searches += 1
-        return self._weigh(self.estimator.estimate(self.call, now_us), now_us)
+        self.is_stale = False
+        before, self.searched = self.searched, self.estimator.estimate(self.call, now_us)
+        return before is None or self.searched is None or _essence(before) != _essence(self.searched)
 
     def _weigh(self, found: Proposal | Needs | None, now_us: int) -> Outcome:
         if found is None:
@@ -248,16 +257,14 @@ class Participant:
         """All have answered: the proposal, or a second round."""
         assert self.needs is not None
         self.due_us = None
-        if self.is_stale:
-            self.is_stale = False
-            return self.subs.begin_anew(now_us) + self.search(now_us)
+        if self.is_stale and self._is_new(now_us):
+            return self.subs.begin_anew(now_us) + self._weigh(self.searched, now_us)
         return self._weigh(self.needs.combine(self.subs.answers(), now_us), now_us)
 
     def search_again(self, now_us: int) -> Outcome:
         """Search anew as soon as the machine has taken the change up: with its next turn."""
-        self.proposal = self.needs = None
         self.due_us = now_us + 1
-        return self.subs.begin_anew(now_us)
+        return []
 
     def note_change(self, now_us: int) -> Outcome:
         """Search anew when the answers have come."""
@@ -369,6 +376,11 @@ class Participant:
         """When to ask others: once the bid of whoever asked before could be heard, unless that is too late."""
         heard_us = self.rivals_until_us + self.slot.slots * self.slot.length_us + self.timing.deadline_guard_us
         return heard_us if heard_us > due_us and self.subs.may_ask(heard_us) else due_us
+
+
+def _essence(found: Proposal | Needs) -> tuple[object, ...]:
+    """What two searches must have in common for the answers to the first to do for the second."""
+    return (found.cost, found.parts) if isinstance(found, Needs) else (found.cost, found.program)
 
 
 #: States in which nothing more is hoped for from a call.

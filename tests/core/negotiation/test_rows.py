@@ -1,12 +1,13 @@
 """The protocol's rows P02 to P17, each shown on a bus without loss."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import pytest
 
 from onboard.core.codes import CallResult, KindCode, Reason
 from onboard.core.messages import Bid, CallForProposals, Message
-from onboard.core.negotiation import CallKey, Negotiation, RestartPolicy, RestartStep
+from onboard.core.negotiation import CallKey, Negotiation, Proposal, RestartPolicy, RestartStep
 from onboard.core.serial import BUS_MS_MODULUS, from_bus_ms
 from tests.core.negotiation.fleet import CALLER, START_US, TIMING, Bus, Costs, Machine, a_call, caller, fleet, terms
 
@@ -39,6 +40,44 @@ def test_p03_one_robot_calls_while_it_bids_in_three_foreign_calls() -> None:
     bus.run(2)
     assert [bus.assigned(number) for number in (1, 2, 3, 4)] == [[11], [11], [11], [12]]
     assert [machine.closed[0].winner for machine in (*callers, busy)] == [11, 11, 11, 12]
+
+
+@dataclass
+class OneAfterTheOther(Costs):
+    """What is bid for or won already is done first: 60 s each."""
+
+    machine: Machine | None = None
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """Later by what comes before."""
+        return self._later(super().lower_bound(call, now_us))
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        """Later by what comes before."""
+        found = super().estimate(call, now_us)
+        cost = self._later(found.cost if found is not None else None)
+        return None if cost is None else Proposal(cost, None, (), ())
+
+    def _later(self, cost: int | None) -> int | None:
+        if cost is None or self.machine is None:
+            return cost
+        before = len(self.machine.committed) + len(self.machine.assigned)
+        return (cost + 60_000 * before) % BUS_MS_MODULUS
+
+
+@pytest.mark.parametrize("gap_s", [0.0, 0.001, 0.2])
+def test_p04_bids_of_one_machine_for_calls_of_one_moment_come_one_behind_the_other(gap_s: float) -> None:
+    costs = OneAfterTheOther({1: 5_000, 2: 5_000, 3: 5_000})
+    robot = costs.machine = Machine(11, costs)
+    callers = [Machine(node, Costs({}), kind=KindCode.COMPARTMENT) for node in (1, 2, 3)]
+    bus = Bus([*callers, robot])
+    for number in (1, 2, 3):
+        bus.call(terms(number), node=number)
+        bus.run(gap_s)
+    bus.run(3)
+    ends_us = sorted(from_bus_ms(bid.cost, START_US) for bid in bus.bids())
+    assert len(ends_us) == 3
+    assert all(later - earlier >= 60_000_000 for earlier, later in pairwise(ends_us)), "no two at one time"
 
 
 def test_p04_ten_overlapping_calls_end_as_ten_calls_one_after_the_other() -> None:
