@@ -7,8 +7,8 @@ import pytest
 
 from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import KindCode, LegAction
-from onboard.core.messages import CallForProposals, Itinerary, Stamp
+from onboard.core.codes import KindCode, LegAction, TokenKind
+from onboard.core.messages import CallForProposals, Itinerary, Stamp, TokenGrant, TokenHeld
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation, Proposal
 from onboard.core.reservations import FOREVER
@@ -137,6 +137,20 @@ def test_of_two_plans_made_at_the_same_time_the_lower_stamp_keeps_its_windows() 
     young = robot(site, FIRST, [travel(8, 3, 0, 60)], award_ms=6)
     assert old.hears(young.told()) is Answer.NOTHING
     assert young.hears(old.told()) is Answer.ANEW
+
+
+def test_a_token_in_hand_outranks_the_stamp() -> None:
+    site = line_site(9, 10, QUICK, 10)
+    old = robot(site, SECOND, [travel(1, 6, 0, 60)], award_ms=5)
+    young = robot(site, FIRST, [travel(8, 3, 0, 60)], award_ms=6)
+    for one in (old, young):
+        for index in range(2, 8):
+            one.fleet.tokens.on_held(TokenHeld(FIRST, TokenKind.SEGMENT, Segment(ALLEY, index).number, 3))
+    for index in range(2, 8):
+        grant = TokenGrant(9, TokenKind.SEGMENT, Segment(ALLEY, index).number, 4, FIRST)
+        young.fleet.tokens.on_grant(grant, 0)
+    assert young.hears(old.told()) is Answer.NOTHING
+    assert old.hears(young.told()) is Answer.ANEW
 
 
 def test_p38_who_only_stands_gives_way_whatever_its_stamp() -> None:

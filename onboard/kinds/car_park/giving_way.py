@@ -4,13 +4,15 @@ Wherever the two plans want one segment at one time:
 - where an order was agreed before, a delay has upset it: who comes first goes on, the other comes later by what is
   missing (an action dependency graph as of Hoenig et al., "Persistent and Robust Execution of MAPF Schedules in
   Warehouses", 2019: an order taken from plans without conflict has no cycle, so nobody waits for ever);
-- where none was, the plans were made at the same time: who only stands there gives way; else the lower stamp keeps its
-  windows and the other plans its way anew, under its old stamp, so that nobody is displaced for ever.
+- where none was, the plans were made at the same time: who only stands there gives way; else who holds the segment's
+  token goes on, else who has the lower stamp. The other plans its way anew, under its old stamp, so that nobody is
+  displaced for ever.
 """
 
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import LegAction
 from onboard.core.kinematics import run_duration_us
@@ -57,6 +59,10 @@ class GivingWay:
         i_stand, they_stand = meeting.mine.to_us >= FOREVER, meeting.theirs.to_us >= FOREVER
         if i_stand != they_stand:
             return i_stand
+        holder = self.fleet.tokens.holder_of(segment_token(meeting.segment))
+        if holder in (self.fleet.node_id, sender):
+            # A right in hand outranks stamps: whoever has it is about to be there.
+            return holder == sender
         plans = self.fleet.mirror.itineraries
         return plans[self.fleet.node_id].stamp > plans[sender].stamp
 
