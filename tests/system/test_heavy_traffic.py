@@ -1,0 +1,44 @@
+"""Four robots and two lifts under more traffic than they can serve: late, but nothing stands still."""
+
+from itertools import pairwise
+
+import pytest
+
+from bus_sim.demand import Demand
+from bus_sim.sites import find_site
+from onboard.core.codes import Grade, TaskPhase
+from onboard.core.messages import Itinerary, Stamp, TaskReport
+from tests.system.scene import Scene, play
+
+CARS = 14
+
+
+@pytest.fixture(scope="module")
+def rush() -> Scene:
+    """A car every forty seconds, fetched soon after; so dense that robots met head-on before plans kept their order."""
+    return play(find_site("standard"), Demand.by_mean(40, 20, 2, count=CARS), limit_s=2_400)
+
+
+def test_p44_everybody_is_served_and_the_machines_never_stand_still(rush: Scene) -> None:
+    rush.assert_sound()
+    street = rush.simulation.plant.street.summary()
+    assert (street.parked, street.served) == (CARS, CARS)
+    ends_us = [at for at, m in rush.all(TaskReport, "fleet") if m.phase is TaskPhase.DONE]
+    gaps_s = [(after - before) / 1e6 for before, after in pairwise(ends_us)]
+    # The longest single task, with a ride and both handlings, takes about 100 s.
+    assert max(gaps_s) < 160
+
+
+def test_p18_load_spreads_over_all_robots(rush: Scene) -> None:
+    owners = {m.sender for _, m in rush.all(TaskReport, "fleet") if m.phase is TaskPhase.DONE}
+    assert owners == {11, 12, 13, 14}
+
+
+def test_plans_are_told_anew_with_other_times_and_keep_their_stamp(rush: Scene) -> None:
+    stamps: dict[int, set[Stamp]] = {}
+    versions: dict[int, set[int]] = {}
+    for _, m in rush.all(Itinerary, "fleet"):
+        if m.grade is Grade.FIRM:
+            stamps.setdefault(m.sender, set()).add(m.stamp)
+            versions.setdefault(m.sender, set()).add(m.version)
+    assert all(len(versions[node]) > len(stamps[node]) for node in (11, 12, 13, 14))
