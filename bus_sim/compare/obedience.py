@@ -140,5 +140,12 @@ def install(simulation: Simulation) -> dict[int, ObedientNegotiation]:
 
 def _as(cls: type[_N], one: Negotiation) -> _N:
     return cls(
-        one.node_id, one.kind, one.timing, one.estimator, policy=one.policy, boot=one.boot, delay=one.delay, slot=one.slot
+        one.node_id,
+        one.kind,
+        one.timing,
+        one.estimator,
+        policy=one.policy,
+        boot=one.boot,
+        delay=one.delay,
+        slot=one.slot,
     )

@@ -17,6 +17,10 @@ from onboard.core.codes import KindCode
 from onboard.core.roads import roads_of
 from onboard.core.site import Segment, Site, Station
 
+#: Places kept for each car, those nearest to the bay: on both sides of it more than the cars need, and all ways to and
+#: from a farther one on the same side are longer.
+PLACES_A_CAR = 4
+
 
 class Visitor(NamedTuple):
     """One car: when it comes and is fetched (None: never), and its driver's acts, ms."""
@@ -52,18 +56,20 @@ class Case:
             raise ValueError(f"site {site.name} has {len(site.compartments)} compartments; a small case has one")
         (station,) = site.compartments.values()
         homes = [machine.home for machine in site.machines.values() if machine.kind is KindCode.ROBOT]
-        positions: list[Segment] = [place.segment for place in site.places]
-        positions += [station.segment, *homes]
         roads, least = roads_of(site), FreeFlow.of(site)
+        places = sorted(site.places, key=lambda place: roads.shortest_us(station.segment, place.segment))
+        places = places[: PLACES_A_CAR * len(demand.stays)]
+        positions: list[Segment] = [place.segment for place in places]
+        positions += [station.segment, *homes]
         visitors = []
         for stay in demand.stays:
             acts = Acts.of(stay, seed)
             leaves_ms = None if stay.departure_us is None else stay.departure_us // 1000
             visitors.append(Visitor(stay.arrival_us // 1000, leaves_ms, *(act_us // 1000 for act_us in acts)))
-        count = len(site.places)
+        count = len(places)
         return cls(
             tuple(visitors),
-            tuple(site.places),
+            tuple(places),
             count,
             tuple(range(count + 1, count + 1 + len(homes))),
             tuple(tuple(roads.shortest_us(here, there) // 1000 for there in positions) for here in positions),
@@ -133,10 +139,7 @@ def play_case(case: Case, rule: Rule) -> int:
     leaving: dict[int, int] = {}
     while coming or leaving:
         begin_ms, _, number, fetch = min(
-            [
-                (max(at_ms, state.bay_ms, state.stored[number][1]), 0, number, True)
-                for number, at_ms in leaving.items()
-            ]
+            [(max(at_ms, state.bay_ms, state.stored[number][1]), 0, number, True) for number, at_ms in leaving.items()]
             + [(max(at_ms, state.bay_ms), 1, number, False) for number, at_ms in coming.items()]
         )
         if fetch:

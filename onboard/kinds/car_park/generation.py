@@ -31,6 +31,8 @@ HANDLING_OVERHEAD_US = 400_000
 CUSTOMER_US = 9_500_000
 #: How long past its planned end another robot's work still keeps its place promised: it may be late. Ours.
 PROMISE_GRACE_US = 60_000_000
+#: From so many places on, the way to taking the car is searched once for all of them. Ours.
+FEW_PLACES = 3
 #: Whoever only stands in the way is out of it so long after the award: planning, tokens, and a way to another refuge.
 #: Ours.
 YIELDING_US = 45_000_000
@@ -71,7 +73,7 @@ class CarParkGeneration:
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """Least finishing time (bus ms) that any robot could name, from call and site alone: it stands at the start."""
         start_us = self._deadline_us(call, now_us) + AWARD_LATENCY_US
-        ends = self._all_candidates(call)
+        ends = _one_a_segment(self._all_candidates(call))
         return min(to_bus_ms(self._lower_us(call, place, self._front(call, place), start_us)) for place in ends)
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
@@ -85,7 +87,8 @@ class CarParkGeneration:
         if not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
             return None
         _, segment, start_us = self._start(call, now_us)
-        ends = [self._lower_us(call, place, segment, start_us) for place in self._candidates(call, now_us)]
+        places = _one_a_segment(self._candidates(call, now_us))
+        ends = [self._lower_us(call, place, segment, start_us) for place in places]
         return to_bus_ms(min(ends)) if ends else None
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
@@ -167,16 +170,17 @@ class CarParkGeneration:
         self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
     ) -> tuple[Solution | None, list[Alternative]]:
         kept, segment, start_us = start
-        bounds = sorted(
-            (self._lower_us(call, place, segment, start_us), number, place)
-            for number, place in enumerate(self._candidates(call, now_us))
-        )
+        bounds = self._bounds(call, now_us, start, reservations)
         best: Solution | None = None
         alternatives: list[Alternative] = []
+        # Places on both sides of a segment are reached and served alike.
+        routes: dict[Segment, Route | None] = {}
         for bound_us, _, place in bounds:
             if best is not None and bound_us >= best.finish_us:
                 break
-            route = self._route(call, place, segment, start_us, now_us, reservations)
+            if place.segment not in routes:
+                routes[place.segment] = self._route(call, place, segment, start_us, now_us, reservations)
+            route = routes[place.segment]
             if route is None:
                 alternatives.append(Alternative(place, None))
                 continue
@@ -185,6 +189,31 @@ class CarParkGeneration:
                 steps = self._steps(call, place, route)
                 best = Solution(kept, segment, start_us, steps, route.finish_us, place)
         return best, alternatives
+
+    def _bounds(
+        self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
+    ) -> list[tuple[int, int, Station]]:
+        """Places that may be chosen, each with a time before which it cannot be finished, the most promising first.
+
+        Where there is a choice of places to leave the car at, the search up to taking it is common to all: it is made
+        once, and only the way from there is counted as free. No route to a place takes the car sooner, as it is a
+        route to taking it and to a refuge as well.
+        """
+        _, segment, start_us = start
+        places = self._candidates(call, now_us)
+        if len(places) < FEW_PLACES or call.from_station == ANY_STATION:
+            return sorted((self._lower_us(call, one, segment, start_us), n, one) for n, one in enumerate(places))
+        take, _ = self._visits(call, places[0], start_us)
+        route = self._plan(reservations, segment, start_us, (take,), now_us)
+        if route is None:
+            return [(FOREVER, 0, places[0])]
+        taken_us = route.finish_us
+        bounds: dict[Segment, int] = {}
+        for place in places:
+            if place.segment not in bounds:
+                leave = self._visits(call, place, start_us)[1]
+                bounds[place.segment] = free_flow_us(self.site, take.segment, taken_us, (leave,))
+        return sorted((bounds[one.segment], n, one) for n, one in enumerate(places))
 
     def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
         kept, segment, start_us = self.program.branch(now_us)
@@ -204,13 +233,18 @@ class CarParkGeneration:
         now_us: int,
         reservations: Reservations,
     ) -> Route | None:
+        return self._plan(reservations, origin, start_us, self._visits(call, place, start_us), now_us)
+
+    def _plan(
+        self, reservations: Reservations, origin: Segment, start_us: int, visits: tuple[Visit, ...], now_us: int
+    ) -> Route | None:
         route = plan_route(
             self.site,
             reservations,
             self.machine.node_id,
             origin,
             start_us,
-            self._visits(call, place, start_us),
+            visits,
             self._refuges(),
             MAX_EXPANSIONS,
             self.mirror.lift_floors(now_us, start_us),
@@ -222,18 +256,9 @@ class CarParkGeneration:
 
         Without work the way to another refuge: so a machine that only stands gives way.
         """
-        route = plan_route(
-            self.site,
-            self.mirror.reservations,
-            self.machine.node_id,
-            origin,
-            start_us,
-            tuple(self._work_visit(work, now_us) for work in works),
-            self._refuges(),
-            MAX_EXPANSIONS,
-            self.mirror.lift_floors(now_us, start_us),
-        )
-        return None if isinstance(route, NoRoute) else _steps_of(route, works)
+        visits = tuple(self._work_visit(work, now_us) for work in works)
+        route = self._plan(self.mirror.reservations, origin, start_us, visits, now_us)
+        return None if route is None else _steps_of(route, works)
 
     def _work_visit(self, work: Work, now_us: int) -> Visit:
         if work.handling is Handling.TAKE and work.station in self.site.compartments.values():
@@ -310,6 +335,11 @@ class CarParkGeneration:
 
     def _deadline_us(self, call: CallForProposals, now_us: int) -> int:
         return from_bus_ms(call.deadline_ms, now_us)
+
+
+def _one_a_segment(places: list[Station]) -> list[Station]:
+    """The first of each segment's places: both sides are reached and served alike."""
+    return list({place.segment: place for place in reversed(places)}.values())
 
 
 def _steps_of(route: Route, works: list[Work]) -> tuple[Step, ...]:

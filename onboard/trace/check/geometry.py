@@ -1,0 +1,91 @@
+"""Where a body is, in slots: computed from the site file and a ``Progress`` alone.
+
+A slot is what has a token of its own (docs/network.md): a segment of an alley or spur, a lift's platform (index 0 of
+the lift's track), and a lift's gate (index 255), which whoever is over the sill holds.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+from onboard.core.codes import TokenKind
+from onboard.core.messages import Progress
+from onboard.core.site import Segment, Site, TrackKind
+from onboard.trace.check.tokens_seen import Token
+
+PLATFORM_INDEX = 0
+GATE_INDEX = 255
+#: A body counts as in a slot from here on, mm: sensors are read to the millimetre, and moments before they are told.
+TOLERANCE_MM = 20
+
+
+class Body(NamedTuple):
+    """A machine as its last ``Progress`` told it: the centre from that of index 1 of ``track``, in mm."""
+
+    node: int
+    track: int
+    index: int
+    position_mm: int
+    speed_mm_s: int
+    time_us: int
+
+
+def body_of(site: Site, progress: Progress, time_us: int) -> Body | None:
+    """The body that a message tells of; None where the site has no such track."""
+    track = site.tracks.get(progress.track)
+    if track is None:
+        return None
+    position_mm = (progress.index - 1) * track.pitch_mm + progress.offset_mm
+    return Body(progress.sender, progress.track, progress.index, position_mm, progress.speed_mm_s, time_us)
+
+
+def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segment]:
+    """Slots that a robot's body from ``low_mm`` to ``high_mm`` is in, gates of the sills that it is over included."""
+    line = site.tracks[track]
+    lowest = 0 if Segment(track, 0) in site.platforms else 1
+    highest = line.length + (1 if Segment(track, line.length + 1) in site.platforms else 0)
+    first, last = (_index_at(mm, line.pitch_mm) for mm in (low_mm + TOLERANCE_MM, high_mm - TOLERANCE_MM))
+    indices = range(max(lowest, first), min(highest, last) + 1)
+    slots = [slot_at(site, Segment(track, index)) for index in indices]
+    for one, other in pairwise(indices):
+        lift = site.platforms.get(Segment(track, one), site.platforms.get(Segment(track, other)))
+        if lift is not None:
+            slots.append(Segment(lift, GATE_INDEX))
+    return slots
+
+
+def occupied(site: Site, body: Body) -> list[Segment]:
+    """Slots that a robot's body is in."""
+    if site.tracks[body.track].kind is not TrackKind.ALLEY:
+        return [Segment(body.track, body.index)]
+    half_mm = site.carrier_length_mm / 2
+    return slots_of(site, body.track, body.position_mm - half_mm, body.position_mm + half_mm)
+
+
+def swept(site: Site, body: Body, until_mm: float) -> list[Segment]:
+    """Slots that a robot's body is in and comes through until its centre is at ``until_mm`` on the same track."""
+    if site.tracks[body.track].kind is not TrackKind.ALLEY:
+        return [Segment(body.track, body.index)]
+    half_mm = site.carrier_length_mm / 2
+    low_mm, high_mm = sorted((float(body.position_mm), until_mm))
+    return slots_of(site, body.track, low_mm - half_mm, high_mm + half_mm)
+
+
+def slot_at(site: Site, position: Segment) -> Segment:
+    """The slot of a position on an alley: itself, or the platform that is meant by the index before or behind it."""
+    lift = site.platforms.get(position)
+    return position if lift is None else Segment(lift, PLATFORM_INDEX)
+
+
+def token_of(slot: Segment) -> Token:
+    """The token of a slot."""
+    return Token(TokenKind.SEGMENT, slot.number)
+
+
+def floor_of(site: Site, lift: Body) -> int:
+    """The alley at which a lift's platform is, by the nearest mark."""
+    joins = site.tracks[lift.track].joins
+    return joins[min(len(joins), max(1, lift.index)) - 1].track
+
+
+def _index_at(position_mm: float, pitch_mm: int) -> int:
+    return int((position_mm + pitch_mm / 2) // pitch_mm) + 1

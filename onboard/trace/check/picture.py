@@ -1,0 +1,85 @@
+"""What has been on a bus so far, for all rules together. A rule is shown an event before the picture takes it up."""
+
+from onboard.core.codes import KindCode, MachineState
+from onboard.core.messages import BusTime, Heartbeat, Message, Progress, TokenGrant, TokenHeld
+from onboard.core.serial import from_bus_ms
+from onboard.core.site import Site
+from onboard.trace.check.event import Event
+from onboard.trace.check.geometry import Body, body_of
+from onboard.trace.check.tokens_seen import TokensSeen
+
+#: A machine that was not heard for so long counts as silent, us: three missing heartbeats (dbc/fleet.dbc).
+SILENT_US = 7_000_000
+
+
+class Picture:
+    """Bus time, holders of tokens, places of bodies and lives of machines, from the frames alone.
+
+    ``disturbed`` is true where frames may have been lost, doubled or delayed on purpose; ``site`` None where no site
+    file was given.
+    """
+
+    def __init__(self, site: Site | None, *, disturbed: bool = False) -> None:
+        self.disturbed = disturbed
+        self.now_us = 0
+        self.offset_us: int | None = None
+        self.tokens = TokensSeen(site)
+        self.bodies: dict[int, Body] = {}
+        #: Boot counter and last sign of life, us of the log, by node.
+        self.boots: dict[int, int] = {}
+        self.heard_us: dict[int, int] = {}
+        #: Things that could not be judged, because the log does not tell enough.
+        self.unjudged = 0
+        self._site = site
+
+    @property
+    def site(self) -> Site:
+        """The site. Raises ``ValueError`` where none was given: rules that need one are left out then."""
+        if self._site is None:
+            raise ValueError("this rule needs the site file")
+        return self._site
+
+    @property
+    def has_site(self) -> bool:
+        """Whether the site is known."""
+        return self._site is not None
+
+    def kind(self, node: int) -> KindCode | None:
+        """Kind of a machine by the site file."""
+        machine = self._site.machines.get(node) if self._site is not None else None
+        return machine.kind if machine is not None else None
+
+    def bus_us(self, time_us: int) -> int | None:
+        """Bus time at a time of the log; None before anybody told it. Low by the time that a frame takes."""
+        return time_us - self.offset_us if self.offset_us is not None else None
+
+    def log_us(self, bus_ms: int, near_us: int) -> int | None:
+        """The time of the log nearest to ``near_us`` at which bus time reads ``bus_ms``."""
+        if self.offset_us is None:
+            return None
+        return from_bus_ms(bus_ms, near_us - self.offset_us) + self.offset_us
+
+    def is_alive(self, node: int, boot: int | None) -> bool:
+        """Whether a machine is heard and still in the life that had this boot counter; None for not known."""
+        return self.boots.get(node) == boot and self.now_us - self.heard_us.get(node, 0) <= SILENT_US
+
+    def feed(self, event: Event[Message]) -> None:
+        """Take up one message."""
+        self.now_us = time_us = event.time_us
+        match event.message:
+            case BusTime(bus_time_us=bus_us):
+                self.offset_us = time_us - bus_us
+            case TokenGrant() as grant:
+                self.tokens.on_grant(grant, time_us)
+            case TokenHeld() as held:
+                self.tokens.on_held(held, time_us)
+            case Progress() as progress if self._site is not None:
+                body = body_of(self._site, progress, time_us)
+                if body is not None:
+                    self.bodies[progress.sender] = body
+            case Heartbeat() as beat:
+                if not self.boots:
+                    # The first sign of life of a whole site in its first life: all tokens are where the site file says.
+                    self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
+                self.boots[beat.sender] = beat.boot
+                self.heard_us[beat.sender] = time_us

@@ -1,0 +1,48 @@
+"""The base of all rules: what they are called, where they come from, which messages they want to see."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from onboard.core.messages import Message
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.picture import Picture
+
+#: Each handler takes events of exactly the message class that it is listed under; Any is what a dispatch table costs.
+Handlers = Mapping[type[Message], Callable[[Any], None]]
+
+
+class Rule:
+    """One rule over one run. ``handlers`` says which messages it sees; ``tick`` lets it see time pass.
+
+    ``needs_site``: it cannot be judged without the site file. ``undisturbed``: it holds only where no frame was lost or
+    doubled on purpose. ``on_devices``: it judges device buses, so a log of the fleet bus alone tells it nothing.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    source: ClassVar[str]
+    needs_site: ClassVar[bool] = False
+    undisturbed: ClassVar[bool] = False
+    on_devices: ClassVar[bool] = False
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        self.picture = picture
+        self._report = report
+
+    def handlers(self) -> Handlers:
+        """Message class to handler. A handler sees the picture as it was before the event."""
+        raise NotImplementedError
+
+    def tick(self, now_us: int) -> None:
+        """About once a second of the log's time: what should have happened by now."""
+
+    def finish(self, now_us: int) -> None:
+        """The log ends, or another run begins."""
+
+    def find(self, event: Event[Any], machines: tuple[int, ...], what: str) -> None:
+        """Report what an event shows."""
+        self._report(Finding(event.time_us, self.name, machines, what, event.evidence))
+
+    def miss(self, time_us: int, machines: tuple[int, ...], what: str) -> None:
+        """Report what should have been in the log and is not."""
+        self._report(Finding(time_us, self.name, machines, what, ""))

@@ -1,0 +1,110 @@
+"""Who holds which token, as the frames alone tell it."""
+
+from collections import OrderedDict, deque
+from typing import NamedTuple
+
+from onboard.core.codes import KindCode, TokenKind
+from onboard.core.messages import TokenGrant, TokenHeld
+from onboard.core.serial import is_newer
+from onboard.core.site import Segment, Site, Station
+
+#: Bits of a token's version (dbc/fleet.dbc).
+VERSION_BITS = 16
+#: Handovers of one token that are remembered, to tell a repeated frame from a second grant.
+MEMORY = 8
+#: Most tokens remembered: all of the largest site, and the cars of many days. The one longest silent is forgotten.
+MOST_TOKENS = 20_000
+#: A frame may overtake another of its own sender, whose identifier is larger, by some bursts on a busy bus, us.
+OVERTAKING_US = 100_000
+
+
+class Token(NamedTuple):
+    """Which token: its kind and number on the wire."""
+
+    kind: TokenKind
+    number: int
+
+    def __str__(self) -> str:
+        if self.kind is TokenKind.SEGMENT:
+            return f"segment {Segment(self.number >> 8, self.number & 0xFF)}"
+        if self.kind is TokenKind.STATION:
+            return f"station {Station.from_number(self.number & 0xFFFF)}"
+        return f"{self.kind.name.lower()} {self.number >> 16}.{self.number & 0xFFFF}"
+
+
+class Handover(NamedTuple):
+    """A token came to ``holder`` under ``version``; ``giver`` 0 where nobody was heard giving it."""
+
+    version: int
+    giver: int
+    holder: int
+    time_us: int
+
+
+class TokensSeen:
+    """The last handovers of each token. ``from_start`` is true where the log begins with the site's first power-up."""
+
+    def __init__(self, site: Site | None) -> None:
+        self.from_start = False
+        self._site = site
+        self._past: OrderedDict[Token, deque[Handover]] = OrderedDict()
+
+    def last(self, token: Token) -> Handover | None:
+        """The newest handover heard of."""
+        past = self._past.get(token)
+        return past[-1] if past else None
+
+    def under(self, token: Token, version: int) -> Handover | None:
+        """The handover that made this version, if it is remembered."""
+        return next((one for one in self._past.get(token, ()) if one.version == version), None)
+
+    def holder(self, token: Token) -> int | None:
+        """Who holds it; None where the log does not tell."""
+        last = self.last(token)
+        if last is not None:
+            return last.holder
+        return self.first_holder(token) if self.from_start else None
+
+    def first_holder(self, token: Token) -> int | None:
+        """Who holds it before it first moves: cars and tasks are their origin's; for all others the site file tells."""
+        if token.kind in (TokenKind.CAR, TokenKind.TASK):
+            return token.number >> 16
+        if self._site is None:
+            return None
+        for machine in self._site.machines.values():
+            if token.kind is TokenKind.SEGMENT and machine.kind is KindCode.ROBOT:
+                if machine.home.number == token.number:
+                    return machine.node_id
+            elif token.kind is TokenKind.STATION and machine.station is not None:
+                if machine.station.number == token.number:
+                    return machine.node_id
+        return self._site.stewards.get(token.number >> 8)
+
+    def may_use(self, token: Token, node: int, now_us: int) -> bool:
+        """Whether ``node`` holds it, held it a moment ago, or the log does not tell."""
+        holder = self.holder(token)
+        if holder in (None, node):
+            return True
+        last = self.last(token)
+        return last is not None and last.giver == node and now_us - last.time_us <= OVERTAKING_US
+
+    def on_grant(self, grant: TokenGrant, time_us: int) -> None:
+        """Take up a grant, whether it was right or not: the newest version counts."""
+        token = Token(grant.token_kind, grant.token)
+        self._learn(token, Handover(grant.version, grant.sender, grant.holder, time_us))
+
+    def on_held(self, held: TokenHeld, time_us: int) -> None:
+        """Take up a statement; it tells something new only where the grant is not in the log."""
+        self._learn(Token(held.token_kind, held.token), Handover(held.version, 0, held.sender, time_us))
+
+    def _learn(self, token: Token, handover: Handover) -> None:
+        past = self._past.get(token)
+        if past is not None and not is_newer(handover.version, past[-1].version, VERSION_BITS):
+            return
+        if past is None:
+            past = self._past[token] = deque(maxlen=MEMORY)
+            if len(self._past) > MOST_TOKENS:
+                self._past.popitem(last=False)
+        else:
+            self._past.move_to_end(token)
+        past.append(handover)
