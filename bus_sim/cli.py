@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from bus_sim.can.faults import parse_fault
+from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
 from bus_sim.serve.bridge import parse_bus_specs
@@ -60,6 +61,7 @@ def build_parser() -> argparse.ArgumentParser:
     dbc.add_argument("site", nargs="?", default="level1", help="name of a shipped site, or a site file")
     sites = commands.add_parser("sites", help="list the shipped sites, or tell what one holds and can lose")
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
+    add_compare(commands)
     return parser
 
 
@@ -160,6 +162,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.command == "sites":
             print("\n".join(site_names() if args.site is None else site_report(find_site(args.site))))
             return 0
+        if args.command == "compare":
+            return run_compare(args)
         site = find_site(args.site or DEFAULT_SITE)
         if args.command == "dbc":
             sys.stdout.write(site_dbc(site))

@@ -21,6 +21,9 @@ PICTURES_S = 15
 #: Lines of events below the picture.
 EVENT_LINES = 10
 
+#: Columns before an alley: its floor and side.
+_LABEL = 5
+_LOADED = "bold reverse green"
 _STATE_WORDS = {
     MachineState.STARTING: "starting",
     MachineState.IDLE: "idle",
@@ -48,31 +51,51 @@ class Clock:
         return (self._zero + timedelta(microseconds=time_us)).strftime("%H:%M:%S")
 
 
-def draw_floor(site: Site, view: SiteView, track: int) -> list[Text]:
-    """Three lines: far places, alley with machines, near places and compartments."""
+#: Columns that one position takes, widest first; the widest that fits is used.
+CELLS = (5, 3, 2)
+
+
+def cell_width(site: Site, width: int) -> int:
+    """Columns for one position, so that the longest alley fits in ``width`` columns if any does."""
+    length = max(track.length for track in site.tracks.values() if track.kind is TrackKind.ALLEY)
+    return next(
+        (cell for cell in CELLS if _LABEL + 2 * _shaft_width(site, cell) + length * cell + 4 <= width), CELLS[-1]
+    )
+
+
+def draw_floor(site: Site, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
+    """Three lines: far places, alley with machines, near places and compartments; ``cell`` columns a position."""
     taken = view.places_taken()
-    compartments = {station: view.name(node) for node, station in site.compartments.items()}
+    compartments = set(site.compartments.values())
     places = set(site.places)
     rows = []
     for side in (Side.FAR, Side.NEAR):
-        row = Text((f"{track:>2} {side.name[0]} " if side is Side.FAR else "   N ") + " " * _shaft_width(site))
+        label = f"{track:>2} {side.name[0]} " if side is Side.FAR else "   N "
+        row = Text(label + " " * _shaft_width(site, cell), no_wrap=True, overflow="crop")
         for index in range(1, site.tracks[track].length + 1):
             station = Station(track, index, side)
             car = taken.get(station.number)
             if station in compartments:
-                row.append("[" + (f"{car.number:^3}" if car else "I/O") + "]", style="bold magenta")
+                row.append(_boxed(str(car.number) if car else "I/O", "[]", cell), style="bold magenta")
             elif station in places:
-                row.append(f"|{car.number:^3}|" if car else "|   |", style="cyan" if car else "dim")
+                row.append(_boxed(str(car.number) if car else "", "||", cell), style="cyan" if car else "dim")
             else:
-                row.append("     ")
+                row.append(" " * cell)
         rows.append(row)
-    rows.insert(1, _alley(site, view, track))
+    rows.insert(1, _alley(site, view, track, cell))
     return rows
 
 
-def _alley(site: Site, view: SiteView, track: int) -> Text:
-    row = Text("     ")
-    row.append_text(_shaft(site, view, track, 0))
+def _boxed(text: str, box: str, cell: int) -> str:
+    """Text of one position; a narrow one has no walls, and an empty place is a dash."""
+    if cell >= CELLS[0]:
+        return f"{box[0]}{text[-3:]:^3}{box[1]}"
+    return f"{text[-cell:] or '-':^{cell}}"
+
+
+def _alley(site: Site, view: SiteView, track: int, cell: int) -> Text:
+    row = Text(" " * _LABEL, no_wrap=True, overflow="crop")
+    row.append_text(_shaft(site, view, track, 0, cell))
     here: dict[int, list[int]] = {}
     for node, (segment, _) in view.positions.items():
         machine = site.machines.get(node)
@@ -81,39 +104,43 @@ def _alley(site: Site, view: SiteView, track: int) -> Text:
     for index in range(1, site.tracks[track].length + 1):
         nodes = here.get(index)
         if nodes is None:
-            row.append("  .  ", style="dim")
+            row.append(f"{'.':^{cell}}", style="dim")
         else:
             loaded = any(view.aboard.get(node) is not None for node in nodes)
-            row.append(f"{view.name(nodes[0])[:4]:^5}", style="bold reverse green" if loaded else "bold green")
-    row.append_text(_shaft(site, view, track, site.tracks[track].length + 1))
+            name = view.name(nodes[0])
+            row.append(f"{name[:4] if cell > 4 else name[-cell:]:^{cell}}", style=_LOADED if loaded else "bold green")
+    row.append_text(_shaft(site, view, track, site.tracks[track].length + 1, cell))
     return row
 
 
-def _shaft_width(site: Site) -> int:
+def _shaft_width(site: Site, cell: int) -> int:
     """Room for the lifts at the left end, where the site has any."""
-    return 7 if lift_tracks(site) else 0
+    return min(7, cell + 2) if lift_tracks(site) else 0
 
 
-def _shaft(site: Site, view: SiteView, track: int, index: int) -> Text:
+def _shaft(site: Site, view: SiteView, track: int, index: int, cell: int) -> Text:
     """A lift at one end of an alley: its platform with whoever stands on it, or the empty shaft."""
+    width = _shaft_width(site, cell)
     lift = lift_at(site, Segment(track, index))
     if lift is None:
-        return Text(" " * _shaft_width(site))
+        return Text(" " * width)
     node = site.stewards[lift]
     at = view.positions[node][0].index
     if sill(site, lift, at).track != track:
-        return Text("   :   ", style="dim")
+        return Text(f"{':':^{width}}", style="dim")
     aboard = [view.name(n) for n, (segment, _) in view.positions.items() if segment == Segment(track, index)]
-    return Text(f"[{aboard[0] if aboard else '=':^5}]", style="bold yellow")
+    return Text(f"[{aboard[0][-(width - 2) :] if aboard else '=':^{width - 2}}]", style="bold yellow")
 
 
-def draw(site: Site, view: SiteView, clock: Clock, line: str) -> Group:
-    """The whole picture: floors from the top, machines' states, the last events, one line of figures."""
+def draw(site: Site, view: SiteView, clock: Clock, line: str, width: int = 120) -> Group:
+    """The picture in ``width`` columns: floors from the top, machines' states, the last events, a line of figures."""
     floors: list[Text] = []
+    cell = cell_width(site, width)
     for number in sorted((n for n, t in site.tracks.items() if t.kind is TrackKind.ALLEY), reverse=True):
-        floors += draw_floor(site, view, number)
+        floors += draw_floor(site, view, number, cell)
     states = Text("   ".join(f"{view.name(n)} {_STATE_WORDS[state]}" for n, state in sorted(view.states.items())))
-    events = [Text(f"{clock.at(when)}  {text}", overflow="ellipsis") for when, text in list(view.events)[-EVENT_LINES:]]
+    said = dict.fromkeys((clock.at(when), text) for when, text in view.events)
+    events = [Text(f"{when}  {text}", no_wrap=True, overflow="ellipsis") for when, text in list(said)[-EVENT_LINES:]]
     events += [Text("")] * (EVENT_LINES - len(events))
     title = f"{site.name}  {clock.at(view.now_us)}"
     return Group(
@@ -161,4 +188,5 @@ class TerminalShow:
         now_s = time.monotonic()
         if now_s - self._last_s >= 1 / PICTURES_S:
             self._last_s = now_s
-            self._live.update(draw(self._site, self._view, self._clock, self._figures()), refresh=True)
+            width = self._console.width
+            self._live.update(draw(self._site, self._view, self._clock, self._figures(), width), refresh=True)

@@ -1,4 +1,4 @@
-"""Draws docs/level1.svg, the terminal picture of the real day at a busy moment.
+"""Draws docs/standard.svg, the terminal picture of the real day at a busy moment.
 
 Run: ``python docs/make_picture.py``.
 """
@@ -17,15 +17,15 @@ from bus_sim.show import Clock, draw
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
 
-#: 16:16:47 local time: a car is on its way to its place.
-MOMENT_S = 16 * 3600 + 16 * 60 + 47
+#: 07:33:10 local time: cars come in at two compartments, robots share the street's alley.
+MOMENT_S = 7 * 3600 + 33 * 60 + 10
 
 
 async def _picture() -> str:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
-    site = find_site("level1")
-    demand = choose_demand(DayOptions(stalls=("AG-1F",)))
+    site = find_site("standard")
+    demand = choose_demand(DayOptions(), site)
     first_us = demand.stays[0].arrival_us
     simulation = build(site, RunOptions(), loop)
     simulation.plant.street.add_all(demand, LEAD_US - first_us)
@@ -33,15 +33,15 @@ async def _picture() -> str:
     await asyncio.sleep(MOMENT_S - first_us / 1e6 + LEAD_US / 1e6)
     assert demand.zero is not None
     clock = Clock(demand.zero + timedelta(microseconds=first_us - LEAD_US))
-    console = Console(record=True, width=76, file=StringIO())
+    console = Console(record=True, width=124, file=StringIO())
     street = simulation.plant.street.summary()
     line = (
         f" cars in {street.parked}   out {street.served}   inside {street.inside}   "
         f"calls {simulation.view.calls_opened}   bids {simulation.view.bids}   "
         f"bus load {simulation.fleet.statistics().mean_load:.2%}"
     )
-    console.print(draw(site, simulation.view, clock, line))
-    svg = console.export_svg(title="bus-sim run level1")
+    console.print(draw(site, simulation.view, clock, line, 124))
+    svg = console.export_svg(title="bus-sim run")
     # rich's template asks another host for its font; the reader's own does as well.
     return re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL).replace("Fira Code", "DejaVu Sans Mono")
 
@@ -51,7 +51,7 @@ def main() -> None:
     loop = VirtualTimeLoop()
     asyncio.set_event_loop(loop)
     svg = loop.run_until_complete(_picture())
-    Path(__file__).with_name("level1.svg").write_text(svg, encoding="utf-8")
+    Path(__file__).with_name("standard.svg").write_text(svg, encoding="utf-8")
     loop.close()
 
 

@@ -1,15 +1,15 @@
 """Who decides who does what: central dispatchers of growing wit.
 
 Nearest-first and random are the simple rules for automated guided vehicles of Egbelu and Tanchoco (1984): whenever a
-vehicle is free and a task waits, the pair with the shortest empty way goes first, or any pair. The joint choice looks at
-all open tasks and all robots together, also at those that are still busy.
+vehicle is free and a task waits, the pair with the shortest empty way goes first, or any pair. The joint choice looks
+at all open tasks and all robots together, also at those that are still busy.
 """
 
 import random
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
-from bus_sim.compare.prospect import Prospect, pick_up, serves_customer_us
+from bus_sim.compare.prospect import Prospect, serves_customer_us
 from onboard.core.messages import CallForProposals
 from onboard.core.reservations import FOREVER
 from onboard.kinds.car_park.generation import Solution
@@ -66,7 +66,7 @@ class NearestFirst:
         """Pairs of a free robot and a task by empty travelling time; ties by age of the task, then node-ID."""
 
         def key(pair: "_Pair", prospect: Prospect) -> tuple[int, int, int]:
-            segment, start_us = prospect.start(pair.node)
+            start_us = prospect.start(pair.node)[1]
             return prospect.reach_us(pair.node, pair.task.call) - start_us, scene.tasks.index(pair.task), pair.node
 
         return _one_by_one(scene, lambda pairs, prospect: sorted(pairs, key=lambda pair: key(pair, prospect)))
@@ -199,6 +199,3 @@ class _Search:
     def _cost(self, task: OpenTask, served_us: int, finish_us: int) -> float:
         now_us = self._scene.prospect.now_us
         return max(task.waiting, NOBODY_YET) * (served_us - now_us) + ROBOT_TIME * (finish_us - now_us)
-
-
-__all__ = ["AnyFirst", "JointChoice", "NearestFirst", "OpenTask", "Order", "Policy", "Scene", "pick_up"]

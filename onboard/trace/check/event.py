@@ -2,14 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 from onboard.core.frame import Frame
 from onboard.core.messages import Message
 from onboard.trace.candump import format_frame
 
+M = TypeVar("M", bound=Message, covariant=True)
 
-class Event[M: Message](NamedTuple):
+
+class Event(NamedTuple, Generic[M]):
     """One message of a log: time in us of the log, the channel's name in the log, and the frame that completed it."""
 
     time_us: int

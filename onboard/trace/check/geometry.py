@@ -4,8 +4,8 @@ A slot is what has a token of its own (docs/network.md): a segment of an alley o
 the lift's track), and a lift's gate (index 255), which whoever is over the sill holds.
 """
 
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 from onboard.core.codes import TokenKind
 from onboard.core.messages import Progress
@@ -18,7 +18,8 @@ GATE_INDEX = 255
 TOLERANCE_MM = 20
 
 
-class Body(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Body:
     """A machine as its last ``Progress`` told it: the centre from that of index 1 of ``track``, in mm."""
 
     node: int
@@ -27,6 +28,11 @@ class Body(NamedTuple):
     position_mm: int
     speed_mm_s: int
     time_us: int
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Track and position."""
+        return self.track, self.position_mm
 
 
 def body_of(site: Site, progress: Progress, time_us: int) -> Body | None:

@@ -72,12 +72,11 @@ class TokensSeen:
         if self._site is None:
             return None
         for machine in self._site.machines.values():
-            if token.kind is TokenKind.SEGMENT and machine.kind is KindCode.ROBOT:
-                if machine.home.number == token.number:
+            if token.kind is TokenKind.SEGMENT:
+                if machine.kind is KindCode.ROBOT and machine.home.number == token.number:
                     return machine.node_id
-            elif token.kind is TokenKind.STATION and machine.station is not None:
-                if machine.station.number == token.number:
-                    return machine.node_id
+            elif machine.station is not None and machine.station.number == token.number:
+                return machine.node_id
         return self._site.stewards.get(token.number >> 8)
 
     def may_use(self, token: Token, node: int, now_us: int) -> bool:

@@ -1,0 +1,193 @@
+"""Calls: closed once and in time, by bids that came in time and went down (rows P05 to P12)."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from onboard.core.codes import NOBODY, CallResult, Criterion
+from onboard.core.messages import Award, Bid, CallForProposals
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rule import Handlers, Rule
+
+#: A call is closed at its deadline; a restart of the initiator, a journal write and a busy bus need less than this, us.
+CLOSED_WITHIN_US = 2_000_000
+#: Closed calls are remembered so long, since awards are said again until the winner is heard, us.
+REMEMBERED_US = 600_000_000
+#: Two bids may cross on their way: the second was queued before the first was heard, us.
+CROSSING_US = 20_000
+#: Bus time in the log is told by frames that take up to a few of these to come through, us.
+CLOCK_TOLERANCE_US = 5_000
+_HALF_MS = 1 << 31
+
+
+@dataclass
+class CallSeen:
+    """One call: when it was opened and is due (us of the log), its bids and its outcome."""
+
+    call: CallForProposals
+    event: Event[CallForProposals]
+    boot: int | None
+    due_us: int | None
+    bids: list[tuple[int, int, int]] = field(default_factory=list)
+    option: bool = False
+    outcome: Award | None = None
+    told: bool = False
+
+
+class _CallRule(Rule):
+    """Keeps the calls of the last minutes."""
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self.calls: OrderedDict[tuple[int, int], CallSeen] = OrderedDict()
+
+    def handlers(self) -> Handlers:
+        """Calls, bids and awards."""
+        return {CallForProposals: self._on_call, Bid: self._on_bid, Award: self._on_award}
+
+    def tick(self, now_us: int) -> None:
+        """Forget what is long over."""
+        while self.calls and now_us - next(iter(self.calls.values())).event.time_us > REMEMBERED_US:
+            self.calls.popitem(last=False)
+
+    def _on_call(self, event: Event[CallForProposals]) -> None:
+        call = event.message
+        known = self.calls.get((call.sender, call.call))
+        if known is not None and known.call == call:
+            return
+        due_us = self.picture.log_us(call.deadline_ms, event.time_us)
+        seen = CallSeen(call, event, self.picture.boots.get(call.sender), due_us)
+        self.calls.pop((call.sender, call.call), None)
+        self.calls[call.sender, call.call] = seen
+
+    def _on_bid(self, event: Event[Bid]) -> None:
+        bid = event.message
+        seen = self.calls.get((bid.initiator, bid.call))
+        if seen is not None:
+            self.judge_bid(event, seen)
+            seen.bids.append((event.time_us, bid.sender, bid.cost))
+
+    def _on_award(self, event: Event[Award]) -> None:
+        seen = self.calls.get((event.message.sender, event.message.call))
+        if seen is None:
+            self.picture.unjudged += 1
+            return
+        self.judge_award(event, seen)
+
+    def judge_bid(self, event: Event[Bid], seen: CallSeen) -> None:
+        """A bid for a call that is known."""
+
+    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+        """An award for a call that is known."""
+
+
+class CallsClosed(_CallRule):
+    """Each call gets exactly one final outcome, at its deadline; an award is idempotent.
+
+    A winner may give the task back before it was heard (REJECTED after AWARDED). An option that nobody
+    decides on lapses without a frame. A call whose initiator fell silent or started anew is over.
+    """
+
+    name = "calls-closed"
+    title = "calls closed, once and in time"
+    source = "rows P11, P12, P14; dbc/fleet.dbc, Award"
+
+    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+        """Another outcome than the first."""
+        award, before = event.message, seen.outcome
+        if award.result is CallResult.OPTION:
+            if before is not None:
+                self.find(event, (award.sender,), f"call {award.call} becomes an option after {before.result.name}")
+            seen.option = True
+            return
+        if before is None or (before.result, award.result) == (CallResult.AWARDED, CallResult.REJECTED):
+            seen.outcome = award
+        elif (before.result, before.winner) != (award.result, award.winner):
+            what = f"call {award.call} ends {_outcome(award)}, after it ended {_outcome(before)}"
+            self.find(event, (award.sender, award.winner), what)
+
+    def tick(self, now_us: int) -> None:
+        """Calls that should be closed by now."""
+        super().tick(now_us)
+        for seen in self.calls.values():
+            if seen.told or seen.outcome is not None or seen.option or seen.due_us is None:
+                continue
+            if now_us - seen.due_us > CLOSED_WITHIN_US and self.picture.is_alive(seen.call.sender, seen.boot):
+                seen.told = True
+                self.find(seen.event, (seen.call.sender,), f"call {seen.call.call} was never closed")
+
+
+class BidsInTime(_CallRule):
+    """Who wins has bid, before the deadline: no bid after it counts."""
+
+    name = "bids-in-time"
+    title = "no bid after the deadline counts"
+    source = "row P05; docs/decisions.md, flag 11"
+
+    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+        """The winner's bids."""
+        award = event.message
+        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or award.winner == NOBODY or seen.told:
+            return
+        times_us = [time_us for time_us, node, _ in seen.bids if node == award.winner]
+        due_us = seen.due_us
+        if times_us and (due_us is None or min(times_us) <= due_us + CLOCK_TOLERANCE_US):
+            return
+        seen.told = True
+        late_us = min(times_us) - (due_us or 0) if times_us else 0
+        what = f"bid {late_us} us after the deadline" if times_us else "never bid"
+        self.find(event, (award.sender, award.winner), f"call {award.call} goes to {award.winner}, who {what}")
+
+
+class BidsGoDown(_CallRule):
+    """The bids of one call strictly decrease on the bus (of equal ones the lower node-ID), and the last one wins."""
+
+    name = "bids-go-down"
+    title = "bids strictly better, and the best wins"
+    source = "rows P06 to P10; dbc/fleet.dbc, Bid"
+    undisturbed = True
+
+    def judge_bid(self, event: Event[Bid], seen: CallSeen) -> None:
+        """Not better than one heard before."""
+        bid = event.message
+        for time_us, node, cost in seen.bids:
+            if (node, cost) == (bid.sender, bid.cost):
+                return
+            heard = event.time_us - time_us > CROSSING_US
+            if heard and not _is_better(bid.cost, bid.sender, cost, node, seen.call.criterion):
+                what = f"bids {bid.cost} for call {bid.call} of {bid.initiator} after {node} bid {cost}"
+                self.find(event, (bid.sender, node), what)
+                return
+
+    def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
+        """Given to another than the best bidder."""
+        award = event.message
+        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or seen.told or seen.due_us is None:
+            return
+        in_time = [(node, cost) for time_us, node, cost in seen.bids if time_us <= seen.due_us - CLOCK_TOLERANCE_US]
+        seen.told = True
+        best = _best(in_time, seen.call.criterion)
+        if best is not None and best[0] != award.winner and award.winner in {node for node, _ in in_time}:
+            what = f"call {award.call} goes to {award.winner}, though {best[0]} bid {best[1]}"
+            self.find(event, (award.sender, award.winner, best[0]), what)
+
+
+def _best(bids: list[tuple[int, int]], criterion: Criterion) -> tuple[int, int] | None:
+    best: tuple[int, int] | None = None
+    for node, cost in bids:
+        if best is None or _is_better(cost, node, best[1], best[0], criterion):
+            best = (node, cost)
+    return best
+
+
+def _is_better(cost: int, node: int, than: int, of: int, criterion: Criterion) -> bool:
+    difference = cost - than
+    if criterion is Criterion.FINISH_TIME:
+        # Bus time in ms wraps: of two times less than half of its range apart the earlier is better.
+        difference = (difference + _HALF_MS) % (2 * _HALF_MS) - _HALF_MS
+    return difference < 0 or (difference == 0 and node < of)
+
+
+def _outcome(award: Award) -> str:
+    return f"{award.result.name} for {award.winner}" if award.winner else award.result.name

@@ -1,0 +1,171 @@
+"""Cars: conserved, one custodian each, one in a place (issue 4, point 1)."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from onboard.core.codes import ANY_STATION, OUTSIDE, TaskPhase, TokenKind
+from onboard.core.messages import CarAt, Reference, TaskReport
+from onboard.core.serial import is_newer
+from onboard.core.site import Station
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rule import Handlers, Rule
+from onboard.trace.check.tokens_seen import VERSION_BITS, Token
+
+#: Cars remembered after they left; older ones are forgotten, since their numbers come again some day.
+MOST_CARS = 4_096
+#: The statement of a car may come so long after the report that names its place, us.
+STATED_WITHIN_US = 1_000_000
+
+
+@dataclass
+class CarSeen:
+    """Where a car was stated to be last, by whom and under which version."""
+
+    station: int
+    by: int
+    version: int
+
+
+class CarsConserved(Rule):
+    """A car comes in by a compartment, goes on and off shuttles, and leaves by a compartment; none is lost or doubled.
+
+    The same fold tells whether two cars are stated in one place or on one shuttle.
+    """
+
+    name = "cars-conserved"
+    title = "cars conserved, one in a place"
+    source = "issue 4, point 1"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._cars: OrderedDict[Reference, CarSeen] = OrderedDict()
+        self._at: dict[int, Reference] = {}
+        self._aboard: dict[int, Reference] = {}
+
+    def handlers(self) -> Handlers:
+        """Statements about cars."""
+        return {CarAt: self._on_car}
+
+    def _on_car(self, event: Event[CarAt]) -> None:
+        said = event.message
+        before = self._cars.get(said.car)
+        if before is not None and is_newer(before.version, said.version, VERSION_BITS):
+            return
+        wrong = self._judge_new(said) if before is None else self._judge_step(said, before)
+        wrong = wrong or self._judge_place(said)
+        if wrong:
+            self.find(event, (said.sender,), f"car {said.car.origin}.{said.car.number} {wrong}")
+        self._take_up(said)
+
+    def _judge_new(self, said: CarAt) -> str:
+        if not self.picture.tokens.from_start:
+            return ""
+        if not self.picture.has_site:
+            return ""
+        bay = self.picture.site.compartments.get(said.sender)
+        if bay is None or said.station != bay.number or said.car.origin != said.sender:
+            return f"is {_where(said.station)} and never came in"
+        return ""
+
+    def _judge_step(self, said: CarAt, before: CarSeen) -> str:
+        step = f"from {_where(before.station)} to {_where(said.station)}"
+        if before.station == said.station:
+            same = said.station != ANY_STATION or said.sender == before.by
+            return "" if same else f"from shuttle {before.by} to shuttle {said.sender}"
+        if before.station == OUTSIDE:
+            return f"goes {step}"
+        if said.station == OUTSIDE:
+            return "" if self._is_bay(before.station) else f"goes {step}"
+        if ANY_STATION not in (before.station, said.station):
+            return f"goes {step} on no shuttle"
+        if before.station == ANY_STATION and said.sender != before.by:
+            handed = self.picture.tokens.under(Token(TokenKind.CAR, _number(said.car)), said.version)
+            if handed is None or handed.giver != before.by:
+                return f"goes {step}, by the word of {said.sender}, from the shuttle of {before.by}"
+        return ""
+
+    def _judge_place(self, said: CarAt) -> str:
+        if said.station == OUTSIDE:
+            return ""
+        other = self._aboard.get(said.sender) if said.station == ANY_STATION else self._at.get(said.station)
+        if other is None or other == said.car:
+            return ""
+        return f"is {_where(said.station)}, where car {other.origin}.{other.number} is"
+
+    def _take_up(self, said: CarAt) -> None:
+        for places in (self._at, self._aboard):
+            for place in [place for place, car in places.items() if car == said.car]:
+                del places[place]
+        if said.station == ANY_STATION:
+            self._aboard[said.sender] = said.car
+        elif said.station != OUTSIDE:
+            self._at[said.station] = said.car
+        self._cars[said.car] = CarSeen(said.station, said.sender, said.version)
+        self._cars.move_to_end(said.car)
+        if len(self._cars) > MOST_CARS:
+            oldest = next((car for car, seen in self._cars.items() if seen.station == OUTSIDE), None)
+            if oldest is not None:
+                del self._cars[oldest]
+
+    def _is_bay(self, station: int) -> bool:
+        if not self.picture.has_site:
+            return station != ANY_STATION
+        return any(bay.number == station for bay in self.picture.site.compartments.values())
+
+
+class OneCustodian(Rule):
+    """Only the holder of a car's token states where the car is, and the report of a task agrees with it."""
+
+    name = "one-custodian"
+    title = "one custodian a car"
+    source = "dbc/fleet.dbc, CarAt; design 5"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._stated: OrderedDict[tuple[int, int], int] = OrderedDict()
+        self._open: list[tuple[Event[TaskReport], int]] = []
+
+    def handlers(self) -> Handlers:
+        """Statements about cars, and reports that a car was put down."""
+        return {CarAt: self._on_car, TaskReport: self._on_report}
+
+    def tick(self, now_us: int) -> None:
+        """A report of a car put down is followed by the statement where it is, if it does not follow it."""
+        while self._open and now_us - self._open[0][1] > STATED_WITHIN_US:
+            event, reported_us = self._open.pop(0)
+            report = event.message
+            stated_us = self._stated.get((report.sender, report.station))
+            if stated_us is None or stated_us < reported_us - STATED_WITHIN_US:
+                what = f"put a car down {_where(report.station)} and does not say which"
+                self.find(event, (report.sender,), what)
+
+    def _on_car(self, event: Event[CarAt]) -> None:
+        said = event.message
+        self._stated[said.sender, said.station] = event.time_us
+        self._stated.move_to_end((said.sender, said.station))
+        if len(self._stated) > MOST_CARS:
+            self._stated.popitem(last=False)
+        token = Token(TokenKind.CAR, _number(said.car))
+        handover = self.picture.tokens.under(token, said.version)
+        custodian = handover.holder if handover is not None else said.car.origin if said.version == 1 else None
+        self.picture.unjudged += custodian is None
+        if custodian not in (None, said.sender):
+            car = f"car {said.car.origin}.{said.car.number}"
+            what = f"states {car} under version {said.version}, whose custodian is {custodian}"
+            self.find(event, (said.sender, custodian or 0), what)
+
+    def _on_report(self, event: Event[TaskReport]) -> None:
+        if event.message.phase is TaskPhase.DONE:
+            self._open.append((event, event.time_us))
+
+
+def _where(station: int) -> str:
+    if station == ANY_STATION:
+        return "aboard"
+    return "outside" if station == OUTSIDE else f"at {Station.from_number(station)}"
+
+
+def _number(car: Reference) -> int:
+    return car.origin << 16 | car.number

@@ -1,0 +1,242 @@
+"""All rules over a whole log: frames in, findings out, in bounded memory; and how a verdict is told."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from onboard.core.frame import Frame
+from onboard.core.messages import BusTime, Message
+from onboard.core.site import Site
+from onboard.trace.candump_reader import CandumpReader, Record
+from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
+from onboard.trace.check.cars import CarsConserved, OneCustodian
+from onboard.trace.check.customers import CustomersServed, FullMeansFull, TasksServed
+from onboard.trace.check.doors import Doors
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.lifts import LiftByGate, LiftCrush, PlatformThere
+from onboard.trace.check.liveness import NobodyStarves, SomethingHappens
+from onboard.trace.check.motion import InsideAuthority, OneBody
+from onboard.trace.check.owners import OneOwner
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rights import OneHolder
+from onboard.trace.check.rule import Rule
+from onboard.trace.check.shuttles import TornCar
+from onboard.wire.codec import Codec, device_codec, fleet_codec
+from onboard.wire.decoder import Decoder
+
+#: Every rule, in the order in which the report names them.
+RULES: tuple[type[Rule], ...] = (
+    OneHolder,
+    InsideAuthority,
+    OneBody,
+    LiftByGate,
+    LiftCrush,
+    PlatformThere,
+    TornCar,
+    Doors,
+    CarsConserved,
+    OneCustodian,
+    OneOwner,
+    CallsClosed,
+    BidsInTime,
+    BidsGoDown,
+    TasksServed,
+    CustomersServed,
+    FullMeansFull,
+    SomethingHappens,
+    NobodyStarves,
+)
+
+#: Findings that are kept word for word; all are counted.
+MOST_FINDINGS = 1_000
+#: Channels of a log that are told apart; a name more is taken for one of them.
+MOST_CHANNELS = 300
+#: Rules look at the time this often, us of the log.
+TICK_US = 1_000_000
+#: Times of a log, or bus time, that go back by more than this begin another run, us.
+BACK_US = 1_000_000
+
+
+@dataclass
+class Verdict:
+    """What came of a log. ``unknown`` counts frames that came to no message, by reason; ``waits_us`` by node-ID."""
+
+    rules: tuple[type[Rule], ...]
+    left_out: dict[str, str] = field(default_factory=dict)
+    findings: list[Finding] = field(default_factory=list)
+    counts: Counter[str] = field(default_factory=Counter)
+    seen: Counter[str] = field(default_factory=Counter)
+    unknown: Counter[str] = field(default_factory=Counter)
+    frames: int = 0
+    messages: int = 0
+    runs: int = 1
+    backwards: int = 0
+    unjudged: int = 0
+    waits_us: dict[int, int] = field(default_factory=dict)
+    wait_limit_us: int | None = None
+
+    @property
+    def is_good(self) -> bool:
+        """Whether no rule was broken."""
+        return not self.counts
+
+    def lines(self, name: Callable[[int], str] = str) -> list[str]:
+        """The report: each rule with what it found, then the findings in the order of the log."""
+        found = [
+            f"{self.frames} frames, {self.messages} messages, {self.runs} run{'s' if self.runs > 1 else ''}",
+            *(f"  {rule.name:<17} {self._told(rule)}" for rule in self.rules),
+        ]
+        found += [f"  {rule:<17} left out: {why}" for rule, why in self.left_out.items()]
+        if self.wait_limit_us is not None and self.waits_us:
+            waits = ", ".join(f"{name(node)} {us / 1e6:.1f} s" for node, us in sorted(self.waits_us.items()))
+            found.append(f"longest waits: {waits}; limit {self.wait_limit_us / 1e6:.0f} s")
+        if self.unknown:
+            found.append("no message: " + ", ".join(f"{why} {count}" for why, count in sorted(self.unknown.items())))
+        if self.backwards:
+            found.append(f"times going back: {self.backwards}")
+        if self.unjudged:
+            found.append(f"not judged, because the log does not tell enough: {self.unjudged}")
+        found += [finding.line(name) for finding in self.findings]
+        more = sum(self.counts.values()) - len(self.findings)
+        return [*found, *([f"and {more} more"] if more > 0 else [])]
+
+    def _told(self, rule: type[Rule]) -> str:
+        if self.counts[rule.name]:
+            return f"BROKEN {self.counts[rule.name]} times: {rule.title}"
+        return f"{'held' if self.seen[rule.name] else 'nothing to judge'}: {rule.title}"
+
+
+class Checks:
+    """Feed a log's frames, or messages, in order; then ``finish``.
+
+    ``disturbed``: frames may have been lost on purpose, so rules that need all of them are left out. Without a site
+    the rules that need one are left out.
+    """
+
+    def __init__(
+        self,
+        site: Site | None,
+        *,
+        disturbed: bool = False,
+        fleet: Codec | None = None,
+        device: Codec | None = None,
+        rules: tuple[type[Rule], ...] = RULES,
+    ) -> None:
+        self._site = site
+        self._disturbed = disturbed
+        self._codecs = (fleet or fleet_codec(), device or device_codec())
+        self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
+        self.verdict = Verdict(tuple(rule for rule in rules if not self._why_not(rule)))
+        self.verdict.left_out = {rule.name: why for rule in rules if (why := self._why_not(rule))}
+        self._last_us: int | None = None
+        self._begin()
+
+    def _why_not(self, rule: type[Rule]) -> str:
+        if rule.needs_site and self._site is None:
+            return "needs the site file"
+        return "holds only where no frame is lost" if rule.undisturbed and self._disturbed else ""
+
+    def _begin(self) -> None:
+        """Another run: nothing is known."""
+        self._picture = Picture(self._site, disturbed=self._disturbed)
+        self._rules = [rule(self._picture, self._keep) for rule in self.verdict.rules]
+        self._handlers: dict[type[Message], list[tuple[str, Callable[[Any], None]]]] = {}
+        for rule in self._rules:
+            for kind, handler in rule.handlers().items():
+                self._handlers.setdefault(kind, []).append((rule.name, handler))
+        self._tick_us: int | None = None
+
+    def feed(self, time_us: int, channel: str, frame: Frame) -> None:
+        """One frame of a log; ``channel`` tells buses apart, and may be any name."""
+        self.verdict.frames += 1
+        fleet, device = self._decoders_of(channel)
+        if frame.is_error:
+            self.verdict.unknown["ERROR_FRAME"] += 1
+            return
+        decoder = fleet if self._codecs[0].name_of(frame) is not None else device
+        before = decoder.drops.total()
+        message = decoder.feed(frame, time_us)
+        if message is not None:
+            self.feed_message(time_us, message, channel, frame)
+        elif decoder.drops.total() != before:
+            self._count_drops(decoder)
+
+    def feed_message(self, time_us: int, message: Message, channel: str = "", frame: Frame | None = None) -> None:
+        """One whole message, with the frame that completed it where there is one."""
+        time_us = self._orderly(time_us, message)
+        self.verdict.messages += 1
+        event = Event(time_us, message, channel, frame)
+        if self._tick_us is None or time_us - self._tick_us >= TICK_US:
+            self._tick_us = time_us
+            self._picture.now_us = time_us
+            for rule in self._rules:
+                rule.tick(time_us)
+        for name, handler in self._handlers.get(type(message), ()):
+            self.verdict.seen[name] += 1
+            handler(event)
+        self._picture.feed(event)
+
+    def finish(self) -> Verdict:
+        """The log is over."""
+        self._end()
+        for decoders in self._decoders.values():
+            for decoder in decoders:
+                self._count_drops(decoder)
+        return self.verdict
+
+    def _end(self) -> None:
+        for rule in self._rules:
+            rule.tick(self._last_us or 0)
+            rule.finish(self._last_us or 0)
+            if isinstance(rule, NobodyStarves):
+                self.verdict.wait_limit_us = rule.limit_us
+                for node, waited_us in rule.longest_us.items():
+                    self.verdict.waits_us[node] = max(self.verdict.waits_us.get(node, 0), waited_us)
+        self.verdict.unjudged += self._picture.unjudged
+
+    def _orderly(self, time_us: int, message: Message) -> int:
+        """The time to go by: a little back is held, much back is another run, as is bus time that starts anew."""
+        last_us, offset_us = self._last_us, self._picture.offset_us
+        back_us = 0 if last_us is None else last_us - time_us
+        anew = isinstance(message, BusTime) and offset_us is not None
+        # A bus time that stands still while the log goes on is one that began anew as well.
+        anew = anew and isinstance(message, BusTime) and time_us - message.bus_time_us - (offset_us or 0) > BACK_US
+        if back_us > BACK_US or anew:
+            self._end()
+            self.verdict.runs += 1
+            self._begin()
+        elif back_us > 0:
+            self.verdict.backwards += 1
+            time_us = last_us or 0
+        self._last_us = time_us
+        return time_us
+
+    def _keep(self, finding: Finding) -> None:
+        self.verdict.counts[finding.rule] += 1
+        if len(self.verdict.findings) < MOST_FINDINGS:
+            self.verdict.findings.append(finding)
+
+    def _decoders_of(self, channel: str) -> tuple[Decoder, Decoder]:
+        found = self._decoders.get(channel)
+        if found is None:
+            if len(self._decoders) >= MOST_CHANNELS:
+                return next(iter(self._decoders.values()))
+            found = self._decoders[channel] = (Decoder(self._codecs[0]), Decoder(self._codecs[1]))
+        return found
+
+    def _count_drops(self, decoder: Decoder) -> None:
+        for reason, count in decoder.drops.items():
+            self.verdict.unknown[reason.name] += count
+        decoder.drops.clear()
+
+
+def check_records(records: Iterable[Record], checks: Checks) -> Verdict:
+    """Judge a whole log, such as a ``CandumpReader`` gives it."""
+    for record in records:
+        checks.feed(record.time_us, record.channel, record.frame)
+    verdict = checks.finish()
+    if isinstance(records, CandumpReader):
+        for fault, count in records.faults.items():
+            verdict.unknown[fault.value] += count
+    return verdict

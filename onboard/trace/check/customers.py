@@ -1,0 +1,161 @@
+"""Customers: served, or told why (issue 4, point 1)."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+
+from onboard.core.codes import OUTSIDE, CallResult, DeskInput, DeskText, Operation, TaskPhase
+from onboard.core.messages import (
+    Award,
+    BayState,
+    CallForProposals,
+    CarAt,
+    DeskEvent,
+    DeskOrder,
+    Reference,
+    TaskReport,
+)
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rule import Handlers, Rule
+
+#: A customer who pressed the key before a car in the bay gets a word within this, us. Ours.
+WORD_WITHIN_US = 60_000_000
+#: A customer gets the car, or the place, within this, us. Ours: some thirty cars before one on the shipped sites.
+SERVED_WITHIN_US = 3_600_000_000
+
+_ANSWERS_TO_KEY = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE, DeskText.OUT_OF_ORDER)
+
+
+class TasksServed(Rule):
+    """Every task that a compartment calls for is done in the end, or refused with a reason."""
+
+    name = "tasks-served"
+    title = "every task is done, or refused with a reason"
+    source = "issue 4, point 1"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._open: OrderedDict[Reference, Event[CallForProposals]] = OrderedDict()
+        self._told: set[Reference] = set()
+
+    def handlers(self) -> Handlers:
+        """Calls and reports."""
+        return {CallForProposals: self._on_call, TaskReport: self._on_report, Award: self._on_award}
+
+    def _on_call(self, event: Event[CallForProposals]) -> None:
+        call = event.message
+        if call.depth == 0 and call.operation in (Operation.PARK, Operation.RETRIEVE):
+            self._open.setdefault(call.task, event)
+
+    def _on_report(self, event: Event[TaskReport]) -> None:
+        report = event.message
+        if report.phase is TaskPhase.REFUSED and not report.reason:
+            self.find(event, (report.sender,), f"task {report.task.origin}.{report.task.number} is refused without why")
+        if report.phase in (TaskPhase.DONE, TaskPhase.REFUSED):
+            self._close(report.task)
+
+    def _on_award(self, event: Event[Award]) -> None:
+        award = event.message
+        opened = self._open.get(award.task)
+        if award.result is CallResult.WITHDRAWN and opened is not None and opened.message.sender == award.sender:
+            self._close(award.task)
+
+    def _close(self, task: Reference) -> None:
+        self._open.pop(task, None)
+        self._told.discard(task)
+
+    def tick(self, now_us: int) -> None:
+        """Tasks that are open for too long."""
+        for task, event in self._open.items():
+            if now_us - event.time_us <= SERVED_WITHIN_US:
+                return
+            if task not in self._told:
+                self._told.add(task)
+                what = f"task {task.origin}.{task.number} is open for {SERVED_WITHIN_US // 1_000_000} s"
+                self.find(event, (task.origin,), what)
+
+
+class CustomersServed(Rule):
+    """Whoever presses the key with a car in the bay, or puts a ticket in, gets a word, and then the car."""
+
+    name = "customers-served"
+    title = "every customer served, or told why"
+    source = "issue 4, point 1; docs/decisions.md, flag 6"
+    on_devices = True
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._loads_kg: dict[int, int] = {}
+        self._asked: dict[int, Event[DeskEvent]] = {}
+        self._answered: set[int] = set()
+        self._tickets: dict[tuple[int, Reference], Event[DeskEvent]] = {}
+        self._told: set[tuple[int, Reference]] = set()
+
+    def handlers(self) -> Handlers:
+        """Desks and bays."""
+        return {DeskEvent: self._on_event, DeskOrder: self._on_word, BayState: self._on_bay}
+
+    def _on_bay(self, event: Event[BayState]) -> None:
+        node = event.message.sender
+        self._loads_kg[node] = event.message.load_kg
+        if not event.message.load_kg:
+            self._asked.pop(node, None)
+            self._answered.discard(node)
+
+    def _on_event(self, event: Event[DeskEvent]) -> None:
+        node, said = event.message.sender, event.message
+        if said.event is not DeskInput.KEY:
+            self._tickets.setdefault((node, said.car), event)
+        elif self._loads_kg.get(node) and node not in self._answered:
+            self._asked.setdefault(node, event)
+
+    def _on_word(self, event: Event[DeskOrder]) -> None:
+        node, word = event.message.sender, event.message
+        if word.text in _ANSWERS_TO_KEY:
+            self._asked.pop(node, None)
+            self._answered.add(node)
+        if word.text in (DeskText.CAR_READY, DeskText.UNKNOWN_TICKET):
+            self._tickets.pop((node, word.car), None)
+            self._told.discard((node, word.car))
+
+    def tick(self, now_us: int) -> None:
+        """Who waits for too long."""
+        for node, event in list(self._asked.items()):
+            if now_us - event.time_us > WORD_WITHIN_US:
+                del self._asked[node]
+                self.find(event, (node,), "a customer pressed the key and got no word")
+        for (node, car), event in self._tickets.items():
+            if now_us - event.time_us > SERVED_WITHIN_US and (node, car) not in self._told:
+                self._told.add((node, car))
+                self.find(event, (node,), f"a customer still waits for car {car.origin}.{car.number}")
+
+
+class FullMeansFull(Rule):
+    """Without faults a customer is refused only where the park is full."""
+
+    name = "full-means-full"
+    title = "nobody is refused while there is room"
+    source = "issue 4, point 1"
+    needs_site = True
+    undisturbed = True
+    on_devices = True
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._inside: set[Reference] = set()
+
+    def handlers(self) -> Handlers:
+        """Cars, and what desks say."""
+        return {CarAt: self._on_car, DeskOrder: self._on_word}
+
+    def _on_car(self, event: Event[CarAt]) -> None:
+        (self._inside.discard if event.message.station == OUTSIDE else self._inside.add)(event.message.car)
+
+    def _on_word(self, event: Event[DeskOrder]) -> None:
+        places = len(self.picture.site.places)
+        if event.message.text is not DeskText.FULL or not self.picture.tokens.from_start:
+            return
+        # A car that is on its way out keeps its place until it is fetched, one on its way in has one already.
+        if len(self._inside) < places:
+            what = f"says FULL with {len(self._inside)} cars on {places} places"
+            self.find(event, (event.message.sender,), what)

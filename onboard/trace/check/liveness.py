@@ -1,0 +1,191 @@
+"""Life: something happens while there is work, and nobody waits for ever (issue 3, point 3; issue 4, point 1)."""
+
+from collections.abc import Callable
+from math import sqrt
+
+from onboard.core.codes import CallResult, KindCode, Operation, TaskPhase
+from onboard.core.messages import Award, CallForProposals, CarAt, Message, Progress, Reference, TaskReport, Waiting
+from onboard.core.site import Axis, Site
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.geometry import body_of
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rule import Handlers, Rule
+
+#: Something happens within this, beyond the longest single motion, while there is an open task, us (issue 4, point 1).
+IDLE_WITHIN_US = 60_000_000
+
+
+def run_us(length_mm: float, axis: Axis) -> int:
+    """Rest-to-rest time of a run with trapezoidal or triangular speed."""
+    ramp_mm = axis.speed_mm_s**2 / axis.acceleration_mm_s2
+    if length_mm < ramp_mm:
+        return round(2e6 * sqrt(length_mm / axis.acceleration_mm_s2))
+    return round(1e6 * (length_mm / axis.speed_mm_s + axis.speed_mm_s / axis.acceleration_mm_s2))
+
+
+def longest_motion_us(site: Site) -> int:
+    """The longest single motion of a site: a whole alley, a whole shaft, or one stroke of a shuttle or door."""
+    times = [run_us(site.shuttle_reach_mm, site.shuttle), site.timing.door_us, site.timing.grip_us]
+    for track in site.tracks.values():
+        axis = site.lift if track.number in site.lifts else site.carrier
+        times.append(run_us((track.length + 1) * track.pitch_mm, axis))
+    return max(times)
+
+
+def longest_task_us(site: Site) -> int:
+    """What one machine may need for one task and the way to a refuge with nobody in its way.
+
+    Six runs and four rides (to the car, to its place, to a refuge), four doors and two handlings.
+    """
+    handling_us = 2 * run_us(site.shuttle_reach_mm, site.shuttle) + site.timing.grip_us
+    return 10 * longest_motion_us(site) + 4 * site.timing.door_us + 2 * handling_us
+
+
+def patience_us(site: Site) -> int:
+    """How long a machine may wait at most: until each other robot has done a task, and one more for good measure."""
+    robots = sum(machine.kind is KindCode.ROBOT for machine in site.machines.values())
+    return max(2, robots) * longest_task_us(site)
+
+
+class _OpenTasks(Rule):
+    """Keeps the tasks that are open."""
+
+    needs_site = True
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self.open: dict[Reference, int] = {}
+
+    def handlers(self) -> Handlers:
+        """Calls, awards and reports."""
+        return {CallForProposals: self._on_call, TaskReport: self.on_report, Award: self.on_award}
+
+    def _on_call(self, event: Event[CallForProposals]) -> None:
+        call = event.message
+        if call.depth == 0 and call.operation in (Operation.PARK, Operation.RETRIEVE):
+            self.open.setdefault(call.task, event.time_us)
+
+    def on_report(self, event: Event[TaskReport]) -> None:
+        """Ends tasks."""
+        if event.message.phase in (TaskPhase.DONE, TaskPhase.REFUSED):
+            self.open.pop(event.message.task, None)
+
+    def on_award(self, event: Event[Award]) -> None:
+        """Ends tasks that nobody wants any more."""
+        if event.message.result is CallResult.WITHDRAWN and event.message.sender == event.message.task.origin:
+            self.open.pop(event.message.task, None)
+
+
+class SomethingHappens(_OpenTasks):
+    """While a task is open, some machine or car moves, or a task goes on, within a minute beyond the longest motion."""
+
+    name = "something-happens"
+    title = "progress within 60 s while there is work"
+    source = "issue 4, point 1"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._last: Event[Message] | None = None
+        self._told = False
+        self._limit_us = IDLE_WITHIN_US + longest_motion_us(picture.site)
+
+    def handlers(self) -> Handlers:
+        """Beside calls and reports, all that moves."""
+        return {**super().handlers(), Progress: self._on_progress, CarAt: self._on_event}
+
+    def _on_call(self, event: Event[CallForProposals]) -> None:
+        if not self.open:
+            self._happened(event)
+        super()._on_call(event)
+
+    def _on_progress(self, event: Event[Progress]) -> None:
+        before = self.picture.bodies.get(event.message.sender)
+        body = body_of(self.picture.site, event.message, event.time_us)
+        if before is None or body is None or (body.place, body.speed_mm_s) != (before.place, before.speed_mm_s):
+            self._happened(event)
+
+    def _on_event(self, event: Event[CarAt]) -> None:
+        self._happened(event)
+
+    def on_report(self, event: Event[TaskReport]) -> None:
+        """A task goes on."""
+        super().on_report(event)
+        self._happened(event)
+
+    def on_award(self, event: Event[Award]) -> None:
+        """A task finds its machine."""
+        super().on_award(event)
+        if event.message.winner and event.message.result is CallResult.AWARDED:
+            self._happened(event)
+
+    def _happened(self, event: Event[Message]) -> None:
+        self._last, self._told = event, False
+
+    def tick(self, now_us: int) -> None:
+        """Whether it stands still for too long."""
+        if not self.open or self._told or self._last is None or now_us - self._last.time_us <= self._limit_us:
+            return
+        self._told = True
+        task = min(self.open, key=lambda one: (self.open[one], one))
+        since_s = (now_us - self._last.time_us) // 1_000_000
+        what = f"nothing happened for {since_s} s; {len(self.open)} open tasks, oldest {task.origin}.{task.number}"
+        self.find(self._last, (task.origin,), what)
+
+
+class NobodyStarves(Rule):
+    """No machine waits longer than the others could need together: from ``Waiting`` to its next motion or work.
+
+    ``longest_us`` is the longest wait of each machine, for the report.
+    """
+
+    name = "nobody-starves"
+    title = "a bounded wait for each machine"
+    source = "issue 3, point 3; issue 4, point 1"
+    needs_site = True
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self.longest_us: dict[int, int] = {}
+        self.limit_us = patience_us(picture.site)
+        self._waiting: dict[int, Event[Waiting]] = {}
+        self._told: set[int] = set()
+
+    def handlers(self) -> Handlers:
+        """Waits, and what ends them."""
+        return {Waiting: self._on_waiting, Progress: self._on_progress, TaskReport: self._on_report}
+
+    def _on_waiting(self, event: Event[Waiting]) -> None:
+        self._waiting.setdefault(event.message.sender, event)
+
+    def _on_progress(self, event: Event[Progress]) -> None:
+        before = self.picture.bodies.get(event.message.sender)
+        body = body_of(self.picture.site, event.message, event.time_us)
+        if before is None or body is None or body.place != before.place or body.speed_mm_s:
+            self._ended(event.message.sender, event.time_us)
+
+    def _on_report(self, event: Event[TaskReport]) -> None:
+        self._ended(event.message.sender, event.time_us)
+
+    def _ended(self, node: int, now_us: int) -> None:
+        waiting = self._waiting.pop(node, None)
+        if waiting is not None:
+            self._note(node, now_us - waiting.time_us)
+            self._told.discard(node)
+
+    def _note(self, node: int, waited_us: int) -> None:
+        self.longest_us[node] = max(self.longest_us.get(node, 0), waited_us)
+
+    def tick(self, now_us: int) -> None:
+        """Who waits for too long."""
+        for node, event in self._waiting.items():
+            waited_us = now_us - event.time_us
+            self._note(node, waited_us)
+            if waited_us > self.limit_us and node not in self._told:
+                self._told.add(node)
+                wait = event.message
+                what = f"waits for {wait.blocker} at track {wait.track}, index {wait.index} for {waited_us // 10**6} s"
+                self.find(event, (node, wait.blocker), what)
+
+    def finish(self, now_us: int) -> None:
+        """Count waits that last to the end."""
+        self.tick(now_us)

@@ -1,0 +1,112 @@
+"""Motion: only under authority and inside it, and never two bodies in one slot (design, section 5)."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from onboard.core.codes import KindCode
+from onboard.core.messages import DriveOrder, DriveState, Progress
+from onboard.core.site import Segment, TrackKind
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.geometry import (
+    PLATFORM_INDEX,
+    TOLERANCE_MM,
+    Body,
+    body_of,
+    floor_of,
+    occupied,
+    swept,
+    token_of,
+)
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rule import Handlers, Rule
+
+
+class InsideAuthority(Rule):
+    """A robot's body, its braking distance and the way of each drive order lie in slots that it holds.
+
+    A slot whose holder the log does not tell is counted as not judged. A breach is told when it begins.
+    """
+
+    name = "inside-authority"
+    title = "motion only under authority and inside it"
+    source = "design 5: authorised() before each movement order and again while it runs"
+    needs_site = True
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._told: set[tuple[int, Segment]] = set()
+        self._sensed_mm: dict[int, int] = {}
+
+    def handlers(self) -> Handlers:
+        """Where bodies are, and with device buses where drives are sent."""
+        return {Progress: self._on_progress, DriveState: self._on_state, DriveOrder: self._on_order}
+
+    def _on_progress(self, event: Event[Progress]) -> None:
+        body = body_of(self.picture.site, event.message, event.time_us)
+        if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
+            return
+        deceleration = self.picture.site.carrier.acceleration_mm_s2
+        braking_mm = body.speed_mm_s * abs(body.speed_mm_s) / (2 * deceleration)
+        here = occupied(self.picture.site, body)
+        ahead = [slot for slot in swept(self.picture.site, body, body.position_mm + braking_mm) if slot not in here]
+        self._judge(event, body, here, "is in")
+        self._judge(event, body, ahead, "cannot stop before")
+
+    def _on_state(self, event: Event[DriveState]) -> None:
+        self._sensed_mm[event.message.sender] = event.message.position_mm
+
+    def _on_order(self, event: Event[DriveOrder]) -> None:
+        body = self.picture.bodies.get(event.message.sender)
+        sensed_mm = self._sensed_mm.get(event.message.sender)
+        if body is None or sensed_mm is None or self.picture.kind(body.node) is not KindCode.ROBOT:
+            return
+        body = replace(self._where_now(body), position_mm=sensed_mm)
+        if self.picture.site.tracks[body.track].kind is TrackKind.ALLEY:
+            self._judge(event, body, swept(self.picture.site, body, event.message.target_mm), "is sent through")
+
+    def _where_now(self, body: Body) -> Body:
+        """A carrier on a platform is at the floor where its lift is, which it tells only when it moves on."""
+        lift_track = self.picture.site.platforms.get(Segment(body.track, body.index))
+        if lift_track is None:
+            return body
+        lift = self.picture.bodies.get(self.picture.site.stewards[lift_track])
+        return body if lift is None else replace(body, track=floor_of(self.picture.site, lift))
+
+    def _judge(self, event: Event[Progress] | Event[DriveOrder], body: Body, slots: list[Segment], how: str) -> None:
+        tokens = self.picture.tokens
+        for slot in slots:
+            holder = tokens.holder(token_of(slot))
+            self.picture.unjudged += holder is None
+            if tokens.may_use(token_of(slot), body.node, event.time_us):
+                self._told.discard((body.node, slot))
+            elif (body.node, slot) not in self._told:
+                self._told.add((body.node, slot))
+                self.find(event, (body.node,), f"{how} {slot}, which {holder} holds")
+
+
+class OneBody(Rule):
+    """No two robots closer than a carrier's length on a track, and no two on one platform."""
+
+    name = "one-body"
+    title = "no two bodies in one slot or platform"
+    source = "issue 4, point 1; row P36"
+    needs_site = True
+
+    def handlers(self) -> Handlers:
+        """Where bodies are."""
+        return {Progress: self._on_progress}
+
+    def _on_progress(self, event: Event[Progress]) -> None:
+        site = self.picture.site
+        body = body_of(site, event.message, event.time_us)
+        if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
+            return
+        platforms = {slot for slot in occupied(site, body) if slot.index == PLATFORM_INDEX}
+        for other in self.picture.bodies.values():
+            if other.node == body.node or self.picture.kind(other.node) is not KindCode.ROBOT:
+                continue
+            apart_mm = abs(other.position_mm - body.position_mm)
+            if other.track == body.track and apart_mm < site.carrier_length_mm - TOLERANCE_MM:
+                self.find(event, (body.node, other.node), f"{apart_mm} mm apart on track {body.track}")
+            for slot in platforms.intersection(occupied(site, other)):
+                self.find(event, (body.node, other.node), f"both on the platform of lift {slot.track}")

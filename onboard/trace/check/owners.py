@@ -1,0 +1,103 @@
+"""Tasks: one owner each, who was awarded it (design, section 4)."""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from onboard.core.codes import CallResult, Operation, TaskPhase
+from onboard.core.messages import Award, CallForProposals, Reference, TaskReport
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rule import Handlers, Rule
+
+#: Operations that are tasks of their own; calls for a part of one name the same task.
+TASKS = (Operation.PARK, Operation.RETRIEVE)
+#: Phases that only the owner of the task tells.
+OWNERS_PHASES = (TaskPhase.STARTED, TaskPhase.LOADED, TaskPhase.DONE)
+#: Tasks remembered; older ones are long over.
+MOST_TASKS = 4_096
+
+
+@dataclass
+class TaskSeen:
+    """A task by its awards: its owner (0: nobody), under which version, and who won some part of it."""
+
+    owner: int = 0
+    version: int = -1
+    done: bool = False
+    winners: set[int] = field(default_factory=set)
+
+
+class OneOwner(Rule):
+    """A task is awarded to one machine, and only that machine tells its phases.
+
+    It changes hands only after its owner gave it back, or by a raised version of the right to it.
+    """
+
+    name = "one-owner"
+    title = "one owner a task"
+    source = "design 4: acts only on the award; re-award by the custodian under a raised version"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._tasks: OrderedDict[Reference, TaskSeen] = OrderedDict()
+        self._calls: OrderedDict[tuple[int, int], bool] = OrderedDict()
+
+    def handlers(self) -> Handlers:
+        """Calls, awards and reports."""
+        return {CallForProposals: self._on_call, Award: self._on_award, TaskReport: self._on_report}
+
+    def _on_call(self, event: Event[CallForProposals]) -> None:
+        call = event.message
+        whole = call.depth == 0 and call.operation in TASKS
+        self._calls[call.sender, call.call] = whole
+        if len(self._calls) > MOST_TASKS:
+            self._calls.popitem(last=False)
+        if whole:
+            self._task(call.task)
+
+    def _task(self, reference: Reference) -> TaskSeen:
+        task = self._tasks.setdefault(reference, TaskSeen())
+        if len(self._tasks) > MOST_TASKS:
+            self._tasks.popitem(last=False)
+        return task
+
+    def _on_award(self, event: Event[Award]) -> None:
+        award = event.message
+        task = self._tasks.get(award.task)
+        if task is None:
+            return
+        if award.result is CallResult.REJECTED and self._calls.get((award.sender, award.call)):
+            task.owner = 0
+        if award.result is not CallResult.AWARDED:
+            return
+        task.winners.add(award.winner)
+        if not self._calls.get((award.sender, award.call)):
+            return
+        if task.owner not in (0, award.winner) and award.task_version == task.version:
+            what = f"task {_name(award.task)} is awarded to {award.winner}, and {task.owner} owns it"
+            self.find(event, (award.sender, award.winner, task.owner), what)
+        task.owner, task.version = award.winner, award.task_version
+
+    def _on_report(self, event: Event[TaskReport]) -> None:
+        report = event.message
+        task = self._tasks.get(report.task)
+        if task is None:
+            self.picture.unjudged += 1
+            return
+        if report.phase in OWNERS_PHASES and report.sender != task.owner:
+            owner = f"which {task.owner} owns" if task.owner else "which nobody was awarded"
+            what = f"tells {report.phase.name} of task {_name(report.task)}, {owner}"
+            self.find(event, (report.sender, task.owner), what)
+        elif report.phase is TaskPhase.AWARDED and report.sender not in task.winners:
+            self.find(event, (report.sender,), f"takes task {_name(report.task)} on without an award")
+        if report.phase is TaskPhase.DONE and report.sender == task.owner:
+            if task.done:
+                self.find(event, (report.sender,), f"tells DONE of task {_name(report.task)} again")
+            task.done = True
+        elif report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED) and report.sender == task.owner:
+            task.owner = 0
+
+
+def _name(task: Reference) -> str:
+    return f"{task.origin}.{task.number}"
