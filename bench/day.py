@@ -1,37 +1,42 @@
-"""How fast a real day runs: simulated seconds a second, frames a second, with all controllers and exact frame times.
+"""How fast real days run: simulated seconds a second, frames a second, with all controllers and exact frame times.
 
-Run: ``python bench/day.py``. Wall times are this machine's; the ratio of the two rows is the cost of the log.
+Run: ``python bench/day.py [SESSIONS.csv DAY]``; with a file of sessions, that day on the standard site is one more row.
+Wall times are this machine's; the ratio of two rows of one site is the cost of the log.
 """
 
+import sys
 import tempfile
-import time
 from pathlib import Path
 
 from bus_sim.day import DayOptions, run_day
 from bus_sim.sites import find_site
-
-#: Whole days run for each row; the median counts.
-ROUNDS = 3
+from bus_sim.summary import RunSummary
 
 
-def measure(trace: Path | None) -> tuple[float, float, int]:
-    """Wall seconds, simulated seconds and frames of one day, the median of ``ROUNDS`` by wall time."""
-    found = []
-    for _ in range(ROUNDS):
-        started_s = time.perf_counter()
-        summary = run_day(find_site("level1"), DayOptions(stalls=("AG-1F",), trace=trace, devices=True, quiet=True))
-        found.append((time.perf_counter() - started_s, summary.simulated_s, summary.frames))
-    return sorted(found)[ROUNDS // 2]
+def row(name: str, site: str, options: DayOptions) -> RunSummary:
+    """Play and print one row; the hour of a window is measured without its warm-up."""
+    summary = run_day(find_site(site), options)
+    wall_s, simulated_s, frames = summary.wall_s, summary.simulated_s, summary.frames
+    served = f"{summary.cars_in}/{summary.cars_out}"
+    speed = f"{simulated_s / wall_s:,.0f}"
+    print(f"| {name} | {served} | {wall_s:.1f} | {speed} | {frames:,} | {frames / wall_s:,.0f} |", flush=True)
+    return summary
 
 
 def main() -> None:
     """Print the table."""
-    print("| the real day on level1 | wall s | times real time | fleet frames | fleet frames/s |")
-    print("|---|---|---|---|---|")
+    print("| what runs | cars in/out | wall s | times real time | fleet frames | fleet frames/s |")
+    print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
-        for name, trace in (("without a log", None), ("all buses logged", Path(folder) / "trace.log")):
-            wall_s, simulated_s, frames = measure(trace)
-            print(f"| {name} | {wall_s:.1f} | {simulated_s / wall_s:,.0f} | {frames:,} | {frames / wall_s:,.0f} |")
+        trace = Path(folder) / "trace.log"
+        row("level1, its real day, no log", "level1", DayOptions(quiet=True))
+        row("level1, all buses logged", "level1", DayOptions(trace=trace, devices=True, quiet=True))
+        row("standard, the real day, no log", "standard", DayOptions(quiet=True))
+        row("standard, all buses logged", "standard", DayOptions(trace=trace, devices=True, quiet=True))
+        row("standard, its busiest hour, no log", "standard", DayOptions(window="busiest", quiet=True))
+        if len(sys.argv) == 3:
+            sessions, day = Path(sys.argv[1]), sys.argv[2]
+            row(f"standard, {day}, no log", "standard", DayOptions(sessions=sessions, day=day, quiet=True))
 
 
 if __name__ == "__main__":

@@ -221,6 +221,8 @@ def _day_options(args: argparse.Namespace) -> DayOptions:
     except ValueError as error:
         raise OptionError(str(error)) from error
     live = args.serve is not None or bool(args.bus)
+    if args.serve is not None and not args.serve.rpartition(":")[2].isdigit():
+        raise OptionError(f"--serve {args.serve}: must be HOST:PORT, such as 127.0.0.1:29536")
     window = _window(args, live=live)
     if live and args.without and args.speed is not None and speed != 1.0:
         raise OptionError(

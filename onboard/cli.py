@@ -32,6 +32,8 @@ examples:
       the fleet bus on a real interface; the command line overrides the file
   onboard --machine mr1.toml -i socketcand -c fleet --bus-kwargs host=127.0.0.1 port=29536
       join a site served by: bus-sim run level1 --serve --without MR1
+  onboard trace check trace.log --site site.toml
+      judge a recorded log; see onboard trace --help
 """
 
 
@@ -56,6 +58,11 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
+    words = sys.argv[1:] if argv is None else list(argv)
+    if words[:1] == ["trace"]:
+        from onboard.trace.cli import main as trace  # noqa: PLC0415  # a controller must not carry it
+
+        return trace(words[1:])
     args = build_parser().parse_args(argv)
     try:
         config = load_machine(args.machine)

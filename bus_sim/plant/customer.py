@@ -140,6 +140,8 @@ class Customer:
         self.visit = Visit()
         self.ticket: Reference | None = None
         self.compartment: Compartment | None = None
+        #: Dawdles so long in the compartment before driving out, us; set by faults.
+        self.dawdle_us = 0
         self._world = world
         self._oracle = oracle
         self._timers = timers
@@ -278,7 +280,7 @@ class Customer:
 
     def _drive_out(self) -> None:
         self._world.begin_crossing(self._place.node_id)
-        self._wait(self._draw_us(DRIVER_S))
+        self._wait(self._draw_us(DRIVER_S) + self.dawdle_us)
 
     def _drive_away(self) -> None:
         self.visit.gone_us = self._timers.now_us()

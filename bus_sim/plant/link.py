@@ -9,6 +9,8 @@ from onboard.ports.bus import Bus
 
 #: Called with a message and the loop time of its reception, us.
 MessageHandler = Callable[[Message, int], None]
+#: What a fault makes of a message between a device and its bus: the same, another, or none.
+MessageFilter = Callable[[Message], Message | None]
 
 
 class DeviceLink(Protocol):
@@ -39,11 +41,15 @@ class BusDeviceLink:
     """A ``DeviceLink`` over any CAN bus.
 
     A bus that carries several machines' devices hands every device every order; messages of node-IDs other than
-    ``node_id`` are passed over, as an acceptance filter on the identifier's low byte would.
+    ``node_id`` are passed over, as an acceptance filter on the identifier's low byte would. Faults put filters into
+    ``outgoing`` (what the sensors say) and ``incoming`` (what the actuators are told); each sees what the one before
+    it let through.
     """
 
     def __init__(self, bus: Bus, encoder: Encoder, decoder: Feed, node_id: int) -> None:
         self.send_refused = 0
+        self.outgoing: list[MessageFilter] = []
+        self.incoming: list[MessageFilter] = []
         self._bus = bus
         self._encoder = encoder
         self._decoder = decoder
@@ -53,7 +59,10 @@ class BusDeviceLink:
 
     def send(self, message: Message) -> None:
         """Encode and queue; frames that the full transmit queue refused are counted in ``send_refused``."""
-        for frame in self._encoder.encode(message):
+        passed = _filtered(message, self.outgoing) if self.outgoing else message
+        if passed is None:
+            return
+        for frame in self._encoder.encode(passed):
             if not self._bus.send(frame):
                 self.send_refused += 1
 
@@ -65,5 +74,19 @@ class BusDeviceLink:
         message = self._decoder.feed(frame, time_us)
         if message is None or message.sender != self._node_id:
             return
+        if self.incoming:
+            message = _filtered(message, self.incoming)
+            if message is None:
+                return
         for handler in self._handlers:
             handler(message, time_us)
+
+
+def _filtered(message: Message, filters: list[MessageFilter]) -> Message | None:
+    """What the filters let through, in their order."""
+    passed: Message | None = message
+    for one in filters:
+        if passed is None:
+            return None
+        passed = one(passed)
+    return passed

@@ -30,9 +30,12 @@ class Plant:
         self.shuttles: dict[int, Shuttle] = {}
         self.compartments: dict[int, Compartment] = {}
         self.lifts: dict[int, LiftDrive] = {}
+        #: Each machine's devices' connection to its device bus; faults of sensors and actuators act there.
+        self.links: dict[int, BusDeviceLink] = {}
         for machine in site.machines.values():
             node_id = machine.node_id
             link = BusDeviceLink(buses[node_id], device_codec(), Decoder(device_codec()), node_id)
+            self.links[node_id] = link
             if machine.kind is KindCode.ROBOT:
                 shuttle = Shuttle(node_id, site, self.world, self.timers, link)
                 self.shuttles[node_id] = shuttle

@@ -51,6 +51,8 @@ class Body:
     position_mm: int
     since_us: int = 0
     activity: Activity = Activity.IDLE
+    #: Before its first word a machine is taken to be at home; getting there is no travel.
+    heard: bool = False
     moving: bool = False
     car: Reference | None = None
     works: list[Segment] = field(default_factory=list)
@@ -126,9 +128,10 @@ class Activities:
         at = Segment(message.track, message.index)
         position_mm = self._site.position_mm(at) + message.offset_mm
         left = self._platform_of(body)
-        if at.track == body.at.track:
+        if body.heard and at.track == body.at.track:
             self._travel(body, abs(position_mm - body.position_mm))
         moved = at != body.at or message.speed_mm_s > 0
+        body.heard = True
         body.at, body.position_mm, body.moving = at, position_mm, message.speed_mm_s > 0
         if moved and body.waiting_since_us is not None:
             self._note_wait(body, time_us)

@@ -244,3 +244,47 @@ def test_a_loop_clock_never_shows_less_than_was_asked_for(loop: VirtualTimeLoop)
     clock.at_us(1_234_567, lambda when_us: seen.append((when_us, clock.now_us())))
     loop.run_until_complete(asyncio.sleep(2))
     assert seen == [(1_234_567, 1_234_567)]
+
+
+def test_the_pace_may_change_while_the_clock_runs() -> None:
+    """An hour at once, then 100 ms at real time, then an hour at once again."""
+
+    async def main(loop: VirtualTimeLoop) -> list[float]:
+        walls = [time.monotonic()]
+        for pace, wait_s in ((None, 3_600.0), (1.0, 0.1), (None, 3_600.0)):
+            loop.set_pace(pace)
+            await asyncio.sleep(wait_s)
+            walls.append(time.monotonic())
+        assert loop.now_us() == 7_200_100_000
+        with pytest.raises(ValueError, match="pace 0"):
+            loop.set_pace(0)
+        return walls
+
+    loop = VirtualTimeLoop()
+    try:
+        begin, hurried, paced, end = loop.run_until_complete(main(loop))
+    finally:
+        loop.close()
+    assert hurried - begin < 1 and end - paced < 1
+    assert paced - hurried >= 0.1
+
+
+def test_a_pace_set_by_a_plain_callback_holds_for_the_next_timer() -> None:
+    loop = VirtualTimeLoop()
+    walls: list[float] = []
+
+    def slow_down(_: int) -> None:
+        loop.set_pace(1.0)
+        walls.append(time.monotonic())
+
+    def stop(_: int) -> None:
+        walls.append(time.monotonic())
+        loop.stop()
+
+    loop.at_us(1_000_000_000, slow_down)
+    loop.at_us(1_000_100_000, stop)
+    try:
+        loop.run_forever()
+    finally:
+        loop.close()
+    assert walls[1] - walls[0] >= 0.1

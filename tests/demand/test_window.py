@@ -15,9 +15,7 @@ CAR = CarBody("car", 2700, 4300, 1500, 1400)
 def demand(*minutes: tuple[float, float | None]) -> Demand:
     """Cars that come and go at these minutes."""
     return Demand(
-        tuple(
-            Stay(round(come * MINUTE_US), None if go is None else round(go * MINUTE_US), CAR) for come, go in minutes
-        )
+        tuple(Stay(round(come * MINUTE_US), None if go is None else round(go * MINUTE_US), CAR) for come, go in minutes)
     )
 
 

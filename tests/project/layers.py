@@ -76,7 +76,11 @@ LAYERS: dict[str, Layer] = {
     ),
     "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
     "onboard.trace": Layer((*CORE_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})),
-    "onboard": Layer((*ALL_OF_ONBOARD, "onboard.cli"), not_stdlib=frozenset({"random", "threading", "time"})),
+    # The trace's own command line reads site files; the composition root loads it where it is asked for.
+    "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace", "onboard.wire")),
+    "onboard": Layer(
+        (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli"), not_stdlib=frozenset({"random", "threading", "time"})
+    ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
         ("onboard", "onboard.trace", *ALL_OF_ONBOARD, "dbc"), ("numpy", "rich"), not_stdlib=frozenset({"threading"})

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from onboard.core.frame import Frame
@@ -100,6 +100,24 @@ class Verdict:
         found += [finding.line(name) for finding in self.findings]
         more = sum(self.counts.values()) - len(self.findings)
         return [*found, *([f"and {more} more"] if more > 0 else [])]
+
+    def to_json(self) -> dict[str, Any]:
+        """The same for programs; times in us."""
+        return {
+            "good": self.is_good,
+            "frames": self.frames,
+            "messages": self.messages,
+            "runs": self.runs,
+            "rules": {
+                rule.name: {"broken": self.counts[rule.name], "seen": self.seen[rule.name]} for rule in self.rules
+            },
+            "left_out": self.left_out,
+            "unknown": dict(self.unknown),
+            "unjudged": self.unjudged,
+            "waits_us": self.waits_us,
+            "wait_limit_us": self.wait_limit_us,
+            "findings": [asdict(finding) for finding in self.findings],
+        }
 
     def _told(self, rule: type[Rule]) -> str:
         if self.counts[rule.name]:

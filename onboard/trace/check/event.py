@@ -8,14 +8,14 @@ from onboard.core.frame import Frame
 from onboard.core.messages import Message
 from onboard.trace.candump import format_frame
 
-M = TypeVar("M", bound=Message, covariant=True)
+M_co = TypeVar("M_co", bound=Message, covariant=True)
 
 
-class Event(NamedTuple, Generic[M]):
+class Event(NamedTuple, Generic[M_co]):
     """One message of a log: time in us of the log, the channel's name in the log, and the frame that completed it."""
 
     time_us: int
-    message: M
+    message: M_co
     channel: str = ""
     frame: Frame | None = None
 

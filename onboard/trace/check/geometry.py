@@ -82,6 +82,21 @@ def slot_at(site: Site, position: Segment) -> Segment:
     return position if lift is None else Segment(lift, PLATFORM_INDEX)
 
 
+def lifts_under(site: Site, body: Body) -> set[int]:
+    """Lifts, by track, on whose platform a robot's body is, wholly or in part.
+
+    A body is told of when its centre enters a segment, starts or stops: of one that goes away from a platform the last
+    word is older than where it is now, so it counts for nothing here.
+    """
+    track = site.tracks[body.track]
+    if track.kind is not TrackKind.ALLEY:
+        return set()
+    low_end = 2 * body.position_mm < (track.length - 1) * track.pitch_mm
+    if body.speed_mm_s and (body.speed_mm_s > 0) is low_end:
+        return set()
+    return {slot.track for slot in occupied(site, body) if slot.index == PLATFORM_INDEX}
+
+
 def token_of(slot: Segment) -> Token:
     """The token of a slot."""
     return Token(TokenKind.SEGMENT, slot.number)

@@ -10,7 +10,7 @@ from onboard.core.codes import DriveMode, KindCode
 from onboard.core.messages import DriveOrder, DriveState, Message, PlatformState, Progress
 from onboard.core.site import Segment
 from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.geometry import GATE_INDEX, Body, body_of, floor_of, occupied, token_of
+from onboard.trace.check.geometry import GATE_INDEX, Body, body_of, floor_of, lifts_under, occupied, token_of
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 
@@ -95,8 +95,10 @@ class LiftCrush(_LiftRule):
         (self._crossing.add if event.message.crossing else self._crossing.discard)(event.message.sender)
 
     def _moves(self, event: Event[Message], track: int, node: int, how: str) -> None:
-        gate = Segment(track, GATE_INDEX)
-        over = [body.node for body in self._robots() if gate in occupied(self.picture.site, body)]
+        site, gate = self.picture.site, Segment(track, GATE_INDEX)
+        over = [
+            body.node for body in self._robots() if gate in occupied(site, body) and track in lifts_under(site, body)
+        ]
         if not over and node not in self._crossing:
             self._told.discard(node)
         elif node not in self._told:

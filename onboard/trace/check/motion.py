@@ -8,11 +8,11 @@ from onboard.core.messages import DriveOrder, DriveState, Progress
 from onboard.core.site import Segment, TrackKind
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.geometry import (
-    PLATFORM_INDEX,
     TOLERANCE_MM,
     Body,
     body_of,
     floor_of,
+    lifts_under,
     occupied,
     swept,
     token_of,
@@ -101,12 +101,12 @@ class OneBody(Rule):
         body = body_of(site, event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        platforms = {slot for slot in occupied(site, body) if slot.index == PLATFORM_INDEX}
+        lifts = lifts_under(site, body)
         for other in self.picture.bodies.values():
             if other.node == body.node or self.picture.kind(other.node) is not KindCode.ROBOT:
                 continue
             apart_mm = abs(other.position_mm - body.position_mm)
             if other.track == body.track and apart_mm < site.carrier_length_mm - TOLERANCE_MM:
                 self.find(event, (body.node, other.node), f"{apart_mm} mm apart on track {body.track}")
-            for slot in platforms.intersection(occupied(site, other)):
-                self.find(event, (body.node, other.node), f"both on the platform of lift {slot.track}")
+            for lift in sorted(lifts & lifts_under(site, other)):
+                self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")

@@ -1,0 +1,97 @@
+"""P56: the joint choice is a strong opponent, and nobody beats the free-flow bound. Waiting is what customers saw."""
+
+from collections.abc import Sequence
+from functools import cache
+
+import pytest
+
+from bus_sim.compare.free_flow import bounds_us
+from bus_sim.compare.plays import MIP, POLICIES, Play, play
+from bus_sim.compare.policies import AnyFirst, JointChoice, NearestFirst
+from bus_sim.compare.table import BOUND, tabulate
+from bus_sim.demand import Demand
+from bus_sim.sites import find_site
+
+SITE = find_site("small")
+#: One car a minute in and one out: the compartment of this site serves fewer, so queues grow.
+SEEDS = (1, 2, 3)
+CARS = 8
+
+
+def demand(seed: int) -> Demand:
+    return Demand.by_mean(60.0, 30.0, seed, count=CARS)
+
+
+@cache
+def played(policy: str, seed: int) -> Play:
+    return play(SITE, demand(seed), policy, seed)
+
+
+def waits_us(policy: str, seeds: Sequence[int] = SEEDS) -> list[int]:
+    return [us for seed in seeds for us in played(policy, seed).in_us + played(policy, seed).out_us]
+
+
+def mean_s(policy: str) -> float:
+    waits = waits_us(policy)
+    return sum(waits) / len(waits) / 1e6
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_p56_every_policy_serves_everybody_without_a_fault(policy: str) -> None:
+    for seed in SEEDS:
+        one = played(policy, seed)
+        assert (one.left, one.faults) == (0, ())
+        assert (len(one.in_us), len(one.out_us), one.tasks) == (CARS, CARS, 2 * CARS)
+
+
+def test_p56_the_joint_choice_beats_nearest_first_and_random() -> None:
+    joint_s = mean_s(JointChoice.name)
+    assert joint_s < 0.99 * mean_s(NearestFirst.name)
+    assert joint_s < 0.97 * mean_s(AnyFirst.name)
+
+
+def test_p56_the_price_of_being_decentralised_is_small() -> None:
+    # Measured: 1.03 over these seeds.
+    assert 0.97 < mean_s(MIP) / mean_s(JointChoice.name) < 1.10
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_p56_no_customer_waits_less_than_the_bound(policy: str) -> None:
+    for seed in SEEDS:
+        ins_us, outs_us = bounds_us(SITE, demand(seed), seed)
+        one = played(policy, seed)
+        assert all(least <= us for least, us in zip(ins_us, one.in_us, strict=True))
+        assert all(least <= us for least, us in zip(outs_us, one.out_us, strict=True))
+
+
+def test_the_bound_is_no_looser_than_a_lone_robots_way() -> None:
+    """One car in an empty park: in, nothing but frames; out, the robot's way from its home and back to the bay."""
+    alone = Demand.one_car(stay_s=600, seed=3)
+    one = play(SITE, alone, MIP, 3)
+    ins_us, outs_us = bounds_us(SITE, alone, 3)
+    assert 0 <= one.in_us[0] - ins_us[0] < 20_000
+    assert 0 <= one.out_us[0] - outs_us[0] < 25_000_000
+
+
+def test_a_play_is_the_same_each_time() -> None:
+    again = play(SITE, demand(1), AnyFirst.name, 1)
+    assert again == played(AnyFirst.name, 1)
+
+
+def test_central_robots_bid_for_no_task() -> None:
+    """With a dispatcher calls, awards and rides are there, and bids only of lifts."""
+    mip, joint = played(MIP, 1), played(JointChoice.name, 1)
+    assert joint.messages < mip.messages
+
+
+def test_a_run_that_left_somebody_waiting_counts_for_no_policy() -> None:
+    good = [played(policy, 1) for policy in (MIP, JointChoice.name)]
+    stuck = Play(MIP, 2, (), (), 60.0, 0, 0, 0, 0.0, 3, ())
+    fine = Play(JointChoice.name, 2, (1_000_000,), (), 60.0, 1, 10, 5, 9.0, 0, ())
+    table = tabulate("a site", [*good, stuck, fine], {1: bounds_us(SITE, demand(1), 1), 2: ([5], [])})
+    assert [row.policy for row in table.rows] == [MIP, JointChoice.name, BOUND]
+    assert table.rows[1].wait_in.count == CARS
+    assert table.left_out == (f"seed 2, under {MIP} 3 customers were not served",)
+    assert "left out: seed 2" in "\n".join(table.lines())
+    ratio = table.rows[0].waiting_s / table.rows[1].waiting_s
+    assert table.to_json()["rows"][0]["to_joint_choice"] == pytest.approx(ratio)  # type: ignore[index]
