@@ -5,11 +5,12 @@ Same seed, same options: the same candump log, byte for byte.
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from bus_sim.can.faults import Fault
 from bus_sim.can.medium import Medium, Tap
+from bus_sim.can.node import SimulatedBus
 from bus_sim.journal import SimulatedJournal
 from bus_sim.plant.plant import Plant
 from bus_sim.virtual_time import VirtualTimeLoop
@@ -89,8 +90,12 @@ class Simulation:
     writer: CandumpWriter | None = None
     #: Which behaviour drives which kind; baselines put their own in before ``start``.
     factories: Callable[[KindCode], BehaviourFactory] = factory_for
+    #: What the controllers are made of; faults put in one whose clock and processor may fail.
+    holon_class: type[Holon] = Holon
     #: Told every message of the fleet bus with its time, after the view.
     observers: list[Callable[[Message, int], None]] = field(default_factory=list)
+    #: Given every controller when it is powered up, before it starts: planted bugs come in here, and nothing else.
+    before_start: list[Callable[[Controller], None]] = field(default_factory=list)
 
     def start(self) -> None:
         """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop."""
@@ -105,7 +110,9 @@ class Simulation:
         journal = self.journals.setdefault(machine.node_id, SimulatedJournal())
         entries = journal.replay()
         boots = sum(1 for entry in entries if entry.get("record") == "boot")
-        holon = Holon(self.site, machine, self.factories(machine.kind), boot=boots % 255 + 1, entries=entries)
+        holon = self.holon_class(
+            self.site, machine, self.factories(machine.kind), boot=boots % 255 + 1, entries=entries
+        )
         ports = Ports(
             self.fleet.attach(machine.name, machine.node_id),
             self.devices[machine.node_id].attach(machine.name, machine.node_id),
@@ -115,7 +122,32 @@ class Simulation:
         )
         controller = Controller(holon, ports, fleet_codec(), device_codec())
         self.controllers[machine.node_id] = controller
+        for prepare in self.before_start:
+            prepare(controller)
         controller.start()
+
+    def crash(self, machine: Machine) -> None:
+        """Cut one controller's power at once; its devices go on by themselves. Harmless where it is off already.
+
+        What the journal holds at this moment is what a later ``start_controller`` finds: a write under way is lost.
+        """
+        controller = self.controllers.pop(machine.node_id, None)
+        if controller is None:
+            return
+        controller.holon.halted = "power cut"
+        for bus in (controller.ports.fleet_bus, controller.ports.device_bus):
+            assert isinstance(bus, SimulatedBus)
+            bus.power_off()
+        journal = self.journals[machine.node_id]
+        self.journals[machine.node_id] = replace(journal, entries=journal.replay())
+
+    def fleet_node(self, name: str) -> SimulatedBus | None:
+        """A running controller's node on the fleet bus, by its machine's name; None while it is off."""
+        for controller in self.controllers.values():
+            bus = controller.ports.fleet_bus
+            if controller.holon.machine.name == name and isinstance(bus, SimulatedBus):
+                return bus
+        return None
 
     def join(self, channel: str, name: str) -> Bus | None:
         """A further node on a bus, for a client from outside: the fleet bus, or a machine's device bus by its name."""

@@ -26,7 +26,6 @@ from onboard.core.negotiation import (
 from onboard.core.negotiation.initiator import Event
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.car_park.generation import AWARD_LATENCY_US, CarParkGeneration
-from onboard.kinds.car_park.program import Program
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.registry import factory_for
 
@@ -117,7 +116,8 @@ class DispatchedRobotFactory(RobotFactory):
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
         """The robot's task-generation function."""
-        return DispatchedGeneration(site, machine, mirror, Program(site))
+        usual = super().estimator(site, machine, mirror)
+        return DispatchedGeneration(usual.site, usual.machine, usual.mirror, usual.program)
 
 
 def factories(kind: KindCode) -> BehaviourFactory:

@@ -142,6 +142,8 @@ class Customer:
         self.compartment: Compartment | None = None
         #: Dawdles so long in the compartment before driving out, us; set by faults.
         self.dawdle_us = 0
+        #: Has nothing to put into the desk; set by faults.
+        self.has_lost_ticket = False
         self._world = world
         self._oracle = oracle
         self._timers = timers
@@ -246,7 +248,7 @@ class Customer:
             self.visit.asked_us = self._timers.now_us()
             self.compartment = self._choose(self)
         self._wait(PATIENCE_US)
-        if self.ticket is not None:
+        if self.ticket is not None and not self.has_lost_ticket:
             self._place.insert_ticket(self.ticket)
 
     def _cancel(self) -> None:

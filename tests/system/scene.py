@@ -81,11 +81,15 @@ def play(
     faults: Sequence[Fault] = (),
     before: Callable[[Simulation], None] | None = None,
     extra_s: float = 60,
+    plant: Callable[[Simulation], None] | None = None,
 ) -> Scene:
-    """Run a site until all customers are served (or the limit), then a little longer."""
+    """Run a site until all customers are served (or the limit), then a little longer.
+
+    ``plant`` is called before power-up, ``before`` right after it.
+    """
     loop = VirtualTimeLoop()
     try:
-        return loop.run_until_complete(_play(site, demand, seed, limit_s, tuple(faults), before, loop, extra_s))
+        return loop.run_until_complete(_play(site, demand, seed, limit_s, tuple(faults), before, loop, extra_s, plant))
     finally:
         loop.close()
 
@@ -99,6 +103,7 @@ async def _play(
     before: Callable[[Simulation], None] | None,
     loop: VirtualTimeLoop,
     extra_s: float,
+    plant: Callable[[Simulation], None] | None,
 ) -> Scene:
     simulation = build(site, RunOptions(seed=seed, faults=faults), loop)
     scene = Scene(simulation)
@@ -106,6 +111,8 @@ async def _play(
     for node_id, machine in site.machines.items():
         _listen(scene, machine.name, device_codec(), node_id)
     simulation.plant.street.add_all(demand, ORIGIN_US)
+    if plant is not None:
+        plant(simulation)
     simulation.start()
     if before is not None:
         before(simulation)

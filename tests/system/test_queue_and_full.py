@@ -1,5 +1,7 @@
 """More customers than the park can take at once: the queue before a compartment, and "full" told at the desk."""
 
+from itertools import pairwise
+
 import pytest
 
 from bus_sim.plant.customer import Outcome, State
@@ -82,7 +84,7 @@ def test_p53_a_burst_queues_before_the_busy_compartment_and_is_served_in_its_ord
 ) -> None:
     scene, queues = burst
     assert queues[0] >= 5, "one drives in, all others wait on the street"
-    falling = [after - before for before, after in zip(queues, queues[1:], strict=False)]
+    falling = [after - before for before, after in pairwise(queues)]
     assert set(falling) == {0, -1} and queues[-1] == 0, "one after the other"
     customers = scene.simulation.plant.street.customers
     assert {customer.state for customer in customers} == {State.PARKED}

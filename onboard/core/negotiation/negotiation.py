@@ -108,6 +108,10 @@ class Negotiation:
         self._forget(now_us)
         return outcome
 
+    def knows(self, initiator: int, call: int) -> bool:
+        """Whether this node takes part in a call, or did a moment ago."""
+        return CallKey(initiator, call) in self.participants
+
     def next_wake(self) -> int | None:
         """The earliest due time of all calls, bus time in us."""
         times = [participant.next_wake() for participant in self.participants.values()]

@@ -189,7 +189,15 @@ class Compartment:
             self.job.winner = event.winner
             self.stewardship.winners[event.call.car] = event.winner
             return []
+        if event.result is CallResult.REJECTED:
+            # The winner gave the task back before it began: it is called anew, by the custodian of the car.
+            return self._call_again(self.job, now_us)
         return self._refused(self.job, event.reason, now_us)
+
+    def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
+        if job.operation is Operation.PARK:
+            return self._call(job, self.station.number, ANY_STATION, now_us)
+        return self._fetch(job, now_us)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Bay and the car in it: to the winner while the output door is open. All else by the steward's rules."""

@@ -263,7 +263,7 @@ class CarParkGeneration:
     def _work_visit(self, work: Work, now_us: int) -> Visit:
         if work.handling is Handling.TAKE and work.station in self.site.compartments.values():
             return self._visits(work.call, work.station, now_us)[0]
-        return Visit(work.station.segment, self._handling_us(work.station))
+        return Visit(work.station.segment, self.handling_us(work.station))
 
     def _refuges(self) -> frozenset[Segment]:
         """Where this robot may end. Spurs are left out: its carrier cannot turn into one yet."""
@@ -281,11 +281,11 @@ class CarParkGeneration:
             called_us = self._deadline_us(call, near_us) - self.site.timing.call_window_us
             ready_us = called_us + CUSTOMER_US + self.site.timing.door_us
         return (
-            Visit(source.segment, self._handling_us(source), ready_us),
-            Visit(sink.segment, self._handling_us(sink)),
+            Visit(source.segment, self.handling_us(source), ready_us),
+            Visit(sink.segment, self.handling_us(sink)),
         )
 
-    def _handling_us(self, station: Station) -> int:
+    def handling_us(self, station: Station) -> int:
         """Reach, grip or release, retract; at a compartment its output door opens first."""
         stroke_us = run_duration_us(self.site.shuttle_reach_mm, self.site.shuttle)
         door_us = self.site.timing.door_us if station in self.site.compartments.values() else 0

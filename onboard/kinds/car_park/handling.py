@@ -41,6 +41,9 @@ TABLE: dict[tuple[Phase, Handling], tuple[ShuttleAction | None, Phase]] = {
     (Phase.RETRACT, Handling.LEAVE): (None, Phase.DONE),
 }
 
+#: The phase that is left by the order of each phase.
+_BEFORE = {Phase.REACH: Phase.ACQUIRE, Phase.CLAMP: Phase.REACH, Phase.RETRACT: Phase.CLAMP}
+
 #: The shuttle's mode that ends each phase, for the order given on entering it.
 ENDS = {Phase.REACH: ShuttleMode.REACHED, Phase.CLAMP: ShuttleMode.REACHED, Phase.RETRACT: ShuttleMode.HOME}
 
@@ -55,12 +58,17 @@ class ShuttleWork:
     sequence: int = 0
     sensed: ShuttleState | None = None
     fault: bool = False
+    _resuming: bool = False
 
     def begin(self, work: Work) -> list[Effect]:
         """Start one handling in front of its station."""
         self.work = work
         self.phase = Phase.ACQUIRE
         return []
+
+    def resume(self, work: Work, phase: Phase) -> None:
+        """Go on with a handling after a restart: the journal names its last step, the sensors whether it is over."""
+        self.work, self.phase, self._resuming = work, phase, True
 
     @property
     def is_out(self) -> bool:
@@ -79,6 +87,8 @@ class ShuttleWork:
         """Take the next step of the table where its condition is met."""
         if self.work is None or self.phase is Phase.DONE:
             return []
+        if self._resuming:
+            return self._resume(self.work, now_us)
         if self.phase is Phase.ACQUIRE:
             effects = self._acquire(now_us)
             if not self._has_rights():
@@ -86,6 +96,21 @@ class ShuttleWork:
             return effects + self._next(now_us)
         if self.sensed is None or self.sensed.sequence != self.sequence or self.sensed.mode is not ENDS[self.phase]:
             return []
+        return self._next(now_us)
+
+    def _resume(self, work: Work, now_us: int) -> list[Effect]:
+        """What the last step was to bring about is taken as over where the sensors say so, else ordered again."""
+        state = self.sensed
+        if state is None or state.mode not in (ShuttleMode.HOME, ShuttleMode.REACHED):
+            return []
+        self._resuming = False
+        is_home = state.mode is ShuttleMode.HOME
+        clamped = (state.load_kg > 0) is (work.handling is Handling.TAKE)
+        if self.phase is Phase.CLAMP and clamped and is_home:
+            self.phase = Phase.RETRACT
+        over = {Phase.REACH: not is_home, Phase.CLAMP: clamped, Phase.RETRACT: is_home}
+        if not over[self.phase]:
+            self.phase = _BEFORE[self.phase]
         return self._next(now_us)
 
     def _rights(self) -> list[TokenKey]:
@@ -124,9 +149,11 @@ class ShuttleWork:
         self.fleet.mirror.on_car(statement)
         effects: list[Effect] = [Send(statement)]
         owner = keeper(self.fleet, work.station)
-        if not taken:
-            effects += self.fleet.tokens.give(key, owner, now_us)
-        effects += self.fleet.tokens.give(station_token(work.station), owner, now_us)
+        given = [station_token(work.station)] if taken else [key, station_token(work.station)]
+        for token in given:
+            # After a restart in the middle of this one of them may be gone already.
+            if self.fleet.tokens.holds(token):
+                effects += self.fleet.tokens.give(token, owner, now_us)
         return effects
 
 

@@ -219,6 +219,12 @@ class Lift:
         rides = [ride for ride in rides if self._made.get(ride.robot) != ride.begin_us]
         return min(rides, key=lambda ride: (ride.begin_us, ride.robot), default=None)
 
+    def _as_planned_now(self, ride: Ride, now_us: int) -> Ride:
+        """The ride of whoever is aboard by its newest plan: a restarted robot may want to go elsewhere."""
+        itinerary = self.fleet.mirror.itineraries.get(ride.robot)
+        planned = rides_of(self.track, ride.robot, itinerary, now_us) if itinerary is not None else []
+        return next((one for one in planned if one.board == ride.board), ride)
+
     def _ride_legs(self, itinerary: Itinerary) -> bool:
         """Whether an itinerary rides with this lift at all: few do, and it is asked for at every message."""
         known = self._rides_with_me.get(itinerary.sender)
@@ -247,6 +253,7 @@ class Lift:
         aboard = self.platform.carrier_aboard and not self.platform.crossing
         if self._gate_was_out and self._holds_gate() and aboard:
             self.phase = LiftPhase.RIDING
+            self.ride = self._as_planned_now(self.ride, now_us)
             ride: dict[str, str | int] = {"record": "ride", "robot": self.ride.robot}
             ride |= {"board": self.ride.board, "leave": self.ride.leave}
             return [Record(ride), *self._go(self.ride.leave, now_us)]

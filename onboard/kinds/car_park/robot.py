@@ -1,11 +1,14 @@
 """The mobile robot (MR): carrier and shuttle carry out the order program of every task that it won."""
 
+from collections import deque
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     NOBODY,
+    CallResult,
+    DriveMode,
     Grade,
     KindCode,
     LegAction,
@@ -13,9 +16,11 @@ from onboard.core.codes import (
     Reason,
     TaskPhase,
 )
-from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.lifts import sill
+from onboard.core.effects import Effect, Halt, Report, Send
+from onboard.core.lift_uses import ride_us
+from onboard.core.lifts import platform_on, sill
 from onboard.core.messages import (
+    Award,
     CallForProposals,
     DriveState,
     Itinerary,
@@ -36,6 +41,7 @@ from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
+from onboard.kinds.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
 from onboard.kinds.car_park.ride_calls import calls_after_winning
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.travel import Carriage
@@ -43,6 +49,8 @@ from onboard.kinds.car_park.way import way_to_refuge
 
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
 REPLAN_TOLERANCE_US = 500_000
+#: From the first known position after a restart until plans are made: the others say meanwhile what they plan. Ours.
+SETTLING_US = 2_000_000
 #: A step that is not over this long after its planned end is told to be late, by as much again. Ours.
 OVERDUE_US = 2_000_000
 
@@ -76,6 +84,10 @@ class Robot:
     shuttle: ShuttleWork = field(init=False)
     riding: Riding = field(init=False)
     giving_way: GivingWay = field(init=False)
+    recovery: Recovery = field(init=False)
+    _recover_at_us: int | None = None
+    #: The last tasks that were done: a late word about one of them is no news.
+    _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
     _begun: bool = False
     _fault: Reason = Reason.NONE
 
@@ -85,6 +97,9 @@ class Robot:
         self.carriage.way_on = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
         self.giving_way = GivingWay(self.fleet, self.program)
+        self.recovery = Recovery.read(self.fleet.entries)
+        if self.recovery.floor is not None:
+            self.carriage.track = self.recovery.floor
 
     @property
     def program(self) -> Program:
@@ -96,7 +111,7 @@ class Robot:
         """Heartbeat state."""
         if self._fault is not Reason.NONE:
             return MachineState.STOPPED
-        if self.program.standing is None:
+        if self.program.standing is None or self._recover_at_us is not None:
             return MachineState.STARTING
         if self.program.step is None:
             return MachineState.IDLE
@@ -115,8 +130,8 @@ class Robot:
         """Drive and shuttle states."""
         if isinstance(message, DriveState):
             effects = self.carriage.sense(message, now_us, self.program.version, self.program.current)
-            if self.program.standing is None and self.carriage.standing_at is not None:
-                effects += self._admit(self.carriage.standing_at, now_us)
+            if self.program.standing is None and message.mode is DriveMode.STANDING:
+                effects += self._find_place(now_us)
             return effects
         if isinstance(message, ShuttleState):
             self.shuttle.sense(message)
@@ -126,6 +141,8 @@ class Robot:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Another machine's plan may mean that mine has to come later, or to take another way."""
+        if isinstance(message, Award):
+            return self._forfeit_unknown(message)
         if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or self.program.standing is None:
             return []
         if self.fleet.mirror.itineraries.get(message.sender) is not message:
@@ -134,6 +151,16 @@ class Robot:
         if answer is Answer.ANEW:
             return self._reroute(message.sender, now_us)
         return self._publish(now_us) if answer is Answer.LATER else []
+
+    def _forfeit_unknown(self, award: Award) -> list[Effect]:
+        """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
+        mine = award.winner == self.fleet.node_id and award.result is CallResult.AWARDED
+        if not mine or not self.recovery.is_restart or self.fleet.negotiation.knows(award.sender, award.call):
+            return []
+        known = [*self.program.works(), *self.recovery.works]
+        if any(work.call.task == award.task for work in known) or award.task in self._done:
+            return []
+        return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
         """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
@@ -172,8 +199,13 @@ class Robot:
 
     def advance(self, now_us: int) -> list[Effect]:
         """Carry on with the step in hand."""
-        if self.program.standing is None or self._fault is not Reason.NONE:
+        if self._fault is not Reason.NONE:
             return []
+        if self.program.standing is None:
+            # On its way to a mark after a restart, or nowhere known.
+            return self.carriage.advance(now_us) if self.carriage.goal is not None else []
+        if self._recover_at_us is not None and self._recover_at_us <= now_us:
+            return self._recover(now_us)
         effects: list[Effect] = []
         # A step can end without a word on any bus, and the next is to begin in the same moment.
         for _ in range(MAX_STEPS):
@@ -191,8 +223,8 @@ class Robot:
         return effects
 
     def next_wake(self) -> int | None:
-        """The drive's next order, or the end of a planned wait."""
-        times = [self.carriage.next_wake()]
+        """The drive's next order, the end of a planned wait, or of a pause after a restart."""
+        times = [self.carriage.next_wake(), self._recover_at_us]
         step = self.program.step
         if step is not None and self._begun:
             times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
@@ -209,12 +241,75 @@ class Robot:
 
     # --- steps -------------------------------------------------------------------------------------------------
 
+    def _find_place(self, now_us: int) -> list[Effect]:
+        """Admitted at a mark; between marks after a restart, first to the nearest one, as far as rights allow."""
+        here = self.carriage.standing_at
+        if here is not None:
+            return self._admit(here, now_us)
+        held = self.carriage.occupied()
+        if self.carriage.goal is None and all(self.fleet.tokens.holds(segment_token(slot)) for slot in held):
+            self.carriage.go(self.carriage.nearest)
+        return []
+
     def _admit(self, here: Segment, now_us: int) -> list[Effect]:
-        """First position after power-up: stand here and tell everybody."""
+        """First position after power-up: stand here and tell everybody; after a restart go on a little later."""
         self.program.standing = here
         self.program.replace([], Stamp(to_bus_ms(now_us), self.fleet.node_id, 0))
         self.carriage.go(here)
+        if self.recovery.is_restart:
+            self._recover_at_us = now_us + SETTLING_US
         return self._publish(now_us)
+
+    def _recover(self, now_us: int) -> list[Effect]:
+        """Go on with what the journal says is mine, by a way planned anew (rows P14, P20)."""
+        assert self.program.standing is not None
+        works = list(self.recovery.works)
+        steps = self._in_hand(works, now_us)
+        origin, start_us = self.program.standing, now_us
+        for step in steps:
+            origin = self._after_ride(step) if step.action is LegAction.RIDE else step.destination
+            works, start_us = (works if step.work is None else works[1:]), step.end_us
+        more = self.generation.reroute(origin, start_us, works, now_us)
+        if more is None:
+            # Somebody is in the way: the others' plans change.
+            self._recover_at_us = now_us + SETTLING_US
+            return []
+        self._recover_at_us = None
+        if steps:
+            self._resume(steps[0])
+        calls = [work.call for work in self.recovery.works]
+        stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF) if calls else self.program.stamp
+        self.program.replace([*steps, *more], stamp)
+        effects: list[Effect] = [Report("goes on after a restart: " + "; ".join(str(step) for step in (*steps, *more)))]
+        effects += self._publish(now_us)
+        return effects + (self._call_lifts(calls[0], more, now_us) if calls else [])
+
+    def _in_hand(self, works: list[Work], now_us: int) -> tuple[Step, ...]:
+        """The handling or the ride that the restart fell into, as the first step of the new program."""
+        here = self.program.standing
+        assert here is not None
+        if self.recovery.riding is not None:
+            lift, board, leave = self.recovery.riding
+            end_us = now_us + ride_us(self.fleet.site, lift, board, leave)
+            return (Step(LegAction.RIDE, lift, board, leave, now_us, end_us),)
+        if self.recovery.phase is None or not works:
+            return ()
+        end_us = now_us + self.generation.handling_us(works[0].station)
+        return (Step(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, works[0]),)
+
+    def _resume(self, step: Step) -> None:
+        """The step in hand goes on from where the journal and the sensors say that it was."""
+        self._begun = True
+        if step.work is not None and self.recovery.phase is not None:
+            self.shuttle.resume(step.work, self.recovery.phase)
+        elif step.action is LegAction.RIDE:
+            self.riding.begin(step.track, step.to_index)
+
+    def _after_ride(self, step: Step) -> Segment:
+        floor = sill(self.fleet.site, step.track, step.to_index).track
+        there = platform_on(self.fleet.site, step.track, floor)
+        assert there is not None
+        return there
 
     def _take_on(
         self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], now_us: int
@@ -226,7 +321,7 @@ class Robot:
             self._begun = False
         self.program.replace([*kept, *solution.steps], Stamp(call.deadline_ms, call.sender, call.call & 0xFF))
         effects: list[Effect] = [
-            Record({"record": "award", "initiator": call.sender, "call": call.call, "task": call.task.number}),
+            award_record(call, *self.generation.ends(call, solution.place)),
             Report("program: " + "; ".join(str(step) for step in solution.steps)),
         ]
         effects += self._publish(now_us)
@@ -246,7 +341,7 @@ class Robot:
         if step.action is LegAction.TRAVEL:
             self.carriage.go(step.destination)
         elif step.action is LegAction.RIDE:
-            return self.riding.begin(step.track, step.to_index)
+            return [ride_record(step), *self.riding.begin(step.track, step.to_index)]
         elif step.work is not None:
             return self.shuttle.begin(step.work) + self._announce_start(step.work)
         return []
@@ -291,9 +386,14 @@ class Robot:
         if step.work is not None:
             taken = step.work.handling is Handling.TAKE
             phase = TaskPhase.LOADED if taken else TaskPhase.DONE
+            effects.append(handled_record(step.work))
+            if not taken:
+                self._done.append(step.work.call.task)
             effects.append(self._report(step.work.call.task, phase, step.work.station.number))
         if step.action is LegAction.RIDE:
-            self.carriage.ride_to(sill(self.fleet.site, step.track, step.to_index).track)
+            floor = sill(self.fleet.site, step.track, step.to_index).track
+            effects.append(floor_record(floor))
+            self.carriage.ride_to(floor)
         self._begun = False
         self.program.current += 1
         late_us = now_us - step.end_us

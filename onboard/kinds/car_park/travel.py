@@ -82,6 +82,13 @@ class Carriage:
         return Segment(self.track, index) if off_mm <= MARK_TOLERANCE_MM else None
 
     @property
+    def nearest(self) -> Segment:
+        """The position whose mark is nearest. Raises ``ValueError`` where no position is known."""
+        if self.sensed is None:
+            raise ValueError("no position is known yet")
+        return Segment(self.track, self.axis.index_at(self.sensed.position_mm))
+
+    @property
     def arrived(self) -> bool:
         """Whether the carrier stands at its goal."""
         return self.goal is not None and self.standing_at == self.goal

@@ -1,0 +1,1 @@
+"""Campaigns: many seeded runs of a site under faults, what came of each, and the fewest faults that still fail."""

@@ -1,0 +1,122 @@
+"""Which faults a seed brings: a profile names the kinds, the seed draws machines, times and sizes."""
+
+import random
+from collections.abc import Callable
+from typing import Final
+
+from bus_sim.faults.injection import Injection
+from bus_sim.faults.table import Value
+from onboard.core.codes import KindCode
+from onboard.core.site import Site
+
+#: Faults begin in this span after power-up, s: all of it while customers come and go, and all end before it is over.
+SPAN_S = (20.0, 900.0)
+#: So many faults a run.
+COUNT = (1, 4)
+
+Draw = Callable[[random.Random, Site], dict[str, Value]]
+
+
+def _machine(chance: random.Random, site: Site) -> str:
+    return chance.choice([machine.name for machine in site.machines.values()])
+
+
+def _some(chance: random.Random, site: Site) -> str:
+    names = [machine.name for machine in site.machines.values()]
+    chosen = chance.sample(names, chance.randint(1, max(1, len(names) // 2)))
+    return "|".join(sorted(chosen))
+
+
+def _of(kind: KindCode) -> Callable[[random.Random, Site], str]:
+    def choose(chance: random.Random, site: Site) -> str:
+        return chance.choice([machine.name for machine in site.machines.values() if machine.kind is kind])
+
+    return choose
+
+
+_ROBOT, _COMPARTMENT = _of(KindCode.ROBOT), _of(KindCode.COMPARTMENT)
+
+
+def _seed(chance: random.Random) -> int:
+    return chance.randrange(1_000_000)
+
+
+def _lasting(low_s: float, high_s: float, chance: random.Random) -> float:
+    return round(chance.uniform(low_s, high_s), 3)
+
+
+def _crash(chance: random.Random, site: Site) -> dict[str, Value]:
+    drawn: dict[str, Value] = {"target": _machine(chance, site), "restart_s": _lasting(0.1, 20, chance)}
+    how = chance.choice(["at once", "frame", "write", "durable"])
+    if how == "frame":
+        drawn["frame"] = chance.randint(1, 60)
+    elif how != "at once":
+        drawn |= {"write": chance.randint(1, 8), "durable": "yes" if how == "durable" else "no"}
+    return drawn
+
+
+_BUS: Final[dict[str, Draw]] = {
+    "burst": lambda c, _: {"for_s": _lasting(0.001, 0.05, c)},
+    "bit_errors": lambda c, _: {"probability": c.choice([0.001, 0.01, 0.1]), "seed": _seed(c)},
+    "lossy": lambda c, s: {"receivers": _some(c, s), "probability": c.choice([0.01, 0.05, 0.2]), "seed": _seed(c)},
+    "reorder": lambda c, s: {"receivers": _some(c, s), "delay_ms": c.choice([2, 20, 200]), "seed": _seed(c)},
+    "bus_off": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(0.02, 0.5, c)},
+    "partition": lambda c, s: {
+        "members": _some(c, s),
+        "for_s": _lasting(0.5, 15, c),
+        "way": c.choice(["both", "out", "in"]),
+    },
+    "overflow": lambda c, s: {"target": _machine(c, s), "queue": c.choice([1, 2, 8])},
+    "babble": lambda c, _: {"for_s": _lasting(0.5, 8, c), "rate_hz": c.choice([500, 1500, 3000])},
+}
+_CRASH: Final[dict[str, Draw]] = {
+    "crash": _crash,
+    "pause": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(0.2, 10, c)},
+    "slow_node": lambda c, s: {"target": _machine(c, s), "processing_us": c.choice([500, 2000])},
+    "power_cut": lambda c, _: {"for_s": _lasting(0.5, 20, c), "seed": _seed(c)},
+}
+_PEOPLE: Final[dict[str, Draw]] = {
+    "lost_ticket": lambda c, _: {"car": c.randint(1, 6)},
+    "key_presses": lambda c, s: {"target": _COMPARTMENT(c, s), "times": c.randint(1, 5)},
+    "cancel": lambda c, _: {"car": c.randint(1, 6)},
+    "linger": lambda c, _: {"car": c.randint(1, 6), "for_s": _lasting(60, 400, c)},
+    "oversize": lambda c, _: {"car": c.randint(1, 6)},
+    "moved": lambda c, s: {"target": _ROBOT(c, s), "by_mm": c.choice([-2400, -600, -40, 40, 600, 2400])},
+}
+#: Only in ``all``. A position sensor that lies plausibly, a broken bolt and a double node-ID are left to scenarios of
+#: their own: what then follows is not the controllers' doing alone.
+_MORE: Final[dict[str, Draw]] = {
+    "disk_full": lambda c, s: {"target": _machine(c, s)},
+    "drift": lambda c, s: {"target": _machine(c, s), "ppm": c.choice([-2000, -200, 200, 2000])},
+    "clock_jump": lambda c, s: {"target": _machine(c, s), "by_ms": c.choice([-5000, -100, 100, 5000])},
+    "sensor_off": lambda c, s: {"target": _machine(c, s)},
+    "sensor_flaky": lambda c, s: {"target": _machine(c, s), "seed": _seed(c)},
+    "actuator_stuck": lambda c, s: {"target": _machine(c, s)},
+    "actuator_slow": lambda c, s: {"target": _ROBOT(c, s)},
+    "actuator_halfway": lambda c, s: {"target": _ROBOT(c, s), "after_s": _lasting(0.1, 3, c)},
+}
+
+PROFILES: Final[dict[str, dict[str, Draw]]] = {
+    "none": {},
+    "bus": _BUS,
+    "crash": _CRASH,
+    "people": _PEOPLE,
+    "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE},
+}
+#: Kinds that have no moment of their own.
+_WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
+
+
+def draw_faults(profile: str, seed: int, site: Site) -> tuple[Injection, ...]:
+    """The faults of one seed, by time; always the same for the same profile, seed and site."""
+    kinds = PROFILES[profile]
+    if not kinds:
+        return ()
+    chance = random.Random(f"faults:{profile}:{site.name}:{seed}")
+    drawn = []
+    for _ in range(chance.randint(*COUNT)):
+        kind = chance.choice(list(kinds))
+        at_s = round(chance.uniform(*SPAN_S), 6)
+        when: dict[str, Value] = {} if kind in _WITHOUT_TIME else {"at_s": at_s}
+        drawn.append((at_s, Injection(kind, {**when, **kinds[kind](chance, site)})))
+    return tuple(injection for _, injection in sorted(drawn, key=lambda one: one[0]))

@@ -1,0 +1,79 @@
+"""A campaign's results as a table and as JSON: faults injected by kind, against what came of the runs with them."""
+
+from collections import Counter
+from collections.abc import Sequence
+
+from bus_sim.campaign.runner import Plan, Result
+from bus_sim.campaign.trial import Verdict, kinds_of
+
+#: In the order of the table's columns.
+COLUMNS = (
+    Verdict.SERVED,
+    Verdict.TOLD,
+    Verdict.DELAYED,
+    Verdict.STOPPED,
+    Verdict.NOT_SERVED,
+    Verdict.CRASHED,
+    Verdict.VIOLATION,
+)
+
+
+def lines(results: Sequence[Result]) -> list[str]:
+    """The table, then a line for every failure. A run counts in the row of every kind that it had."""
+    injected: Counter[str] = Counter()
+    came: Counter[tuple[str, Verdict]] = Counter()
+    for result in results:
+        kinds = kinds_of(result.report.scenario) or Counter({"(no fault)": 0})
+        injected += kinds
+        for kind in kinds:
+            came[kind, result.report.verdict] += 1
+        came["all runs", result.report.verdict] += 1
+    rows = sorted({kind for kind, _ in came} - {"all runs"}) + ["all runs"]
+    injected["all runs"] = sum(injected.values())
+    head = f"{'faults':<18}{'injected':>9}" + "".join(f"{column.value:>16}" for column in COLUMNS)
+    text = [head]
+    for row in rows:
+        counts = "".join(f"{came[row, column] or '.':>16}" for column in COLUMNS)
+        text.append(f"{row:<18}{injected[row]:>9}{counts}")
+    return text + _failures(results)
+
+
+def _failures(results: Sequence[Result]) -> list[str]:
+    text = []
+    for result in results:
+        if result.shrunk is None:
+            continue
+        faults = "; ".join(str(fault) for fault in result.shrunk.faults) or "no fault at all"
+        text.append(f"seed {result.seed}: {result.report.verdict.value}: {result.report.why()}")
+        text.append(f"  least scenario: {faults}")
+        text += [f"  {name}" for name in result.files]
+    return text
+
+
+def to_json(plan: Plan, results: Sequence[Result]) -> dict[str, object]:
+    """Plain values for ``json.dump``."""
+    return {
+        "site": plan.site,
+        "profile": plan.profile,
+        "seeds": [result.seed for result in results],
+        "simulated_h": sum(result.report.simulated_s for result in results) / 3600,
+        "verdicts": dict(Counter(result.report.verdict.value for result in results)),
+        "runs": [
+            {
+                "seed": result.seed,
+                "verdict": result.report.verdict.value,
+                "faults": [str(fault) for fault in result.report.scenario.faults],
+                "struck": dict(result.report.struck),
+                "served": result.report.served,
+                "told": result.report.told,
+                "waiting": result.report.waiting,
+                "longest_wait_s": result.report.longest_wait_s,
+                "violations": list(result.report.violations),
+                "halted": list(result.report.halted),
+                "error": result.report.error,
+                "least": [str(fault) for fault in result.shrunk.faults] if result.shrunk is not None else None,
+                "files": list(result.files),
+            }
+            for result in results
+        ],
+    }

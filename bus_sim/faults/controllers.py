@@ -1,0 +1,168 @@
+"""Faults of controllers: power cuts at every kind of moment, journals that suffer, processors and clocks."""
+
+import random
+from collections.abc import Callable
+from dataclasses import replace
+
+from bus_sim.faults.holon import FaultyHolon
+from bus_sim.faults.injection import Injection
+from bus_sim.journal import SimulatedJournal
+from bus_sim.run import Simulation
+from onboard.core.frame import Frame
+from onboard.core.site import Machine
+
+
+def crash(simulation: Simulation, injection: Injection) -> None:
+    """At once, or from now on at the n-th frame that it sends or the n-th entry that it writes."""
+    machine = machine_named(simulation, injection.target)
+
+    def strike() -> None:
+        if machine.node_id not in simulation.controllers:
+            return
+        simulation.crash(machine)
+        _hurt_journal(simulation.journals[machine.node_id], injection)
+        if injection.text("restart") == "yes":
+            restart_later(simulation, machine, simulation.loop.now_us() + round(injection.number("restart_s") * 1e6))
+
+    if injection.count("frame"):
+        _at_frame(simulation, machine, injection.count("frame"), strike)
+    elif injection.count("write"):
+        durable = injection.text("durable") == "yes"
+        _at_write(simulation, machine, injection.count("write"), durable=durable, strike=strike)
+    else:
+        strike()
+
+
+def _at_frame(simulation: Simulation, machine: Machine, number: int, strike: Callable[[], None]) -> None:
+    """The n-th frame of this machine is queued and never leaves: the power goes while it waits."""
+    left = [number]
+
+    def count(_frame: Frame, _time_us: int, sender: str) -> None:
+        if sender == machine.name and left[0] > 0:
+            left[0] -= 1
+            if left[0] == 0:
+                strike()
+
+    simulation.fleet.tap_queues(count)
+    simulation.devices[machine.node_id].tap_queues(count)
+
+
+def _at_write(
+    simulation: Simulation, machine: Machine, number: int, *, durable: bool, strike: Callable[[], None]
+) -> None:
+    journal = simulation.journals[machine.node_id]
+    left = [number]
+
+    def count(is_durable: bool) -> None:
+        if is_durable is durable and left[0] > 0:
+            left[0] -= 1
+            if left[0] == 0:
+                # The journal lives on after the crash, under another controller.
+                journal.on_write = None
+                strike()
+
+    journal.on_write = count
+
+
+def _hurt_journal(journal: SimulatedJournal, injection: Injection) -> None:
+    what = injection.text("journal")
+    if what == "lost":
+        journal.entries.clear()
+    elif what == "torn":
+        del journal.entries[-1:]
+    elif what == "rolled_back":
+        del journal.entries[-injection.count("entries") :]
+
+
+def restart_later(simulation: Simulation, machine: Machine, when_us: int) -> None:
+    """Power comes back at a loop time, us; nothing happens where it is back already."""
+
+    def power_up() -> None:
+        if machine.node_id not in simulation.controllers:
+            simulation.start_controller(machine)
+
+    simulation.plant.timers.call_at(when_us, power_up)
+
+
+def power_cut(simulation: Simulation, injection: Injection) -> None:
+    """All controllers at once; afterwards each comes back by itself at a moment drawn by chance."""
+    chance = random.Random(injection.count("seed"))
+    for machine in simulation.site.machines.values():
+        if machine.node_id in simulation.controllers:
+            simulation.crash(machine)
+            when_us = injection.until_us + round(chance.uniform(0, injection.number("spread_s")) * 1e6)
+            restart_later(simulation, machine, when_us)
+
+
+def disk_full(simulation: Simulation, injection: Injection) -> None:
+    """No entry can be written; when there is room again the machine is switched off and on by its supervisor."""
+    machine = machine_named(simulation, injection.target)
+    simulation.journals[machine.node_id].is_full = True
+
+    def room() -> None:
+        simulation.journals[machine.node_id].is_full = False
+        simulation.crash(machine)
+        simulation.journals[machine.node_id] = replace(simulation.journals[machine.node_id], is_full=False)
+        restart_later(simulation, machine, simulation.loop.now_us() + 1_000_000)
+
+    simulation.plant.timers.call_at(injection.until_us, room)
+
+
+def pause(simulation: Simulation, injection: Injection) -> None:
+    """The process stands still."""
+    holon = _holon(simulation, injection)
+    if holon is not None:
+        holon.pause(injection.until_us)
+
+
+def drift(simulation: Simulation, injection: Injection) -> None:
+    """The clock is too fast or too slow from now on, until the controller is restarted."""
+    holon = _holon(simulation, injection)
+    if holon is not None:
+        holon.set_clock(simulation.loop.now_us(), ppm=injection.count("ppm"))
+
+
+def clock_jump(simulation: Simulation, injection: Injection) -> None:
+    """The clock jumps, forwards or backwards."""
+    holon = _holon(simulation, injection)
+    if holon is not None:
+        holon.set_clock(simulation.loop.now_us(), jump_us=injection.count("by_ms") * 1000)
+
+
+def slow_node(simulation: Simulation, injection: Injection) -> None:
+    """Each frame of the fleet bus costs its processor so much, us."""
+    _slow(simulation, injection, None)
+
+
+def overflow(simulation: Simulation, injection: Injection) -> None:
+    """The same behind a queue that is too short."""
+    _slow(simulation, injection, injection.count("queue"))
+
+
+def _slow(simulation: Simulation, injection: Injection, queue: int | None) -> None:
+    bus = simulation.fleet_node(injection.target)
+    if bus is None:
+        return
+    before = bus.options
+    bus.processing_us = injection.count("processing_us")
+    if queue is not None:
+        bus.options = replace(before, receive_queue=queue)
+
+    def heal() -> None:
+        bus.processing_us = before.processing_us
+        bus.options = before
+
+    simulation.plant.timers.call_at(injection.until_us, heal)
+
+
+def machine_named(simulation: Simulation, name: str) -> Machine:
+    """A machine of the site; ``prepare`` has made sure that there is one."""
+    return next(machine for machine in simulation.site.machines.values() if machine.name == name)
+
+
+def _holon(simulation: Simulation, injection: Injection) -> FaultyHolon | None:
+    controller = simulation.controllers.get(machine_named(simulation, injection.target).node_id)
+    if controller is None:
+        return None
+    assert isinstance(controller.holon, FaultyHolon)
+    return controller.holon

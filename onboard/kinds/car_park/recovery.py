@@ -1,0 +1,108 @@
+"""What a robot's journal tells after a restart: which tasks are its own, how far each has come, where it is.
+
+Written before anybody hears of it: an award taken on, a handling that is over, the shuttle's step before its order, a
+ride begun and ended. The mirror, bids and plans are not in the journal; the way is planned anew from where the sensors
+say that the carrier stands (design, section 5).
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from onboard.core.codes import Criterion, KindCode, Operation
+from onboard.core.effects import Record
+from onboard.core.messages import CallForProposals, Reference
+from onboard.core.site import Station
+from onboard.kinds.car_park.handling import Phase
+from onboard.kinds.car_park.program import Handling, Step, Work
+
+Entry = Mapping[str, str | int]
+
+
+def award_record(call: CallForProposals, source: Station, sink: Station) -> Record:
+    """A task taken on: what is needed to go on with it, and where its car is taken and left."""
+    entry: dict[str, str | int] = {"record": "award", "initiator": call.sender, "call": call.call}
+    entry |= {"task_origin": call.task.origin, "task": call.task.number, "operation": int(call.operation)}
+    entry |= {"car_origin": call.car.origin, "car": call.car.number, "wheelbase_mm": call.wheelbase_mm}
+    entry |= {"from_station": call.from_station, "to_station": call.to_station, "deadline_ms": call.deadline_ms}
+    return Record(entry | {"source": source.number, "sink": sink.number})
+
+
+def handled_record(work: Work) -> Record:
+    """A handling is over."""
+    task = work.call.task
+    entry: dict[str, str | int] = {"record": "handled", "task_origin": task.origin, "task": task.number}
+    return Record(entry | {"handling": work.handling.value})
+
+
+def ride_record(step: Step) -> Record:
+    """A ride begins: from now on the floor is the lift's business."""
+    return Record({"record": "riding", "lift": step.track, "board": step.from_index, "leave": step.to_index})
+
+
+def floor_record(track: int) -> Record:
+    """A ride is over: the carrier is on this alley."""
+    return Record({"record": "floor", "track": track})
+
+
+@dataclass
+class Recovery:
+    """The journal read from its oldest entry on. ``works`` is what is left to do, in order."""
+
+    works: list[Work] = field(default_factory=list)
+    #: The shuttle's phase in the first of ``works``, None where it was not begun.
+    phase: Phase | None = None
+    floor: int | None = None
+    #: Lift track, board and leave index of a ride that was begun and not ended.
+    riding: tuple[int, int, int] | None = None
+    is_restart: bool = False
+
+    @classmethod
+    def read(cls, entries: Iterable[Entry]) -> "Recovery":
+        """From a journal; entries of other kinds are passed over."""
+        found = cls()
+        for entry in entries:
+            found._take(entry)
+        return found
+
+    def _take(self, entry: Entry) -> None:
+        match entry.get("record"):
+            case "boot":
+                self.is_restart = True
+            case "award" if "source" in entry:
+                self.works += _works(entry)
+            case "step":
+                self.phase = Phase(str(entry["phase"]))
+            case "handled":
+                self.works = [work for work in self.works if not _is(work, entry)]
+                self.phase = None
+            case "riding":
+                self.riding = (int(entry["lift"]), int(entry["board"]), int(entry["leave"]))
+            case "floor":
+                self.floor, self.riding = int(entry["track"]), None
+
+
+def _is(work: Work, entry: Entry) -> bool:
+    task = Reference(int(entry["task_origin"]), int(entry["task"]))
+    return work.call.task == task and work.handling.value == entry["handling"]
+
+
+def _works(entry: Entry) -> list[Work]:
+    number = {name: int(value) for name, value in entry.items() if name != "record"}
+    car = Reference(number["car_origin"], number["car"])
+    call = CallForProposals(
+        sender=number["initiator"],
+        call=number["call"],
+        task=Reference(number["task_origin"], number["task"]),
+        operation=Operation(number["operation"]),
+        kind=KindCode.ROBOT,
+        criterion=Criterion.FINISH_TIME,
+        attempt=1,
+        depth=0,
+        deadline_ms=number["deadline_ms"],
+        from_station=number["from_station"],
+        to_station=number["to_station"],
+        car=car,
+        wheelbase_mm=number["wheelbase_mm"],
+    )
+    ends = ((Handling.TAKE, "source"), (Handling.LEAVE, "sink"))
+    return [Work(handling, Station.from_number(number[end]), car, call.wheelbase_mm, call) for handling, end in ends]

@@ -1,0 +1,55 @@
+"""A controller that is killed at any moment and started again goes on, and the car still arrives."""
+
+import asyncio
+
+import pytest
+
+from bus_sim.run import Simulation
+from bus_sim.sites import find_site
+from onboard.core.codes import TaskPhase
+from onboard.core.messages import TaskReport
+from tests.system.scene import Scene, play, stays
+
+#: The robot that wins both tasks of the scene on the small site, and the lift that it rides.
+ROBOT, LIFT = "MR1", "ER1"
+#: Powered off for so long, s.
+DOWN_S = 3.0
+
+
+def killed(name: str, at_s: float) -> Scene:
+    """One car comes and goes; the machine loses its controller at ``at_s`` and gets it back with the same journal."""
+
+    def plan(simulation: Simulation) -> None:
+        machine = simulation.site.machine(name)
+
+        async def outage() -> None:
+            await asyncio.sleep(at_s)
+            await simulation.controllers[machine.node_id].stop()
+            await asyncio.sleep(DOWN_S)
+            simulation.start_controller(machine)
+
+        outages.append(simulation.loop.create_task(outage()))
+
+    outages: list[asyncio.Task[None]] = []
+    scene = play(find_site("small"), stays((0, 200)), before=plan, limit_s=900)
+    assert all(outage.done() and outage.exception() is None for outage in outages)
+    return scene
+
+
+def assert_served(scene: Scene) -> None:
+    scene.assert_sound()
+    street = scene.simulation.plant.street.summary()
+    assert (street.parked, street.served, street.asking, street.queueing) == (1, 1, 0, 0)
+
+
+#: From the way to the lift, over each step of taking and leaving the car, to the refuge; then of the way back.
+ENTRY_S = (22, 25, 27, 28, 29, 31, 33, 35, 38, 41, 44, 45, 47, 49, 51, 53, 55, 57, 59, 62, 65)
+EXIT_S = (214, 218, 222, 226, 230, 235, 240, 245, 250, 255, 260, 268)
+
+
+@pytest.mark.parametrize("at_s", ENTRY_S + EXIT_S)
+def test_p50_a_robot_killed_at_any_step_finds_its_place_and_the_car_arrives(at_s: int) -> None:
+    scene = killed(ROBOT, at_s)
+    assert_served(scene)
+    owners = {(m.task, m.sender) for _, m in scene.all(TaskReport, "fleet") if m.phase is TaskPhase.DONE}
+    assert len(owners) == len({task for task, _ in owners}) == 2, "one owner a task, and each is done once"
