@@ -6,10 +6,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from bus_sim.can.faults import parse_fault
+from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
+from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names
@@ -62,6 +63,7 @@ def build_parser() -> argparse.ArgumentParser:
     sites = commands.add_parser("sites", help="list the shipped sites, or tell what one holds and can lose")
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     add_compare(commands)
+    add_campaign(commands)
     return parser
 
 
@@ -116,7 +118,13 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FAULT",
-        help="a fault on the fleet bus, such as omission:receivers=11,probability=0.01,seed=7 (repeatable)",
+        help="a fault, such as omission:receivers=11,probability=0.01,seed=7 or crash:target=MR1,at_s=80 (repeatable)",
+    )
+    how.add_argument(
+        "--scenario",
+        type=Path,
+        metavar="FILE",
+        help="site, customers, seed and faults from this file; of the other options only --trace and --json go with it",
     )
     out = run.add_argument_group("what comes out")
     out.add_argument(
@@ -164,6 +172,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             return 0
         if args.command == "compare":
             return run_compare(args)
+        if args.command == "campaign":
+            return run_campaign_command(args)
+        if args.command == "run" and args.scenario is not None:
+            return _run_scenario(args)
         site = find_site(args.site or DEFAULT_SITE)
         if args.command == "dbc":
             sys.stdout.write(site_dbc(site))
@@ -208,11 +220,22 @@ def _window(args: argparse.Namespace, *, live: bool) -> str | None:
     return asked if asked is not None or whole or live or args.without else "busiest"
 
 
+def _run_scenario(args: argparse.Namespace) -> int:
+    """A scenario says everything itself: what the command line says besides would be passed over in silence."""
+    usual = build_parser().parse_args(["run"])
+    free = ("scenario", "trace", "json")
+    for name, value in vars(args).items():
+        if name not in free and value != getattr(usual, name):
+            option = "SITE" if name == "site" else f"--{name.removesuffix('_s').replace('_', '-')}"
+            raise OptionError(f"{option}: does not go with --scenario; write it into the file, or leave it out")
+    return run_scenario(args.scenario, args.trace, args.json)
+
+
 def _day_options(args: argparse.Namespace) -> DayOptions:
-    faults = []
+    faults: list[AnyFault] = []
     for text in args.fault:
         try:
-            faults.append(parse_fault(text))
+            faults.append(parse_injection(text))
         except ValueError as error:
             raise OptionError(f"--fault {text}: {error}") from error
     speed = _speed(args.speed)

@@ -9,8 +9,9 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bus_sim.can.faults import Fault
 from bus_sim.demand import LEVEL1_DAY, WHOLE_DAY, Demand, DemandError
+from bus_sim.faults.arm import arm, check_targets, frame_faults
+from bus_sim.faults.injection import AnyFault
 from bus_sim.outside import Outside
 from bus_sim.run import RunOptions, Simulation, build, run_until
 from bus_sim.show import Clock, TerminalShow
@@ -48,7 +49,7 @@ class DayOptions:
     speed: float | None = None
     limit_s: float | None = None
     without: frozenset[str] = frozenset()
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[AnyFault, ...] = ()
     trace: Path | None = None
     devices: bool = False
     serve: str | None = None
@@ -100,6 +101,10 @@ def run_day(site: Site, options: DayOptions) -> RunSummary:
     if unknown:
         known = ", ".join(machine.name for machine in site.machines.values())
         raise DemandError(f"--without {sorted(unknown)[0]}: no such machine; machines here: {known}")
+    try:
+        check_targets(options.faults, site)
+    except ValueError as error:
+        raise DemandError(f"--fault: {error}") from error
     loop = VirtualTimeLoop(pace=options.speed)
     try:
         asyncio.set_event_loop(loop)
@@ -139,7 +144,7 @@ class _Day:
             epoch_us=round(self._zero.timestamp() * 1_000_000),
             trace=options.trace,
             trace_devices=options.devices,
-            faults=options.faults,
+            faults=frame_faults(options.faults, site),
             without=options.without,
         )
         simulation = build(site, run_options, self._loop)
@@ -155,6 +160,7 @@ class _Day:
             highlight=False,
         )
         simulation.plant.street.add_all(self._demand, self._origin_us)
+        arm(simulation, options.faults)
         self._begin_s = time.monotonic()
         outside = Outside(simulation, options.serve, options.buses, console)
         clock = Clock(self._zero)

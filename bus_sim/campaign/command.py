@@ -11,9 +11,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from bus_sim.campaign import table
 from bus_sim.campaign.profiles import PROFILES
 from bus_sim.campaign.runner import Plan, Result, run_campaign
-from bus_sim.campaign.trial import Verdict
+from bus_sim.campaign.trial import FAILURES, Verdict, play
 from bus_sim.demand import DemandError
-from bus_sim.faults.scenario import Arrivals
+from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
 
 HELP = """\
@@ -90,3 +90,37 @@ def _seeds(text: str) -> range:
     if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
         raise DemandError(f"--seeds {text}: must be a seed, or the first and the last of several, such as 1-16")
     return range(int(first), int(last or first) + 1)
+
+
+def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
+    """Play one scenario file as a campaign plays it, and tell what came of it; 0 where everybody was served or told.
+
+    Raises ``ConfigError`` with one line for each mistake in the file.
+    """
+    scenario, site = load_scenario(path)
+    console = Console()
+    console.print(
+        f"scenario {path.name}: site {site.name}, {scenario.arrivals.cars} cars, seed {scenario.seed}, "
+        f"{len(scenario.faults)} faults",
+        highlight=False,
+        soft_wrap=True,
+    )
+    for fault in scenario.faults:
+        console.print(f"fault        {fault}", highlight=False, markup=False, soft_wrap=True)
+    report = play(site, scenario, trace=trace)
+    told = [
+        f"outcome      {report.verdict.value}",
+        f"customers    served {report.served}   told why {report.told}   waiting {report.waiting}   "
+        f"longest wait {report.longest_wait_s:.0f} s   in {report.simulated_s:.0f} s",
+        *(f"HALTED       {line}" for line in report.halted),
+        *(f"VIOLATION    {line}" for line in report.violations),
+        *([f"ERROR        {report.error}"] if report.error else []),
+        *([f"trace        {trace}"] if trace is not None else []),
+    ]
+    for line in told:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    if json_file is not None:
+        result = Result(scenario.seed, report)
+        text = json.dumps(table.to_json(Plan(scenario.site, "scenario"), [result]), indent=2)
+        json_file.write_text(text + "\n", encoding="utf-8")
+    return 1 if report.verdict in FAILURES else 0

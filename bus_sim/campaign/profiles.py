@@ -56,11 +56,11 @@ def _crash(chance: random.Random, site: Site) -> dict[str, Value]:
 
 
 _BUS: Final[dict[str, Draw]] = {
-    "burst": lambda c, _: {"for_s": _lasting(0.001, 0.05, c)},
+    "burst": lambda c, _: {"for_s": _lasting(0.05, 2.0, c)},
     "bit_errors": lambda c, _: {"probability": c.choice([0.001, 0.01, 0.1]), "seed": _seed(c)},
     "lossy": lambda c, s: {"receivers": _some(c, s), "probability": c.choice([0.01, 0.05, 0.2]), "seed": _seed(c)},
     "reorder": lambda c, s: {"receivers": _some(c, s), "delay_ms": c.choice([2, 20, 200]), "seed": _seed(c)},
-    "bus_off": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(0.02, 0.5, c)},
+    "bus_off": lambda c, s: {"target": _machine(c, s), "for_s": _lasting(0.5, 5.0, c)},
     "partition": lambda c, s: {
         "members": _some(c, s),
         "for_s": _lasting(0.5, 15, c),

@@ -2,7 +2,7 @@
 
 import multiprocessing
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
@@ -17,12 +17,12 @@ from onboard.core.site import Site
 
 @dataclass(frozen=True)
 class Plan:
-    """What every trial of a campaign has in common. ``out``: where scenarios and traces of failures go; None: nowhere."""
+    """What every trial of a campaign has in common. ``out``: where failures are kept; None: nowhere."""
 
     site: str
     profile: str
     limit_s: float = 7_200.0
-    arrivals: Arrivals = Arrivals()
+    arrivals: Arrivals = field(default_factory=Arrivals)
     out: Path | None = None
 
 

@@ -28,7 +28,7 @@ def lines(results: Sequence[Result]) -> list[str]:
         for kind in kinds:
             came[kind, result.report.verdict] += 1
         came["all runs", result.report.verdict] += 1
-    rows = sorted({kind for kind, _ in came} - {"all runs"}) + ["all runs"]
+    rows = [*sorted({kind for kind, _ in came} - {"all runs"}), "all runs"]
     injected["all runs"] = sum(injected.values())
     head = f"{'faults':<18}{'injected':>9}" + "".join(f"{column.value:>16}" for column in COLUMNS)
     text = [head]

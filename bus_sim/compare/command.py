@@ -43,7 +43,7 @@ def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     compare.add_argument("site", nargs="?", default="standard", help="name of a shipped site, or a site file")
-    compare.add_argument("--seeds", default="1-5", metavar="A-B", help="seeds of the random parts (default: 1-5)")
+    compare.add_argument("--seeds", default="1-10", metavar="A-B", help="seeds of the random parts (default: 1-10)")
     compare.add_argument("--cars", type=int, default=12, metavar="N", help="cars of each random run (default: 12)")
     compare.add_argument(
         "--random",

@@ -184,7 +184,10 @@ class Holon:
         if message.sender == self.node_id:
             return self._halt("another node sends under this node-ID")
         if not self._is_time_source(message.sender):
-            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
+            machine = self.site.machines.get(message.sender)
+            if machine is None or machine.kind is KindCode.ROBOT:
+                self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         first = not self.clock.is_set
         self._bus_time_lost = False

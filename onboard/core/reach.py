@@ -9,6 +9,9 @@ from collections.abc import Collection
 from onboard.core.lifts import lift_tracks
 from onboard.core.site import Segment, Site, Station, TrackKind
 
+#: Sites whose passages are kept in one process: one in a machine, some in a test run.
+_MAX_KEPT = 16
+
 
 def reached(site: Site, *, lost: Collection[int] = (), standing: Collection[Segment] = ()) -> frozenset[Segment]:
     """Alley segments that a carrier can get to from any compartment's front.
@@ -49,8 +52,21 @@ def hidden_by(site: Site, standing: Collection[Segment], lost: Collection[int] =
 def passages(site: Site) -> frozenset[int]:
     """Alleys that are the only way to another: a machine standing there for ever would cut that one off.
 
-    They are no refuges (design, section 5: every other needed place stays reachable).
+    They are no refuges (design, section 5: every other needed place stays reachable). Worked out once for each site.
     """
+    kept = _kept.get(id(site))
+    # A kept answer holds its site, so an identity in use is never that of another site.
+    if kept is None:
+        if len(_kept) >= _MAX_KEPT:
+            del _kept[next(iter(_kept))]
+        kept = _kept[id(site)] = site, _find_passages(site)
+    return kept[1]
+
+
+_kept: dict[int, tuple[Site, frozenset[int]]] = {}
+
+
+def _find_passages(site: Site) -> frozenset[int]:
     everywhere = reached(site)
     found = set()
     for track in site.tracks.values():

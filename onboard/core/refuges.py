@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from functools import lru_cache
 
+from onboard.core.codes import KindCode
+from onboard.core.reach import passages
 from onboard.core.site import Segment, Site, TrackKind
 
 
@@ -33,9 +35,10 @@ def refuges(site: Site) -> frozenset[Segment]:
 def open_refuges(site: Site, standing: Iterable[Segment]) -> frozenset[Segment]:
     """Those refuges in which one more machine may end while others stand for ever at ``standing``.
 
-    Where there are several floors: no alley before compartments, so that the street alley stays free for all, and
-    neither an alley nor a spur in which another stands: at most one in each. One floor has no such choice; there every
-    refuge is open, as the machines can pass each other nowhere.
+    Where there are several floors: no alley before compartments, so that the street alley stays free for all, no alley
+    that is the only way to another unless the robot is the only one, and neither an alley nor a spur in which another
+    stands: at most one in each. One floor has no such choice; there every refuge is open, as the machines can pass each
+    other nowhere.
     """
     alleys = [track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
     if len(alleys) == 1:
@@ -43,6 +46,8 @@ def open_refuges(site: Site, standing: Iterable[Segment]) -> frozenset[Segment]:
     street = {station.track for station in site.compartments.values()}
     # With compartments on all floors, the lowest of them has to be the one that stays free.
     closed = (street if street < set(alleys) else {min(alleys)}) | {segment.track for segment in standing}
+    if sum(machine.kind is KindCode.ROBOT for machine in site.machines.values()) > 1:
+        closed |= passages(site)
     return _without(refuges(site), frozenset(closed))
 
 

@@ -207,14 +207,20 @@ end:
 proctype giving(byte n, to) {
 end:
     do
-    :: atomic { GIVES(to) -> give(n, to) }
+    :: atomic { GIVES(to) && todo[n] == IDLE && holds[n] && seen[n] < VERSIONS -> give(n, to) }
     od
 }
 
-proctype hearing(byte n, version, whom) {
+proctype accepting(byte n, version) {
 end:
     do
-    :: atomic { n == whom -> accept(n, version) }
+    :: accept(n, version)
+    od
+}
+
+proctype learning(byte n, version, whom) {
+end:
+    do
     :: learn(n, version, whom)
     od
 }
@@ -239,10 +245,12 @@ init {
             run machine(i);
             for (j : 0 .. NODES - 1) {
                 if
-                :: i != j -> run giving(i, j)
-                :: else
-                fi;
-                for (v : 1 .. VERSIONS) { run hearing(i, v, j) }
+                :: i != j ->
+                    run giving(i, j);
+                    for (v : 1 .. VERSIONS) { run learning(i, v, j) }
+                :: else ->
+                    for (v : 1 .. VERSIONS) { run accepting(i, v) }
+                fi
             }
         }
 #ifdef LIVE

@@ -5,7 +5,7 @@ from dataclasses import replace
 from onboard.core.codes import KindCode, Side
 from onboard.core.refuges import open_refuges, refuges
 from onboard.core.site import Axis, Machine, Segment, Site, Station, Track, TrackKind
-from tests.core.buildings import building
+from tests.core.buildings import LEFT, RIGHT, building
 from tests.core.lines import SPUR
 from tests.sites import one_floor
 
@@ -48,3 +48,25 @@ def test_with_compartments_on_all_floors_the_lowest_alley_stays_free() -> None:
 
 def test_on_one_floor_every_refuge_is_open() -> None:
     assert open_refuges(one_floor(), [Segment(1, 7)]) == refuges(one_floor())
+
+
+def shafts(robots: int) -> Site:
+    """Five floors; one lift serves floors 1 to 3, the other 3 to 5: from floor 3 on up there is no way but floor 3."""
+    site = building(5, 6, Axis(1_500, 500), pitch_mm=2_400, floor_mm=2_500, carrier_length_mm=2_300)
+    left, right = site.tracks[LEFT], site.tracks[RIGHT]
+    tracks = site.tracks | {
+        LEFT: replace(left, length=3, joins=left.joins[:3]),
+        RIGHT: replace(right, length=3, joins=right.joins[2:]),
+    }
+    street = Machine(1, "IOC1", KindCode.COMPARTMENT, Segment(1, 4), Station(1, 4, Side.NEAR))
+    machines = {n: Machine(n, f"MR{n}", KindCode.ROBOT, Segment(2, 3), None) for n in range(11, 11 + robots)}
+    return replace(site, tracks=tracks, machines={1: street, **machines})
+
+
+def test_nobody_stays_in_an_alley_through_which_the_others_go_to_the_floors_above() -> None:
+    assert {segment.track for segment in open_refuges(shafts(2), ())} == {2, 4, 5}
+    assert {segment.track for segment in open_refuges(shafts(2), [Segment(4, 3)])} == {2, 5}
+
+
+def test_a_lone_robot_cuts_nobody_off() -> None:
+    assert {segment.track for segment in open_refuges(shafts(1), ())} == {2, 3, 4, 5}

@@ -236,11 +236,46 @@ class Lift:
     # --- the phases --------------------------------------------------------------------------------------------
 
     def _when_starting(self, now_us: int) -> list[Effect]:
+        """Free where nobody has the platform; after a restart in the middle of a ride, back into its phase."""
         assert self.platform is not None and self.drive is not None
-        if self.platform.crossing or self.platform.carrier_aboard or self.drive.mode is not DriveMode.STANDING:
+        if self.drive.mode is not DriveMode.STANDING:
+            return []
+        holder = self.fleet.tokens.holder_of(segment_token(platform(self.track)))
+        if holder != self.fleet.node_id:
+            return self._take_up_ride(holder, now_us)
+        if self.platform.crossing or self.platform.carrier_aboard:
             return []
         self.phase = LiftPhase.FREE
         return self.statements(now_us)
+
+    def _take_up_ride(self, robot: int, now_us: int) -> list[Effect]:
+        """Who holds the platform is boarding, riding or leaving: tokens, sensors and the journal tell which."""
+        assert self.platform is not None
+        ride = self._ride_in_journal()
+        if ride is not None:
+            self.ride = ride
+            there = self._stands_at(ride.leave)
+            self.phase = LiftPhase.LEAVING if there else LiftPhase.RIDING
+        else:
+            itinerary = self.fleet.mirror.itineraries.get(robot)
+            planned = rides_of(self.track, robot, itinerary, now_us) if itinerary is not None else []
+            here = next((one for one in planned if self._stands_at(one.board)), None)
+            if here is None:
+                return []
+            self.ride = here
+            self.phase = LiftPhase.BOARDING
+            self._gate_was_out = self.platform.carrier_aboard or not self._holds_gate()
+        return self.statements(now_us)
+
+    def _ride_in_journal(self) -> Ride | None:
+        """The ride that was begun and not ended when the controller stopped."""
+        found: Ride | None = None
+        for entry in self.fleet.entries:
+            if entry.get("record") == "ride":
+                found = Ride(int(entry["robot"]), int(entry["board"]), int(entry["leave"]), 0)
+            elif entry.get("record") == "ride_over":
+                found = None
+        return found
 
     def _when_free(self, now_us: int) -> list[Effect]:
         following = self.next_ride(now_us)
@@ -279,9 +314,10 @@ class Lift:
         assert self.ride is not None
         # The robot need not tell its plan anew after a ride: it is remembered as made.
         self._made[self.ride.robot] = self.ride.begin_us
+        over = Record({"record": "ride_over", "robot": self.ride.robot})
         self.ride = None
         self.phase = LiftPhase.FREE
-        return self._when_free(now_us)
+        return [over, *self._when_free(now_us)]
 
     # --- inner works -------------------------------------------------------------------------------------------
 

@@ -1,0 +1,48 @@
+"""``bus-sim compare`` as a person uses it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from bus_sim.cli import main
+from bus_sim.compare.plays import POLICIES
+from bus_sim.compare.table import BOUND
+
+
+def test_p56_one_command_makes_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    told = tmp_path / "table.json"
+    status = main(["compare", "small", "--parts", "random", "--seeds", "1", "--cars", "2", "--json", str(told)])
+    assert status == 0
+    out = capsys.readouterr().out
+    lines = [line for line in out.splitlines() if line.startswith("| ")]
+    assert [line.split(" | ")[0].removeprefix("| ") for line in lines[1:]] == [*POLICIES, BOUND]
+    rows = json.loads(told.read_text(encoding="utf-8"))["random"]["rows"]
+    assert [row["policy"] for row in rows] == [*POLICIES, BOUND]
+    assert all(row["to_bound"] >= 1 for row in rows)
+    assert all(0 < row["empty_share"] < 1 and row["messages_per_task"] > 0 for row in rows[:-1])
+
+
+def test_a_window_of_a_day_counts_only_its_own_customers(capsys: pytest.CaptureFixture[str]) -> None:
+    """On the shipped day of level 1 nobody comes before half past five, and two cars come by a quarter past six."""
+    status = main(["compare", "level1", "--parts", "day", "--window", "05:00-06:15"])
+    assert status == 0
+    captured = capsys.readouterr()
+    assert "level1: 2019-07-24 05:00 to 06:15" in captured.out
+    assert captured.err.count("0 not served") == len(POLICIES)
+
+
+@pytest.mark.parametrize(
+    ("options", "remedy"),
+    [
+        (["--seeds", "5-1"], "first and last such as 1-5"),
+        (["--seeds", "one"], "first and last such as 1-5"),
+        (["--parts", "nights"], "some of random, day, small"),
+        (["--parts", "random", "--random", "0", "1"], "must be above 0"),
+    ],
+)
+def test_a_mistake_gives_one_line(options: list[str], remedy: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "small", *options]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("bus-sim: ")
+    assert remedy in line
