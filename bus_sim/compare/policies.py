@@ -14,13 +14,13 @@ from onboard.core.messages import CallForProposals
 from onboard.core.reservations import FOREVER
 from onboard.kinds.car_park.generation import Solution
 
-#: What a task counts before which nobody waits: somebody may come. In customers; ours, the best of 0.1 to 1 tried.
+#: What a task counts for which nobody waits: somebody may come. In customers; ours (1 decides alike).
 NOBODY_YET = 0.5
-#: What a second of a robot's time counts beside a customer's. Ours.
+#: What a second of a robot's time counts beside a customer's. Ours (0.02 and 0.3 decide alike).
 ROBOT_TIME = 0.1
 #: A plan that leaves a task out is as bad as one that ends it so much later, us. Ours.
 LEFT_OUT_US = 900_000_000
-#: Bound of one joint choice, in searches of single tasks (a wall-time bound would not replay).
+#: Bound of one joint choice, in searches of single tasks (a wall-time bound would not replay). Ours.
 MAX_SEARCHES = 24
 
 

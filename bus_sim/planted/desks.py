@@ -1,5 +1,7 @@
 """Bugs at compartments: doors, words for customers, tasks that come to nothing."""
 
+# ruff: noqa: SLF001 - a bug sits inside a machine, where its own code reaches
+
 from collections.abc import Callable, Iterable
 from dataclasses import replace as changed
 from typing import Any
@@ -154,7 +156,11 @@ def _forgets_its_award(simulation: Simulation) -> None:
 
 
 def _blind_to_persons(simulation: Simulation) -> None:
-    """The bay's sensor for persons is dead, for the controller and for the door's edge."""
+    """The bay's sensor for persons is dead, for the controller and for both doors."""
+    for compartment in simulation.plant.compartments.values():
+        for door in compartment.doors.values():
+            replace(door, "_is_clear", lambda _: lambda: True)
+            replace(door, "_may_open", lambda _: lambda: True)
 
     def ears(_: object) -> Callable[[Message], Message]:
         def hear(message: Message) -> Message:
@@ -166,7 +172,7 @@ def _blind_to_persons(simulation: Simulation) -> None:
 
 
 BUGS = (
-    PlantedBug("closing-is-locked", "doors", "the output door opens before the input door is locked", _closing_is_locked),
+    PlantedBug("closing-is-locked", "doors", "the output door opens before the input is locked", _closing_is_locked),
     PlantedBug("no-door-interlock", "doors", "the same, and the doors obey", _and_no_interlock),
     PlantedBug("blind-to-persons", "doors", "a bay is closed and opened on a person", _blind_to_persons),
     PlantedBug("without-a-word", "customers-served", "a desk never answers the key", _without_word),

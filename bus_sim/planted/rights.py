@@ -4,10 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 from bus_sim.planted.bug import PlantedBug
-from bus_sim.planted.tools import at_start, in_behaviour, replace
+from bus_sim.planted.tools import at_start, hearing, in_behaviour, replace
 from bus_sim.run import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, Reason, TokenKind
+from onboard.core.messages import Itinerary, Message, Progress
 
 
 def _without_erasing(simulation: Simulation) -> None:
@@ -25,7 +26,31 @@ def _without_erasing(simulation: Simulation) -> None:
 
         replace(tokens, "give", make)
 
-    at_start(simulation, None, plant)
+    # Not in robots: they would give back for ever what they still hold.
+    at_start(simulation, KindCode.COMPARTMENT, plant)
+    _grants_segments(simulation)
+
+
+def _grants_segments(simulation: Simulation) -> None:
+    """Stewards grant segments that they take for their own to whoever asks."""
+
+    def plant(machine: Any) -> None:
+        def make(old: Callable[..., Reason]) -> Callable[..., Reason]:
+            return lambda key, *rest: Reason.NONE if key.kind is TokenKind.SEGMENT else old(key, *rest)
+
+        replace(machine, "may_grant", make)
+
+    in_behaviour(simulation, KindCode.COMPARTMENT, plant)
+
+
+def _sees_nobody(simulation: Simulation) -> None:
+    """Robots plan as if they were alone, and drive whatever they hold."""
+    _unasked(simulation)
+
+    def ears(_: object) -> Callable[[Message], Message | None]:
+        return lambda message: None if isinstance(message, Itinerary | Progress) and message.sender > 10 else message
+
+    hearing(simulation, KindCode.ROBOT, ears)
 
 
 def _steward_for_ever(simulation: Simulation) -> None:
@@ -34,13 +59,18 @@ def _steward_for_ever(simulation: Simulation) -> None:
 
         def make(old: Callable[..., bool]) -> Callable[..., bool]:
             # The site file says who holds a token at first; this one believes that for ever.
-            return lambda key: old(key) or (
-                key.kind is TokenKind.SEGMENT and controller.holon.site.stewards.get(key.number >> 8) == tokens.node_id
+            return lambda key: (
+                old(key)
+                or (
+                    key.kind is TokenKind.SEGMENT
+                    and controller.holon.site.stewards.get(key.number >> 8) == tokens.node_id
+                )
             )
 
         replace(tokens, "holds", make)
 
     at_start(simulation, KindCode.COMPARTMENT, plant)
+    _grants_segments(simulation)
 
 
 def _unasked(simulation: Simulation) -> None:
@@ -65,21 +95,20 @@ def _a_point(simulation: Simulation) -> None:
 
 
 def _grants_to_all(simulation: Simulation) -> None:
-    """Stewards grant from the site file alone, and robots are not asked whether they are there."""
+    """Stewards grant segments to whoever asks, and robots plan as if they were alone."""
     _steward_for_ever(simulation)
 
-    def plant(machine: Any) -> None:
-        replace(machine, "may_grant", lambda _: lambda *_arguments: Reason.NONE)
+    def ears(_: object) -> Callable[[Message], Message | None]:
+        return lambda message: None if isinstance(message, Itinerary | Progress) and message.sender > 10 else message
 
-    for kind in (KindCode.COMPARTMENT, KindCode.LIFT):
-        in_behaviour(simulation, kind, plant)
+    hearing(simulation, KindCode.ROBOT, ears)
 
 
 BUGS = (
     PlantedBug("keeps-what-it-gives", "one-holder", "a token is given and not erased", _without_erasing),
-    PlantedBug("steward-for-ever", "one-holder", "a steward believes that it holds what it gave away", _steward_for_ever),
+    PlantedBug("steward-for-ever", "one-holder", "a steward takes what it gave for its own", _steward_for_ever),
     PlantedBug("drives-unasked", "inside-authority", "a robot drives to its goal, whatever it holds", _unasked),
     PlantedBug("body-is-a-point", "inside-authority", "a robot gives slots back while its rear is in", _a_point),
     PlantedBug("grants-to-all", "one-body", "stewards grant to whoever asks", _grants_to_all),
-    PlantedBug("drives-through", "one-body", "robots drive to their goals, whoever is there", _unasked),
+    PlantedBug("drives-through", "one-body", "robots plan and drive as if they were alone", _sees_nobody),
 )

@@ -57,9 +57,7 @@ def saying(simulation: Simulation, kind: KindCode | None, said: Said) -> None:
 
     def plant(controller: Controller) -> None:
         for method in ("start", "receive", "sense", "wake"):
-            replace(
-                controller.holon, method, lambda old: lambda *arguments, **named: changed(old(*arguments, **named))
-            )
+            replace(controller.holon, method, lambda old: lambda *arguments, **named: changed(old(*arguments, **named)))
 
     at_start(simulation, kind, plant)
 

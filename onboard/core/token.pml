@@ -5,7 +5,7 @@
  * Machines crash between any two effects and start again from their journal, CRASHES times in all.
  *
  * Variants: SEND_FIRST plants a bug, the frame before the journal write. LIVE takes frames off the bus, LOSSES times,
- * and asks whether a requested token moves once that is over. TRACE leaves out the processes: what a run of the
+ * and asks whether a requested token moves once that is over; ONE_GRANT plants a bug there, a grant never repeated. TRACE leaves out the processes: what a run of the
  * controllers did is then a sequence of these same steps, and a step that the model does not have blocks.
  * Not modelled: versions that wrap, and a journal that is lost or torn.
  */
@@ -191,7 +191,9 @@ end:
     :: state_held(n)
     :: record_gone(n)
     :: confirmed(n)
+#ifndef ONE_GRANT
     :: atomic { leaving[n] != 0 && !granted[AT(leaving[n], receiver[n])] && todo[n] == IDLE -> grant_again(n) }
+#endif
     :: atomic { holds[n] && seen[n] > 0 && !stated[AT(seen[n], n)] && todo[n] == IDLE -> state_again(n) }
 #ifdef LIVE
     :: atomic { n == 1 && !holds[1] && todo[1] == IDLE && !asked -> asked = true }

@@ -50,6 +50,21 @@ def test_p56_the_joint_choice_beats_nearest_first_and_random() -> None:
     assert joint_s < 0.97 * mean_s(AnyFirst.name)
 
 
+def test_p56_the_joint_choice_is_far_better_where_there_is_more_to_choose() -> None:
+    """Three compartments and four robots: nearest-first and random took 1.3 times as long over ten seeds."""
+    site, seeds = find_site("standard"), (1, 3)
+
+    def mean_of(policy: str) -> float:
+        plays = [play(site, Demand.by_mean(30.0, 15.0, seed, count=8), policy, seed) for seed in seeds]
+        assert [(one.left, one.faults) for one in plays] == [(0, ())] * len(seeds)
+        waits = [us for one in plays for us in one.in_us + one.out_us]
+        return sum(waits) / len(waits)
+
+    joint = mean_of(JointChoice.name)
+    assert joint < 0.9 * mean_of(NearestFirst.name)
+    assert joint < 0.9 * mean_of(AnyFirst.name)
+
+
 def test_p56_the_price_of_being_decentralised_is_small() -> None:
     # Measured: 1.03 over these seeds.
     assert 0.97 < mean_s(MIP) / mean_s(JointChoice.name) < 1.10

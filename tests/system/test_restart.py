@@ -47,6 +47,21 @@ ENTRY_S = (22, 25, 27, 28, 29, 31, 33, 35, 38, 41, 44, 45, 47, 49, 51, 53, 55, 5
 EXIT_S = (214, 218, 222, 226, 230, 235, 240, 245, 250, 255, 260, 268)
 
 
+#: With the bay: the customer inside, the call, the doors, the robot at work, the hand-over.
+BAY_S = (12, 18, 24, 26, 27, 28, 30, 34, 38, 42, 46, 50, 54, 205, 209, 213, 221, 229, 245, 261, 265, 273, 281)
+RIDE_S = (27, 28, 30, 33, 36, 50, 54, 57, 214, 218, 222, 280)
+
+
+@pytest.mark.parametrize("at_s", BAY_S)
+def test_p50_a_compartment_killed_at_any_step_goes_on_with_its_customer(at_s: int) -> None:
+    assert_served(killed("IOC1", at_s))
+
+
+@pytest.mark.parametrize("at_s", RIDE_S)
+def test_p50_a_lift_killed_with_a_carrier_aboard_ends_its_ride(at_s: int) -> None:
+    assert_served(killed(LIFT, at_s))
+
+
 @pytest.mark.parametrize("at_s", ENTRY_S + EXIT_S)
 def test_p50_a_robot_killed_at_any_step_finds_its_place_and_the_car_arrives(at_s: int) -> None:
     scene = killed(ROBOT, at_s)

@@ -49,10 +49,21 @@ from onboard.core.negotiation import Awarded, CallTerms, Closed, Estimator, Nego
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site, Station
 from onboard.kinds.car_park.bay_generation import BayGeneration
+from onboard.kinds.car_park.bay_memory import (
+    BayMemory,
+    car_record,
+    job_over_record,
+    job_record,
+    ticket_record,
+    winner_record,
+)
 from onboard.kinds.car_park.stewardship import Stewardship
 
 #: A call that nobody could serve is made again after this, us. Ours.
 RETRY_US = 30_000_000
+#: After a restart the machines say again what they have in hand; a task that nobody names is called anew so much later.
+#: Ours.
+SETTLING_US = 2_000_000
 
 
 class BayPhase(Enum):
@@ -109,6 +120,7 @@ class Compartment:
     bay: BayState | None = None
     tickets: deque[Reference] = field(default_factory=deque)
     stewardship: Stewardship = field(init=False)
+    memory: BayMemory = field(init=False)
     _number: int = 0
     _sequence: int = 0
     _desk_sequence: int | None = None
@@ -119,6 +131,9 @@ class Compartment:
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
+        self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
+        self.stewardship.replay(self.memory)
+        self.tickets.extend(self.memory.tickets)
         for entry in self.fleet.entries:
             if entry.get("record") == "number":
                 self._number = int(entry["number"])
@@ -173,7 +188,16 @@ class Compartment:
         """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
         if isinstance(message, OperatorOrder) and message.compartment == self.fleet.node_id:
             return self._at_desk(_DESK_INPUT[message.action], message.car, now_us)
+        if isinstance(message, TaskReport) and message.phase is TaskPhase.AWARDED and self._waits_for(message.task):
+            # I was restarted and asked all: its winner says that the task is in hand.
+            return self._won_by(message.sender)
         return self.stewardship.hear(message)
+
+    def _waits_for(self, task: Reference) -> bool:
+        """Whether the task in hand has no known winner, and no call for it is open."""
+        return (
+            self.job is not None and self.job.task == task and not self.job.winner and self.job.retry_at_us is not None
+        )
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
@@ -186,16 +210,22 @@ class Compartment:
         if not isinstance(event, Closed) or self.job is None or event.call.task != self.job.task:
             return []
         if event.result is CallResult.AWARDED:
-            self.job.winner = event.winner
-            self.stewardship.winners[event.call.car] = event.winner
-            return []
+            return self._won_by(event.winner)
         if event.result is CallResult.REJECTED:
             # The winner gave the task back before it began: it is called anew, by the custodian of the car.
             return self._call_again(self.job, now_us)
         return self._refused(self.job, event.reason, now_us)
 
+    def _won_by(self, winner: int) -> list[Effect]:
+        assert self.job is not None
+        self.job.winner = winner
+        self.job.retry_at_us = None
+        self.stewardship.winners[self.job.car] = winner
+        return [winner_record(self.job.car, winner)]
+
     def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
         if job.operation is Operation.PARK:
+            job.retry_at_us = None
             return self._call(job, self.station.number, ANY_STATION, now_us)
         return self._fetch(job, now_us)
 
@@ -223,7 +253,7 @@ class Compartment:
 
     def next_wake(self) -> int | None:
         """When a refused call is made again."""
-        return self.job.retry_at_us if self.job is not None else None
+        return self.job.retry_at_us if self.job is not None and self.phase is BayPhase.AWAITING else None
 
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""
@@ -245,6 +275,7 @@ class Compartment:
         in_hand = self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE
         if not in_hand and car not in self.tickets:
             self.tickets.append(car)
+            return [ticket_record(car), self._desk(DeskText.PLEASE_WAIT, car)]
         return [self._desk(DeskText.PLEASE_WAIT, car)]
 
     def _desk(self, text: DeskText, car: Reference) -> Effect:
@@ -254,17 +285,35 @@ class Compartment:
     # --- the phases --------------------------------------------------------------------------------------------
 
     def _when_starting(self, now_us: int) -> list[Effect]:
+        if self.memory.job is not None:
+            return self._take_up_job(now_us)
         effects = self._door(DoorName.OUTPUT, DoorAction.CLOSE)
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return effects
         return effects + self._to_free()
 
+    def _take_up_job(self, now_us: int) -> list[Effect]:
+        """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
+        assert self.memory.job is not None
+        task, operation, car, wheelbase_mm = self.memory.job
+        self.job = BayTask(task, operation, car, wheelbase_mm, self.stewardship.winners.get(car, 0))
+        self.job.was_granted = self.memory.was_granted
+        if self.job.was_granted:
+            self._go(BayPhase.SERVING)
+            return self._when_serving(now_us)
+        if not self.job.winner:
+            # Whoever won meanwhile says so when asked, which every machine does at power-up.
+            self.job.retry_at_us = now_us + SETTLING_US
+        self._go(BayPhase.LOCKING)
+        return self._when_locking(now_us)
+
     def _to_free(self) -> list[Effect]:
+        over: list[Effect] = [job_over_record()] if self.job is not None else []
         self.job = None
         self._robot_waits = False
         self._key_pressed = False
         self._go(BayPhase.FREE)
-        return self._door(DoorName.INPUT, DoorAction.OPEN)
+        return over + self._door(DoorName.INPUT, DoorAction.OPEN)
 
     def _when_free(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.doors is not None
@@ -305,7 +354,9 @@ class Compartment:
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
         effects = self.fleet.tokens.create(car_token(*car))
         effects.append(Record({"record": "number", "number": self._number}))
-        effects += [self._state_car(car, self.station.number, bay.wheelbase_mm), self._desk(DeskText.TAKE_TICKET, car)]
+        effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
+        effects += self._state_car(car, self.station.number, bay.wheelbase_mm)
+        effects.append(self._desk(DeskText.TAKE_TICKET, car))
         effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
         self._go(BayPhase.LOCKING)
         return [*effects, self._light(LightColour.RED)]
@@ -332,7 +383,8 @@ class Compartment:
         task = Reference(self.fleet.node_id, self._number)
         self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
-        return [Record({"record": "number", "number": self._number}), *self._fetch(self.job, now_us)]
+        job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
+        return [Record({"record": "number", "number": self._number}), job, *self._fetch(self.job, now_us)]
 
     def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
         where = self._place_of(job.car)
@@ -345,7 +397,7 @@ class Compartment:
     def _when_awaiting(self, now_us: int) -> list[Effect]:
         assert self.job is not None
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
-            return self._fetch(self.job, now_us)
+            return self._call_again(self.job, now_us)
         if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         self._go(BayPhase.OPENING)
@@ -379,7 +431,7 @@ class Compartment:
         if not is_open or self.bay.load_kg or self.bay.person_inside:
             return []
         car = self.job.car
-        effects = [self._state_car(car, OUTSIDE, self.job.wheelbase_mm), self._desk(DeskText.WELCOME, Reference(0, 0))]
+        effects = [*self._state_car(car, OUTSIDE, self.job.wheelbase_mm), self._desk(DeskText.WELCOME, Reference(0, 0))]
         return effects + self._to_free()
 
     # --- inner works -------------------------------------------------------------------------------------------
@@ -391,7 +443,7 @@ class Compartment:
             return [Report(f"nobody can fetch car {job.car.number}: {reason.name}; called again in 30 s")]
         effects: list[Effect] = [
             Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
-            self._state_car(job.car, OUTSIDE, job.wheelbase_mm),
+            *self._state_car(job.car, OUTSIDE, job.wheelbase_mm),
             self._desk(DeskText.FULL, job.car),
         ]
         return effects + self._to_free()
@@ -409,11 +461,11 @@ class Compartment:
         )
         return list(self.fleet.negotiation.open(terms, now_us))
 
-    def _state_car(self, car: Reference, station: int, wheelbase_mm: int) -> Effect:
+    def _state_car(self, car: Reference, station: int, wheelbase_mm: int) -> list[Effect]:
         version = self.fleet.tokens.seen[car_token(*car)]
         statement = CarAt(self.fleet.node_id, car, station, version, wheelbase_mm)
         self.fleet.mirror.on_car(statement)
-        return Send(statement)
+        return [car_record(statement), Send(statement)]
 
     def _door(self, door: DoorName, action: DoorAction) -> list[Effect]:
         """Order a door once; the plant's interlock refuses what must not be, and the phase then waits."""

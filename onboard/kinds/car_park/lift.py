@@ -19,6 +19,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine, Site
+from onboard.kinds.car_park.bay_memory import BayMemory
 from onboard.kinds.car_park.lift_generation import LiftGeneration
 from onboard.kinds.car_park.stewardship import Stewardship
 
@@ -83,6 +84,7 @@ class Lift:
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
+        self.stewardship.replay(BayMemory(self.fleet.node_id).read(self.fleet.entries))
         self._table = {
             LiftPhase.STARTING: self._when_starting,
             LiftPhase.FREE: self._when_free,

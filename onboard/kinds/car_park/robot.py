@@ -237,6 +237,9 @@ class Robot:
         itinerary = self.fleet.mirror.itineraries.get(self.fleet.node_id)
         if itinerary is not None:
             effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.current)]
+        # An initiator that was restarted learns that its task is in hand.
+        to_take = [work for work in self.program.works() if work.handling is Handling.TAKE]
+        effects += [self._report(work.call.task, TaskPhase.AWARDED, work.station.number) for work in to_take]
         return effects + self.fleet.tokens.statements()
 
     # --- steps -------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TokenGrant
 from onboard.core.petitions import UNORDERED
 from onboard.core.site import Segment
+from onboard.kinds.car_park.bay_memory import BayMemory, car_record, winner_record
 
 #: Calls remembered to know which car an award is about; older ones are long closed.
 MAX_CALLS = 64
@@ -22,6 +23,13 @@ class Stewardship:
     winners: dict[Reference, int] = field(default_factory=dict)
     _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
 
+    def replay(self, memory: BayMemory) -> None:
+        """Take up what the journal tells of the cars that are in my custody still."""
+        self.winners.update(memory.winners)
+        for car, statement in memory.cars.items():
+            if self.fleet.tokens.holds(car_token(*car)):
+                self.fleet.mirror.on_car(statement)
+
     def hear(self, message: Message) -> list[Effect]:
         """Learn from calls and awards; state a car anew when its token has come to me."""
         match message:
@@ -31,8 +39,9 @@ class Stewardship:
                     del self._cars_of_calls[next(iter(self._cars_of_calls))]
             case Award() if message.result is CallResult.AWARDED:
                 car = self._cars_of_calls.get((message.sender, message.call))
-                if car is not None:
+                if car is not None and self.winners.get(car) != message.winner:
                     self.winners[car] = message.winner
+                    return [winner_record(car, message.winner)]
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._take_custody(Reference(message.token >> 16, message.token & 0xFFFF), message.version)
         return []
@@ -60,7 +69,7 @@ class Stewardship:
             return []
         self.winners.pop(car, None)
         statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
-        return [Send(statement)] if self.fleet.mirror.on_car(statement) else []
+        return [car_record(statement), Send(statement)] if self.fleet.mirror.on_car(statement) else []
 
     def _passing_order(self, segment: Segment, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Tokens go in the plan's order, as its holder and the requester both see it; without one to the oldest."""

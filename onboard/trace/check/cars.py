@@ -150,6 +150,10 @@ class OneCustodian(Rule):
         token = Token(TokenKind.CAR, _number(said.car))
         handover = self.picture.tokens.under(token, said.version)
         custodian = handover.holder if handover is not None else said.car.origin if said.version == 1 else None
+        last = self.picture.tokens.last(token)
+        if custodian is None and last is not None and is_newer(said.version, last.version, VERSION_BITS):
+            what = f"states car {said.car.origin}.{said.car.number} under version {said.version}, which nobody gave"
+            self.find(event, (said.sender, last.holder), what)
         self.picture.unjudged += custodian is None
         if custodian not in (None, said.sender):
             car = f"car {said.car.origin}.{said.car.number}"

@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import DoorPosition, Side
-from onboard.core.messages import BayState, DoorState, ShuttleState
+from onboard.core.codes import DoorAction, DoorName, DoorPosition
+from onboard.core.messages import BayState, DoorOrder, DoorState, ShuttleState
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
+
+_Seen = Event[DoorState] | Event[BayState] | Event[ShuttleState]
 
 
 class Doors(Rule):
@@ -24,11 +26,30 @@ class Doors(Rule):
         super().__init__(picture, report)
         self._doors: dict[int, DoorState] = {}
         self._inside: dict[int, bool] = {}
+        self._shuttles: dict[int, ShuttleState] = {}
         self._told: set[tuple[int, str]] = set()
 
     def handlers(self) -> Handlers:
         """Doors, bays and shuttles."""
-        return {DoorState: self._on_doors, BayState: self._on_bay, ShuttleState: self._on_shuttle}
+        return {
+            DoorState: self._on_doors,
+            DoorOrder: self._on_order,
+            BayState: self._on_bay,
+            ShuttleState: self._on_shuttle,
+        }
+
+    def _on_order(self, event: Event[DoorOrder]) -> None:
+        """A door is told to open only while the other one is locked, and the inner one with nobody inside."""
+        order = event.message
+        doors = self._doors.get(order.sender)
+        if doors is None or order.action is not DoorAction.OPEN:
+            return
+        inner = order.door is DoorName.OUTPUT
+        other = doors.input_door if inner else doors.output_door
+        if other is not DoorPosition.LOCKED:
+            self.find(event, (order.sender,), f"{order.door.name} is told to open while the other is {other.name}")
+        elif inner and self._inside.get(order.sender):
+            self.find(event, (order.sender,), "the output door is told to open with a person inside")
 
     def _on_doors(self, event: Event[DoorState]) -> None:
         state = event.message
@@ -37,28 +58,40 @@ class Doors(Rule):
         both = state.input_door is not locked and state.output_door is not locked
         self._state(event, state.sender, "neither door is locked", holds=both)
         self._judge_person(event, state.sender)
+        self._judge_shuttles(event, state.sender)
 
     def _on_bay(self, event: Event[BayState]) -> None:
-        self._inside[event.message.sender] = event.message.person_inside
+        node, inside = event.message.sender, event.message.person_inside
+        doors, before = self._doors.get(node), self._inside.get(node, inside)
+        if doors is not None and inside is not before and doors.input_door is not DoorPosition.OPEN:
+            self.find(event, (node,), f"a person passes the input door, which is {doors.input_door.name}")
+        self._inside[node] = inside
         self._judge_person(event, event.message.sender)
 
-    def _judge_person(self, event: Event[DoorState] | Event[BayState], node: int) -> None:
+    def _judge_person(self, event: _Seen, node: int) -> None:
         doors = self._doors.get(node)
         holds = doors is not None and self._inside.get(node, False) and doors.output_door is not DoorPosition.LOCKED
         self._state(event, node, "a person is inside while the output door is not locked", holds=holds)
 
     def _on_shuttle(self, event: Event[ShuttleState]) -> None:
-        state = event.message
-        body = self.picture.bodies.get(state.sender)
-        if body is None or not state.extension_mm or not self.picture.has_site:
-            return
-        for node, bay in self.picture.site.compartments.items():
-            beside = (bay.track, bay.index, bay.side) == (body.track, body.index, Side(state.side))
-            doors = self._doors.get(node)
-            if beside and doors is not None and doors.output_door is not DoorPosition.OPEN:
-                self.find(event, (state.sender, node), f"a shuttle is in the bay, its door {doors.output_door.name}")
+        self._shuttles[event.message.sender] = event.message
+        if self.picture.has_site:
+            for node in self.picture.site.compartments:
+                self._judge_shuttles(event, node)
 
-    def _state(self, event: Event[DoorState] | Event[BayState], node: int, what: str, *, holds: bool) -> None:
+    def _judge_shuttles(self, event: _Seen, node: int) -> None:
+        """No shuttle is in a bay whose output door is not open."""
+        doors = self._doors.get(node)
+        if doors is None or not self.picture.has_site or node not in self.picture.site.compartments:
+            return
+        bay = self.picture.site.compartments[node]
+        for robot, state in self._shuttles.items():
+            body = self.picture.bodies.get(robot)
+            inside = body is not None and (body.track, body.index, state.side) == bay and state.extension_mm > 0
+            what = f"the shuttle of {robot} is in the bay while its door is not open"
+            self._state(event, node, what, holds=inside and doors.output_door is not DoorPosition.OPEN)
+
+    def _state(self, event: _Seen, node: int, what: str, *, holds: bool) -> None:
         if holds and (node, what) not in self._told:
             self._told.add((node, what))
             self.find(event, (node,), what)

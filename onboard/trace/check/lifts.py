@@ -10,7 +10,7 @@ from onboard.core.codes import DriveMode, KindCode
 from onboard.core.messages import DriveOrder, DriveState, Message, PlatformState, Progress
 from onboard.core.site import Segment
 from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.geometry import GATE_INDEX, Body, body_of, floor_of, lifts_under, occupied, token_of
+from onboard.trace.check.geometry import GATE_INDEX, Body, body_of, floor_of, lifts_under, occupied, swept, token_of
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 
@@ -118,19 +118,36 @@ class PlatformThere(Rule):
     source = "docs/decisions.md, A lift's platform and its gate are two tokens"
     needs_site = True
 
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._told: set[int] = set()
+
     def handlers(self) -> Handlers:
-        """Where robots are."""
-        return {Progress: self._on_progress}
+        """Where robots are, and with device buses where they are sent."""
+        return {Progress: self._on_progress, DriveOrder: self._on_order}
 
     def _on_progress(self, event: Event[Progress]) -> None:
-        site = self.picture.site
-        body = body_of(site, event.message, event.time_us)
+        body = body_of(self.picture.site, event.message, event.time_us)
+        if body is not None and self.picture.kind(body.node) is KindCode.ROBOT:
+            self._judge(event, body, occupied(self.picture.site, body), "is over")
+
+    def _on_order(self, event: Event[DriveOrder]) -> None:
+        body = self.picture.bodies.get(event.message.sender)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        for slot in occupied(site, body):
+        body = self.picture.on_floor(body)
+        self._judge(event, body, swept(self.picture.site, body, event.message.target_mm), "is sent over")
+
+    def _judge(self, event: Event[Message], body: Body, slots: list[Segment], how: str) -> None:
+        site, wrong = self.picture.site, False
+        for slot in slots:
             lift = self.picture.bodies.get(site.stewards.get(slot.track, 0))
             if slot.index != GATE_INDEX or lift is None or lift.track != slot.track:
                 continue
             if lift.speed_mm_s or floor_of(site, lift) != body.track:
+                wrong = True
                 where = "moves" if lift.speed_mm_s else f"is at floor {floor_of(site, lift)}"
-                self.find(event, (body.node, lift.node), f"over the sill of floor {body.track} while the lift {where}")
+                if body.node not in self._told:
+                    what = f"{how} the sill of floor {body.track} while the lift {where}"
+                    self.find(event, (body.node, lift.node), what)
+        (self._told.add if wrong else self._told.discard)(body.node)

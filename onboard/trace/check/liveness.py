@@ -87,6 +87,7 @@ class SomethingHappens(_OpenTasks):
         super().__init__(picture, report)
         self._last: Event[Message] | None = None
         self._told = False
+        self._award: tuple[int, int] | None = None
         self._limit_us = IDLE_WITHIN_US + longest_motion_us(picture.site)
 
     def handlers(self) -> Handlers:
@@ -115,7 +116,10 @@ class SomethingHappens(_OpenTasks):
     def on_award(self, event: Event[Award]) -> None:
         """A task finds its machine."""
         super().on_award(event)
-        if event.message.winner and event.message.result is CallResult.AWARDED:
+        award = event.message
+        if award.winner and award.result is CallResult.AWARDED and self._award != (award.sender, award.call):
+            # Said again and again it moves nothing.
+            self._award = (award.sender, award.call)
             self._happened(event)
 
     def _happened(self, event: Event[Message]) -> None:

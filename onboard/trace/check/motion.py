@@ -11,7 +11,6 @@ from onboard.trace.check.geometry import (
     TOLERANCE_MM,
     Body,
     body_of,
-    floor_of,
     lifts_under,
     occupied,
     swept,
@@ -60,17 +59,9 @@ class InsideAuthority(Rule):
         sensed_mm = self._sensed_mm.get(event.message.sender)
         if body is None or sensed_mm is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        body = replace(self._where_now(body), position_mm=sensed_mm)
+        body = replace(self.picture.on_floor(body), position_mm=sensed_mm)
         if self.picture.site.tracks[body.track].kind is TrackKind.ALLEY:
             self._judge(event, body, swept(self.picture.site, body, event.message.target_mm), "is sent through")
-
-    def _where_now(self, body: Body) -> Body:
-        """A carrier on a platform is at the floor where its lift is, which it tells only when it moves on."""
-        lift_track = self.picture.site.platforms.get(Segment(body.track, body.index))
-        if lift_track is None:
-            return body
-        lift = self.picture.bodies.get(self.picture.site.stewards[lift_track])
-        return body if lift is None else replace(body, track=floor_of(self.picture.site, lift))
 
     def _judge(self, event: Event[Progress] | Event[DriveOrder], body: Body, slots: list[Segment], how: str) -> None:
         tokens = self.picture.tokens

@@ -1,11 +1,13 @@
 """What has been on a bus so far, for all rules together. A rule is shown an event before the picture takes it up."""
 
+from dataclasses import replace
+
 from onboard.core.codes import KindCode, MachineState
 from onboard.core.messages import BusTime, Heartbeat, Message, Progress, TokenGrant, TokenHeld
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Site
+from onboard.core.site import Segment, Site
 from onboard.trace.check.event import Event
-from onboard.trace.check.geometry import Body, body_of
+from onboard.trace.check.geometry import Body, body_of, floor_of
 from onboard.trace.check.tokens_seen import TokensSeen
 
 #: A machine that was not heard for so long counts as silent, us: three missing heartbeats (dbc/fleet.dbc).
@@ -62,6 +64,12 @@ class Picture:
     def is_alive(self, node: int, boot: int | None) -> bool:
         """Whether a machine is heard and still in the life that had this boot counter; None for not known."""
         return self.boots.get(node) == boot and self.now_us - self.heard_us.get(node, 0) <= SILENT_US
+
+    def on_floor(self, body: Body) -> Body:
+        """A carrier on a platform is at the floor where its lift is, which it tells only when it moves on."""
+        lift_track = self.site.platforms.get(Segment(body.track, body.index))
+        lift = self.bodies.get(self.site.stewards[lift_track]) if lift_track is not None else None
+        return body if lift is None else replace(body, track=floor_of(self.site, lift))
 
     def feed(self, event: Event[Message]) -> None:
         """Take up one message."""

@@ -88,6 +88,8 @@ class TornCar(Rule):
         busy = seen.state.mode in (ShuttleMode.GRIPPING, ShuttleMode.RELEASING)
         if busy and order.action in (ShuttleAction.REACH, ShuttleAction.RETRACT):
             self.find(event, (order.sender,), f"{order.action.name} while {seen.state.mode.name}")
+        if order.action is ShuttleAction.REACH and seen.is_out and order.side is not seen.state.side:
+            self.find(event, (order.sender,), f"REACH to the other side while {seen.state.mode.name}")
         if order.action is ShuttleAction.GRIP:
             self._judge_grip(event, self._station(order.sender, seen.state))
 

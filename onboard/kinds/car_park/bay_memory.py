@@ -1,0 +1,91 @@
+"""What the journal of a fixed machine keeps of cars and tasks, and what it tells after a restart.
+
+A steward remembers where the cars in its custody stand and who won which; a compartment its task, whether the winner
+has had the bay, and the tickets that wait. Written before it is said (design, section 5).
+"""
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey
+from onboard.core.codes import Operation
+from onboard.core.effects import Record
+from onboard.core.messages import CarAt, Reference
+
+Entry = Mapping[str, str | int]
+
+
+def car_record(statement: CarAt) -> Record:
+    """Where a car in my custody stands, as it is told."""
+    entry: dict[str, str | int] = {"record": "car_at", "car_origin": statement.car.origin, "car": statement.car.number}
+    entry |= {"station": statement.station, "version": statement.version, "wheelbase_mm": statement.wheelbase_mm}
+    return Record(entry)
+
+
+def winner_record(car: Reference, winner: int) -> Record:
+    """Who may fetch a car."""
+    return Record({"record": "winner", "car_origin": car.origin, "car": car.number, "winner": winner})
+
+
+def ticket_record(car: Reference) -> Record:
+    """A ticket came; its car is to be fetched."""
+    return Record({"record": "ticket", "car_origin": car.origin, "car": car.number})
+
+
+def job_record(task: Reference, operation: Operation, car: Reference, wheelbase_mm: int) -> Record:
+    """The bay's task begins."""
+    entry: dict[str, str | int] = {"record": "job", "task_origin": task.origin, "task": task.number}
+    entry |= {"operation": int(operation), "car_origin": car.origin, "car": car.number, "wheelbase_mm": wheelbase_mm}
+    return Record(entry)
+
+
+def job_over_record() -> Record:
+    """The bay is free again."""
+    return Record({"record": "job_over"})
+
+
+@dataclass
+class BayMemory:
+    """The journal of a fixed machine, read from its oldest entry on. ``bay`` is a compartment's own station token."""
+
+    node_id: int
+    bay: TokenKey | None = None
+    cars: dict[Reference, CarAt] = field(default_factory=dict)
+    winners: dict[Reference, int] = field(default_factory=dict)
+    tickets: deque[Reference] = field(default_factory=deque)
+    #: Task, operation, car and wheelbase of the task in hand, or None.
+    job: tuple[Reference, Operation, Reference, int] | None = None
+    #: Whether the winner has had the bay since the task began.
+    was_granted: bool = False
+
+    def read(self, entries: Iterable[Entry]) -> "BayMemory":
+        """Take up all entries; those of other kinds are passed over."""
+        for entry in entries:
+            self._take(entry)
+        return self
+
+    def _take(self, entry: Entry) -> None:
+        match entry.get("record"):
+            case "car_at":
+                numbers = int(entry["station"]), int(entry["version"]), int(entry["wheelbase_mm"])
+                self.cars[_car(entry)] = CarAt(self.node_id, _car(entry), *numbers)
+                self.winners.pop(_car(entry), None)
+            case "winner":
+                self.winners[_car(entry)] = int(entry["winner"])
+            case "ticket":
+                self.tickets.append(_car(entry))
+            case "job":
+                operation = Operation(int(entry["operation"]))
+                task = Reference(int(entry["task_origin"]), int(entry["task"]))
+                self.job, self.was_granted = (task, operation, _car(entry), int(entry["wheelbase_mm"])), False
+                if operation is Operation.RETRIEVE and _car(entry) in self.tickets:
+                    self.tickets.remove(_car(entry))
+            case "job_over":
+                self.job = None
+            case "token_given" if self.bay == (int(entry["kind"]), int(entry["number"])):
+                self.was_granted = True
+
+
+def _car(entry: Entry) -> Reference:
+    return Reference(int(entry["car_origin"]), int(entry["car"]))

@@ -1,0 +1,161 @@
+"""Rules of authority: tokens, motion, bodies, lifts."""
+
+import pytest
+
+from onboard.core.codes import DriveMode, TokenKind
+from onboard.core.messages import DriveOrder, DriveState, Message, PlatformState, TokenHeld
+from onboard.core.site import Segment
+from tests.trace.checking import (
+    ER1,
+    GATE,
+    LIFT,
+    MR1,
+    MR2,
+    PLATFORM,
+    Tape,
+    at,
+    grant,
+    one_alley,
+    two_floors,
+)
+
+SLOT = Segment(1, 10)
+
+
+def held(node: int, version: int) -> TokenHeld:
+    return TokenHeld(node, TokenKind.SEGMENT, SLOT.number, version)
+
+
+# --- one holder --------------------------------------------------------------------------------------------------------
+
+GOOD_HANDOVERS: dict[str, list[Message]] = {
+    "there and back": [grant(SLOT, 1, 1, MR1), held(MR1, 1), grant(SLOT, 2, MR1, 1), grant(SLOT, 3, 1, MR2)],
+    "said again": [grant(SLOT, 1, 1, MR1), grant(SLOT, 1, 1, MR1), grant(SLOT, 2, MR1, 1), grant(SLOT, 1, 1, MR1)],
+    "overtaken by the next grant": [grant(SLOT, 1, 1, MR1), grant(SLOT, 2, MR1, 1), held(MR1, 1)],
+}
+
+
+@pytest.mark.parametrize("messages", GOOD_HANDOVERS.values(), ids=GOOD_HANDOVERS.keys())
+def test_a_right_may_move_by_its_holder_and_be_said_again(messages: list[Message]) -> None:
+    assert Tape(one_alley()).say(1, *messages).broken() == {}
+
+
+BAD_HANDOVERS: dict[str, list[Message]] = {
+    "given by one that never had it": [grant(SLOT, 1, MR2, MR1)],
+    "given to two": [grant(SLOT, 1, 1, MR1), grant(SLOT, 1, 1, MR2)],
+    "taken back": [grant(SLOT, 1, 1, MR1), grant(SLOT, 2, 1, MR2)],
+    "a version left out": [grant(SLOT, 1, 1, MR1), grant(SLOT, 3, MR1, 1)],
+    "held by another": [grant(SLOT, 1, 1, MR1), held(MR2, 1)],
+    "held without a grant": [grant(SLOT, 1, 1, MR1), held(MR2, 2)],
+    "given to itself": [grant(SLOT, 1, 1, 1)],
+}
+
+
+@pytest.mark.parametrize("messages", BAD_HANDOVERS.values(), ids=BAD_HANDOVERS.keys())
+def test_two_holders_are_found(messages: list[Message]) -> None:
+    assert Tape(one_alley()).say(1, *messages).broken() == {"one-holder": 1}
+
+
+def test_a_right_that_was_given_on_is_not_claimed_later() -> None:
+    tape = Tape(one_alley()).say(1, grant(SLOT, 1, 1, MR1), grant(SLOT, 2, MR1, 1))
+    assert tape.say(3, held(MR1, 1)).broken() == {"one-holder": 1}
+
+
+def test_a_log_that_begins_in_the_middle_takes_the_first_word_for_granted() -> None:
+    tape = Tape(one_alley(), started=False).say(1, grant(SLOT, 7, MR2, MR1), grant(SLOT, 8, MR1, 1))
+    assert tape.broken() == {}
+
+
+def test_versions_wrap_and_leave_0_out() -> None:
+    tape = Tape(one_alley(), started=False).say(1, grant(SLOT, 65535, 1, MR1), grant(SLOT, 1, MR1, 1))
+    assert tape.broken() == {}
+
+
+# --- motion ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_body_moves_in_what_it_holds_with_its_braking_distance() -> None:
+    tape = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, grant(Segment(1, 11), 1, MR2, MR1))
+    tape.say(3, at(MR1, 1, 12, -600, -500), at(MR1, 1, 11))
+    assert tape.broken() == {}
+
+
+@pytest.mark.parametrize(
+    "where",
+    [at(MR1, 1, 11), at(MR1, 1, 12, -600), at(MR1, 1, 12, 0, -1000)],
+    ids=["in another's slot", "half in it", "too fast to stop before it"],
+)
+def test_a_body_outside_its_authority_is_found_once(where: Message) -> None:
+    tape = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, where, where)
+    assert tape.broken() == {"inside-authority": 1}
+
+
+def test_a_slot_given_back_too_early_is_found() -> None:
+    tape = Tape(one_alley()).say(1, grant(Segment(1, 11), 1, MR2, MR1), grant(Segment(1, 12), 1, MR1, 1))
+    assert tape.say(1.05, at(MR1, 1, 12, -600)).broken() == {}, "frames may overtake each other"
+    tape = Tape(one_alley()).say(1, grant(Segment(1, 11), 1, MR2, MR1), grant(Segment(1, 12), 1, MR1, 1))
+    assert tape.say(2, at(MR1, 1, 12, -600)).broken() == {"inside-authority": 1}
+
+
+def test_a_drive_is_sent_no_farther_than_the_machine_may_go() -> None:
+    tape = Tape(one_alley()).say(1, at(MR1, 1, 12), DriveState(MR1, 0, 26400, 0, DriveMode.STANDING, at_mark=True))
+    tape.say(2, DriveOrder(MR1, 1, 26400, 1500))
+    assert tape.say(3, DriveOrder(MR1, 2, 24000, 1500)).broken() == {"inside-authority": 1}
+
+
+def test_where_nobody_knows_the_holder_nothing_is_judged_but_counted() -> None:
+    verdict = Tape(one_alley(), started=False).say(1, at(MR1, 1, 5)).verdict()
+    assert verdict.is_good and verdict.unjudged
+
+
+def test_two_bodies_closer_than_a_carrier_are_found() -> None:
+    tape = Tape(one_alley()).say(1, at(MR1, 1, 12), at(MR2, 1, 11))
+    assert tape.broken() == {}
+    tape = Tape(one_alley(), started=False).say(1, at(MR1, 1, 12, -600), at(MR2, 1, 11))
+    assert tape.broken() == {"one-body": 1}
+
+
+def test_two_bodies_on_one_platform_are_found_whatever_their_floors() -> None:
+    tape = Tape(two_floors(), started=False).say(1, at(ER1, LIFT, 1), at(MR1, 1, 0), at(MR2, 2, 0))
+    assert tape.broken() == {"one-body": 1}
+
+
+# --- lifts -------------------------------------------------------------------------------------------------------------
+
+
+def test_a_lift_moves_with_its_gate() -> None:
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), at(ER1, LIFT, 1, 300, 500), at(ER1, LIFT, 2))
+    assert tape.broken() == {}
+
+
+def test_a_lift_that_moves_while_a_robot_has_its_gate_is_found() -> None:
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), grant(GATE, 1, ER1, MR2))
+    assert tape.say(2, at(ER1, LIFT, 1, 300, 500)).broken() == {"lift-by-gate": 1}
+
+
+def test_a_lift_that_is_sent_while_a_robot_has_its_gate_is_found() -> None:
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), grant(GATE, 1, ER1, MR2))
+    assert tape.say(2, DriveOrder(ER1, 1, 2500, 1000)).broken() == {"lift-by-gate": 1}
+
+
+def test_a_lift_crushing_what_overhangs_its_sill_is_found_by_its_curtain() -> None:
+    curtain = PlatformState(ER1, carrier_aboard=False, crossing=True, load_kg=0)
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), curtain)
+    assert tape.say(2, DriveOrder(ER1, 1, 2500, 1000)).broken() == {"lift-crush": 1}
+    free = PlatformState(ER1, carrier_aboard=True, crossing=False, load_kg=0)
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), curtain, free)
+    assert tape.say(2, DriveOrder(ER1, 1, 2500, 1000)).broken() == {}
+
+
+def test_a_lift_crushing_what_overhangs_its_sill_is_found_from_the_fleet_bus_alone() -> None:
+    rights = [grant(slot, 1, node, MR2) for slot, node in ((Segment(1, 1), 1), (PLATFORM, ER1), (GATE, ER1))]
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), *rights).say(2, at(MR2, 1, 0, 600))
+    assert tape.say(3, at(ER1, LIFT, 1, 300, 500)).broken() == {"lift-by-gate": 1, "lift-crush": 1}
+
+
+def test_a_robot_over_the_sill_of_an_empty_shaft_is_found() -> None:
+    rights = [grant(slot, 1, node, MR2) for slot, node in ((Segment(1, 1), 1), (PLATFORM, ER1), (GATE, ER1))]
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 1), *rights).say(2, at(MR2, 1, 0, 600))
+    assert tape.broken() == {}
+    tape = Tape(two_floors()).say(1, at(ER1, LIFT, 2), *rights).say(2, at(MR2, 1, 0, 600))
+    assert tape.broken() == {"platform-there": 1}
