@@ -13,7 +13,7 @@ ARGS ?=
 PYTEST_ARGS ?=
 export REQUIRE
 
-.PHONY: help run test lint format bench docs clean
+.PHONY: help run test lint format models bench docs clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
@@ -33,6 +33,9 @@ lint: $(VENV)/.test ## set up, then ruff (rules and format) and mypy --strict
 format: $(VENV)/.test ## put the sources into ruff's format and mend what ruff can mend safely
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+models: $(VENV)/.test ## check the Promela models with SPIN, and runs of the controllers against them
+	$(BIN)/python -m pytest tests/models
 
 bench: $(VENV)/.test ## all figures of bench/, one table each
 	@set -e; for script in bench/[!_]*.py; do \

@@ -10,6 +10,8 @@ import pytest
 PACKAGES = {
     "asc2log": "can-utils",
     "candump": "can-utils",
+    "gcc": "gcc libc6-dev",
+    "spin": "spin",
     "canplayer": "can-utils",
     "log2asc": "can-utils",
     "tshark": "tshark",

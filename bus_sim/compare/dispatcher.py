@@ -15,9 +15,6 @@ from onboard.core.negotiation import CallKey
 from onboard.kinds.car_park.robot import Robot
 from onboard.wire.codec import fleet_codec
 
-#: A robot counts as free so long before its last work ends, us: its next way then follows without a stop, and lifts
-#: come in time. Ours: 30 and 60 s serve alike, 15 s and less worse.
-AHEAD_US = 30_000_000
 #: Everybody has read a frame so long after it was heard, us. Ours.
 SETTLING_US = 2_000
 #: Open tasks are looked at again at least this often, us. Ours.
@@ -77,7 +74,10 @@ class Dispatcher:
             self._refuse_hopeless(scene)
         if self._decided:
             self._order(self._decided.pop(0))
-        soon_us = [when_us + max(self._free_in_us(node, when_us) - AHEAD_US, SETTLING_US) for node in self._robots()]
+        soon_us = [
+            when_us + max(self._free_in_us(node, when_us) - self._policy.ahead_us, SETTLING_US)
+            for node in self._robots()
+        ]
         later_us = [free_us for free_us in soon_us if free_us > when_us + SETTLING_US]
         self._look_at(min([*later_us, when_us + TICK_US]))
 
@@ -107,7 +107,7 @@ class Dispatcher:
         robots = {node: robot for node, robot in self._robots().items() if node not in self._ordered}
         now_us = max((self._bus_us(node, loop_us) for node in robots), default=loop_us)
         planners = {node: robot.generation for node, robot in robots.items()}
-        free = tuple(node for node in robots if self._free_in_us(node, loop_us) <= AHEAD_US)
+        free = tuple(node for node in robots if self._free_in_us(node, loop_us) <= self._policy.ahead_us)
         tasks = tuple(OpenTask(call, self._waiting(call.sender)) for call in self._open.values())
         return Scene(Prospect(planners, now_us, {}), free, tasks)
 

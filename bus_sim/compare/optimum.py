@@ -10,7 +10,7 @@ from typing import Any
 from bus_sim.compare.small_case import Case, earliest_finish, play_case
 
 #: Bound of one search in CP-SAT's deterministic time (about seconds): a wall-time bound would not replay.
-MAX_EFFORT = 120.0
+MAX_EFFORT = 60.0
 
 
 class OptimumError(RuntimeError):

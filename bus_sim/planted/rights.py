@@ -8,7 +8,7 @@ from bus_sim.planted.tools import at_start, hearing, in_behaviour, replace
 from bus_sim.run import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, Reason, TokenKind
-from onboard.core.messages import Itinerary, Message, Progress
+from onboard.core.messages import CallForProposals, Itinerary, Message, Progress
 
 
 def _without_erasing(simulation: Simulation) -> None:
@@ -43,14 +43,35 @@ def _grants_segments(simulation: Simulation) -> None:
     in_behaviour(simulation, KindCode.COMPARTMENT, plant)
 
 
+def _alone(simulation: Simulation) -> None:
+    """Robots plan as if they were alone, and those with even node-IDs answer no call: they stand in the way."""
+
+    def ears(controller: Controller) -> Callable[[Message], Message | None]:
+        stands = controller.holon.node_id % 2 == 0
+
+        def hear(message: Message) -> Message | None:
+            if isinstance(message, Itinerary | Progress):
+                kind = simulation.site.machines[message.sender].kind
+                return None if kind is KindCode.ROBOT else message
+            return None if stands and isinstance(message, CallForProposals) else message
+
+        return hear
+
+    hearing(simulation, KindCode.ROBOT, ears)
+
+
 def _sees_nobody(simulation: Simulation) -> None:
     """Robots plan as if they were alone, and drive whatever they hold."""
     _unasked(simulation)
+    _alone(simulation)
 
-    def ears(_: object) -> Callable[[Message], Message | None]:
-        return lambda message: None if isinstance(message, Itinerary | Progress) and message.sender > 10 else message
 
-    hearing(simulation, KindCode.ROBOT, ears)
+def _version_not_raised(simulation: Simulation) -> None:
+    def plant(controller: Controller) -> None:
+        tokens = controller.holon.tokens
+        replace(tokens, "_grant", lambda old: lambda key, version, to: old(key, version - 1, to))
+
+    at_start(simulation, None, plant)
 
 
 def _steward_for_ever(simulation: Simulation) -> None:
@@ -97,16 +118,13 @@ def _a_point(simulation: Simulation) -> None:
 def _grants_to_all(simulation: Simulation) -> None:
     """Stewards grant segments to whoever asks, and robots plan as if they were alone."""
     _steward_for_ever(simulation)
-
-    def ears(_: object) -> Callable[[Message], Message | None]:
-        return lambda message: None if isinstance(message, Itinerary | Progress) and message.sender > 10 else message
-
-    hearing(simulation, KindCode.ROBOT, ears)
+    _alone(simulation)
 
 
 BUGS = (
-    PlantedBug("keeps-what-it-gives", "one-holder", "a token is given and not erased", _without_erasing),
-    PlantedBug("steward-for-ever", "one-holder", "a steward takes what it gave for its own", _steward_for_ever),
+    PlantedBug("version-not-raised", "one-holder", "a token is given under the version it had", _version_not_raised),
+    PlantedBug("steward-for-ever", "one-holder", "a steward takes others' slots for its own", _grants_to_all),
+    PlantedBug("keeps-what-it-gives", "doors", "a compartment gives its bay and does not erase it", _without_erasing),
     PlantedBug("drives-unasked", "inside-authority", "a robot drives to its goal, whatever it holds", _unasked),
     PlantedBug("body-is-a-point", "inside-authority", "a robot gives slots back while its rear is in", _a_point),
     PlantedBug("grants-to-all", "one-body", "stewards grant to whoever asks", _grants_to_all),

@@ -8,6 +8,7 @@ times are ours: plausible, and measured nowhere.
 from dataclasses import dataclass
 
 from onboard.config.reader import Table
+from onboard.core.negotiation.bidding import slot_length_us
 from onboard.core.site import Axis, CarLimits, Timing
 
 #: Longest classic frame with 29-bit identifier and 8 data bytes, bits (Davis, Burns, Bril and Lukkien 2007).
@@ -70,11 +71,13 @@ def _read_cars(table: Table) -> CarLimits:
     return limits
 
 
-def read_timing(table: Table, robots: int, bitrate: int) -> Timing:
+def read_timing(table: Table, robots: int, machines: int, bitrate: int) -> Timing:
     """``[timing]``, written in ms.
 
     The bidding delay W (design, section 4) is at least 3 N times the bus latency, N the robots and the latency that
-    of two longest frames: one that has just begun to be sent, and one's own.
+    of two longest frames: one that has just begun to be sent, and one's own. The window must hold W, then one round of
+    all machines' slots (``core.negotiation.bidding``), for a bid waits for its slot after W, and two guards, for no bid
+    is sent after the second.
     """
     least_ms = -(-3 * robots * 2 * WORST_FRAME_BITS * 1000 // bitrate)
     window_ms = table.integer("call_window_ms", 50, 60_000, 1_000)
@@ -84,10 +87,15 @@ def read_timing(table: Table, robots: int, bitrate: int) -> Timing:
     if delay_ms < least_ms:
         what = f"shorter than 3 N times two frames at {bitrate} bit/s, N = {robots} robots"
         table.bad("bid_delay_ms", delay_ms, what, f"write at least {least_ms}")
-    if delay_ms + guard_ms >= window_ms and not table.wrong:
+    round_ms = -(-machines * slot_length_us(bitrate) // 1000)
+    needed_ms = delay_ms + round_ms + 2 * guard_ms
+    if needed_ms >= window_ms and not table.wrong:
         name = next((one for one in ("call_window_ms", "bid_delay_ms") if one in table.values), "deadline_guard_ms")
-        what = f"no room for bid_delay_ms {delay_ms} and deadline_guard_ms {guard_ms} in call_window_ms {window_ms}"
-        table.bad(name, table.values.get(name), what, f"write call_window_ms = {delay_ms + guard_ms + 1} or more")
+        what = (
+            f"no room for bid_delay_ms {delay_ms}, {round_ms} ms of slots and twice deadline_guard_ms {guard_ms} in "
+            f"call_window_ms {window_ms}"
+        )
+        table.bad(name, table.values.get(name), what, f"write call_window_ms = {needed_ms + 1} or more")
     return Timing(
         window_ms * 1000,
         delay_ms * 1000,

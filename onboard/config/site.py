@@ -41,7 +41,7 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     stewards = read_stewards(root.table("stewards"), layout, fleet)
     constants = read_constants(root, lift, layout.pitch_mm)
     robots = sum(1 for machine in fleet.by_node.values() if machine.kind is KindCode.ROBOT)
-    timing = read_timing(root.table("timing"), robots, bitrate)
+    timing = read_timing(root.table("timing"), robots, len(fleet.by_node), bitrate)
     negotiation = root.table("negotiation")
     rides = RideCalls(negotiation.choice("rides", [one.value for one in RideCalls], "after"))
     timing = replace(timing, sub_call_percent=negotiation.integer("sub_call_percent", 20, 80, 50))

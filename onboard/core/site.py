@@ -164,7 +164,7 @@ class Site:
     timing: Timing
     rides: RideCalls = RideCalls.AFTER
 
-    @property
+    @cached_property
     def compartments(self) -> dict[int, Station]:
         """Station of each compartment by node-ID."""
         return {m.node_id: m.station for m in self.machines.values() if m.station is not None}

@@ -5,8 +5,8 @@
  * Machines crash between any two effects and start again from their journal, CRASHES times in all.
  *
  * Variants: SEND_FIRST plants a bug, the frame before the journal write. LIVE takes frames off the bus, LOSSES times,
- * and asks whether a requested token moves once that is over; ONE_GRANT plants a bug there, a grant never repeated. TRACE leaves out the processes: what a run of the
- * controllers did is then a sequence of these same steps, and a step that the model does not have blocks.
+ * and asks whether a requested token moves once that is over; ONE_GRANT plants a bug there, a grant never repeated.
+ * TRACE leaves out the processes: what a run of the controllers did is then a sequence of these same steps, and a step that the model does not have blocks.
  * Not modelled: versions that wrap, and a journal that is lost or torn.
  */
 #ifndef NODES

@@ -6,7 +6,7 @@ does not. Text is templated, as cantools' own writer reorders signals and drops 
 
 from collections.abc import Iterable, Iterator
 
-from onboard.core.codes import KindCode
+from onboard.core.codes import MAX_NODE_ID, KindCode
 from onboard.core.site import Machine, Site
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
 
@@ -22,6 +22,10 @@ _ENDS: dict[KindCode, frozenset[str]] = {
     KindCode.LIFT: frozenset({"Controller", "Drive", "Platform"}),
     KindCode.COMPARTMENT: frozenset({"Controller", "Doors", "Desk", "Bay"}),
 }
+#: The node of the fleet contract that stands for people's tools and bridges to other buses.
+_GATEWAY = "Gateway"
+#: Node-IDs kept for gateways; a site file does not name them.
+_GATEWAY_IDS = range(MAX_NODE_ID + 1, 256)
 _EXTENDED = 1 << 31
 #: What a DBC writes for nobody.
 _NO_NODE = "Vector__XXX"
@@ -38,6 +42,26 @@ def _sent_by(machine: Machine, machines: Iterable[Machine]) -> Iterator[tuple[Me
             yield layout, machine.name
 
 
+def _gateways(taken: Iterable[str]) -> dict[int, str]:
+    """A name for each gateway, such as ``Gateway251``; other than any machine's."""
+    names = set(taken)
+    named = {}
+    for node_id in _GATEWAY_IDS:
+        name = f"{_GATEWAY}{node_id}"
+        while name in names:
+            name = f"x{name}"
+        named[node_id] = name
+    return named
+
+
+def _sent_by_gateway(machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
+    """What a gateway says, an operator's orders foremost, and the names of the machines that listen."""
+    for layout in fleet_layouts():
+        if _GATEWAY in layout.senders:
+            hearing = [one.name for one in machines if _ROLES[one.kind] in layout.receivers]
+            yield layout, ",".join(hearing) or _NO_NODE
+
+
 def _signal(signal: SignalLayout, receivers: str) -> str:
     sign = "-" if signal.signed else "+"
     return (
@@ -47,18 +71,24 @@ def _signal(signal: SignalLayout, receivers: str) -> str:
 
 
 def site_dbc(site: Site) -> str:
-    """DBC text with every message of every machine of a site, full identifiers, comments and value tables kept."""
+    """DBC text with every message of every machine of a site, full identifiers, comments and value tables kept.
+
+    The gateways that a site may have (nodes 251 to 255) are in it too, so that an operator's orders decode.
+    """
     machines = list(site.machines.values())
-    names = [machine.name for machine in machines]
+    gateways = _gateways(machine.name for machine in machines)
+    names = [machine.name for machine in machines] + list(gateways.values())
+    senders = [(one.node_id, one.name, list(_sent_by(one, machines))) for one in machines]
+    senders += [(node_id, name, list(_sent_by_gateway(machines))) for node_id, name in gateways.items()]
     lines = ['VERSION ""', "", "NS_ :", "\tCM_", "\tBA_DEF_", "\tBA_", "\tVAL_", "\tBA_DEF_DEF_", "", "BS_:", ""]
     lines += ["BU_: " + " ".join(names), ""]
     comments = [f'CM_ "Site {site.name}, digest {site.digest}: one message for each machine. Generated; do not edit.";']
     attributes: list[str] = []
     values: list[str] = []
-    for machine in machines:
-        for layout, receivers in _sent_by(machine, machines):
-            number = _EXTENDED | layout.frame_id | machine.node_id
-            lines.append(f"BO_ {number} {machine.name}_{layout.name}: {layout.length} {machine.name}")
+    for node_id, name, sent in senders:
+        for layout, receivers in sent:
+            number = _EXTENDED | layout.frame_id | node_id
+            lines.append(f"BO_ {number} {name}_{layout.name}: {layout.length} {name}")
             lines += [_signal(signal, receivers) for signal in layout.signals] + [""]
             comments.append(f'CM_ BO_ {number} "{layout.comment}";')
             comments += [f'CM_ SG_ {number} {signal.name} "{signal.comment}";' for signal in layout.signals]
@@ -66,7 +96,7 @@ def site_dbc(site: Site) -> str:
                 attributes.append(f'BA_ "GenMsgCycleTime" BO_ {number} {layout.cycle_ms};')
             for signal in layout.signals:
                 if signal.choices:
-                    table = " ".join(f'{value} "{name}"' for value, name in reversed(signal.choices))
+                    table = " ".join(f'{value} "{word}"' for value, word in reversed(signal.choices))
                     values.append(f"VAL_ {number} {signal.name} {table} ;")
     definitions = ['BA_DEF_ BO_  "GenMsgCycleTime" INT 0 60000;', 'BA_DEF_DEF_  "GenMsgCycleTime" 0;']
     return "\n".join([*lines, *comments, "", *definitions, *attributes, "", *values]) + "\n"

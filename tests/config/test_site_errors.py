@@ -110,6 +110,12 @@ ONE_MISTAKE = {
         "s.toml:5: timing.bid_delay_ms = 90: shorter than 3 N times two frames at 10000 bit/s, N = 1 robots; "
         "write at least 96",
     ),
+    "no room for the slots between the delay and the deadline": (
+        'name = "two"',
+        'name = "two"\n[timing]\ncall_window_ms = 346',
+        "s.toml:4: timing.call_window_ms = 346: no room for bid_delay_ms 300, 6 ms of slots and twice "
+        "deadline_guard_ms 20 in call_window_ms 346; write call_window_ms = 347 or more",
+    ),
     "not TOML": (
         "count = 2",
         "count = two",

@@ -1,10 +1,13 @@
 """What each kind of fault does to the simulated world, seen on the buses and on the bodies."""
 
+from functools import partial
+
 import pytest
 
 from bus_sim.plant.customer import Outcome, State
 from bus_sim.run import Simulation
 from onboard.core.codes import DeskInput, DoorName, DoorPosition
+from onboard.core.frame import Frame
 from onboard.core.messages import DeskEvent, DriveOrder, DriveState, Heartbeat
 from onboard.ports.bus import ErrorState
 from tests.faults.world import Seen, watch
@@ -18,6 +21,10 @@ def _position_mm(seen: Seen) -> float:
 
 def _states(seen: Seen, from_s: float = 0, to_s: float = 1e9) -> list[DriveState]:
     return [m for t, m in seen.device if isinstance(m, DriveState) and from_s * 1e6 <= t < to_s * 1e6]
+
+
+def _note(times: list[int], _: Frame, time_us: int) -> None:
+    times.append(time_us)
 
 
 # --- the bus ---------------------------------------------------------------------------------------------------
@@ -49,7 +56,7 @@ def test_a_partition_cuts_the_ways_that_it_names(way: str, robot_hears: bool, co
     def listen(simulation: Simulation) -> None:
         for node, times in heard.items():
             bus = simulation.controllers[node].ports.fleet_bus
-            bus.subscribe(lambda _, time_us, times=times: times.append(time_us))
+            bus.subscribe(partial(_note, times))
 
     watch(f"partition:members=MR1,at_s=12,for_s=20,way={way}", seconds=32, look=(11.9, listen))
     for node, hears in ((ROBOT, robot_hears), (COMPARTMENT, compartment_hears)):

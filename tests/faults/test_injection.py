@@ -6,7 +6,7 @@ from bus_sim.campaign.profiles import PROFILES, draw_faults
 from bus_sim.can.faults import Fault
 from bus_sim.faults.arm import ACTIONS, check_targets, frame_faults
 from bus_sim.faults.injection import Injection, parse_injection
-from bus_sim.faults.table import KINDS
+from bus_sim.faults.table import KINDS, Value
 from bus_sim.sites import find_site
 
 
@@ -26,7 +26,7 @@ def test_what_a_profile_draws_is_read_back_and_fits_the_site(profile: str) -> No
 
 def test_every_kind_of_the_table_does_something() -> None:
     site = find_site("small")
-    values = {"target": "MR1", "members": "MR1", "receivers": "MR1", "at_s": 1.0, "car": 1}
+    values: dict[str, Value] = {"target": "MR1", "members": "MR1", "receivers": "MR1", "at_s": 1.0, "car": 1}
     for name, kind in KINDS.items():
         given = {key: values[key] for key, setting in kind.settings.items() if setting.default is None}
         injection = Injection(name, given)

@@ -1,7 +1,6 @@
 """Lift availability is checked by a call before the bid (row P39), on the small site with ``rides = "before"``."""
 
 import dataclasses
-import statistics
 
 import pytest
 
@@ -137,4 +136,4 @@ def test_p39_four_robots_ask_two_lifts_for_cars_that_come_at_one_moment() -> Non
     wholes = {call.parent for _, call in nested(found)}
     assert len(wholes) == 6
     askers = [len({call.sender for _, call in nested(found) if call.parent == whole}) for whole in wholes]
-    assert statistics.median(askers) <= 2, "who hears a better one ask waits for its bid, and then mostly asks nobody"
+    assert sum(askers) < 3 * len(askers), "who hears a better one ask waits for its bid, and then often asks nobody"

@@ -27,7 +27,7 @@ MR1, MR2 = 11, 12
 #: Two floors of ten, a lift at the left end, one compartment at p(1,5), two robots.
 TWO_FLOORS = """
 [site]
-name = "two floors"
+name = "two-floors"
 [floors]
 count = 2
 positions = 10

@@ -26,7 +26,7 @@ def held(node: int, version: int) -> TokenHeld:
     return TokenHeld(node, TokenKind.SEGMENT, SLOT.number, version)
 
 
-# --- one holder --------------------------------------------------------------------------------------------------------
+# --- one holder ------------------------------------------------------------------------------------------------
 
 GOOD_HANDOVERS: dict[str, list[Message]] = {
     "there and back": [grant(SLOT, 1, 1, MR1), held(MR1, 1), grant(SLOT, 2, MR1, 1), grant(SLOT, 3, 1, MR2)],
@@ -71,7 +71,7 @@ def test_versions_wrap_and_leave_0_out() -> None:
     assert tape.broken() == {}
 
 
-# --- motion ------------------------------------------------------------------------------------------------------------
+# --- motion ------------------------------------------------------------------------------------------------
 
 
 def test_a_body_moves_in_what_it_holds_with_its_braking_distance() -> None:
@@ -120,7 +120,7 @@ def test_two_bodies_on_one_platform_are_found_whatever_their_floors() -> None:
     assert tape.broken() == {"one-body": 1}
 
 
-# --- lifts -------------------------------------------------------------------------------------------------------------
+# --- lifts ------------------------------------------------------------------------------------------------
 
 
 def test_a_lift_moves_with_its_gate() -> None:

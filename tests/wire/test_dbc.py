@@ -9,12 +9,14 @@ import pytest
 from cantools.database.can import Message
 
 from dbc import device_dbc_text, fleet_dbc_text
+from onboard.config.site import parse_site
 from onboard.core import codes, messages
 from onboard.wire import network_doc
+from onboard.wire.codec import fleet_codec
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts, read_layouts
 from onboard.wire.network_doc import network_page
 from onboard.wire.site_dbc import site_dbc
-from tests.sites import one_floor
+from tests.sites import ONE_FLOOR, one_floor
 from tests.wire.samples import judge_of, layouts
 
 TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text()}
@@ -125,10 +127,32 @@ def test_the_sites_dbc_keeps_signals_comments_tables_and_cycles() -> None:
     for found in read_layouts(site_dbc(one_floor(robots=2))):
         name, _, kind = found.name.partition("_")
         original = ours[kind]
-        node_id = one_floor(robots=2).machine(name).node_id
+        gateway = name.startswith("Gateway")
+        node_id = int(name.removeprefix("Gateway")) if gateway else one_floor(robots=2).machine(name).node_id
         assert found.senders == (name,)
         assert found.frame_id == original.frame_id | node_id
         assert (found.comment, found.cycle_ms, found.signals) == (original.comment, original.cycle_ms, original.signals)
+
+
+def test_an_operators_orders_decode_with_the_sites_dbc() -> None:
+    """The gateways' nodes, 251 to 255, are in no site file."""
+    database = judge_of(site_dbc(one_floor(robots=2)))
+    for node_id in range(codes.MAX_NODE_ID + 1, 256):
+        order = messages.OperatorOrder(node_id, 1, codes.OperatorAction.INSERT_TICKET, messages.Reference(1, 7))
+        (frame,) = fleet_codec().encode(order)
+        found = database.get_message_by_frame_id(frame.arbitration_id)
+        assert found.name == f"Gateway{node_id}_OperatorOrder"
+        values = found.decode(frame.data)
+        assert isinstance(values, dict)
+        assert (values["compartment"], str(values["action"]), values["car_number"]) == (1, "INSERT_TICKET", 7)
+
+
+def test_a_machine_that_is_called_like_a_gateway_keeps_its_name() -> None:
+    floor = ONE_FLOOR.format(positions=12).replace("IOC1", "Gateway251")
+    text = site_dbc(parse_site(floor + '[[robots]]\nname = "MR1"\nnode = 11\nhome = "p(1,12)"\n', "test.toml"))
+    (nodes,) = (line for line in text.splitlines() if line.startswith("BU_:"))
+    assert nodes.split()[1:4] == ["Gateway251", "MR1", "xGateway251"]
+    assert judge_of(text).get_message_by_name("Gateway251_Bid").frame_id & 0xFF == 1
 
 
 def test_the_sites_dbc_names_those_who_listen() -> None:

@@ -61,12 +61,15 @@ ANY_TIME = Slot(0, 1, 0)
 def slot_of(site: Site, node_id: int) -> Slot:
     """A machine's slot: its rank by node-ID among all of the site's. Raises ``ValueError`` for a node not of the site.
 
-    One slot is as long as a bid takes to be heard by all, so of two machines that are equally good, or nearly so, the
-    second hears the first and stays silent: a queued frame cannot be recalled. So the bids of a call strictly improve
-    on the wire (row P08), as long as no controller is late.
+    Of two machines that are equally good, or nearly so, the second hears the first and stays silent: a queued frame
+    cannot be recalled. So the bids of a call strictly improve on the wire (row P08), as long as no controller is late.
     """
-    length_us = _FRAMES_TO_HEAR * _FRAME_BITS * 1_000_000 // site.bitrate + _READING_US
-    return Slot(sorted(site.machines).index(node_id), len(site.machines), length_us)
+    return Slot(sorted(site.machines).index(node_id), len(site.machines), slot_length_us(site.bitrate))
+
+
+def slot_length_us(bitrate: int) -> int:
+    """One slot is as long as a bid takes to be heard by all, at a bit rate in bit/s."""
+    return _FRAMES_TO_HEAR * _FRAME_BITS * 1_000_000 // bitrate + _READING_US
 
 
 def in_slot(delay_us: int, slot: Slot) -> int:

@@ -42,6 +42,8 @@ bool has_bid[MACHINES];
 byte rank[MACHINES];
 byte best[MACHINES + 1];
 byte bids[TO(MACHINES + 1, 0)];
+/* How many bids are on their way to each receiver: it passes the deadline when they are there, or missed. */
+byte on_way[MACHINES + 1];
 bool somebody_passed;
 byte stage;
 /* The award, or the closing for nobody, on its way to each machine; the winner's itinerary on its way back. */
@@ -56,16 +58,6 @@ inline alone(i) {
     k_ = 0;
     do
     :: k_ < MACHINES -> assert(k_ == i || state[k_] != ASSIGNED); k_++
-    :: k_ >= MACHINES -> break
-    od;
-    k_ = 0
-}
-
-/* Nothing is on its way to this receiver any more. */
-inline settled(receiver) {
-    k_ = 0;
-    do
-    :: k_ < MACHINES && bids[TO(receiver, k_)] != ON_BUS -> k_++
     :: k_ >= MACHINES -> break
     od;
     k_ = 0
@@ -87,7 +79,7 @@ inline bid(i) {
         k_ = 0;
         do
         :: k_ <= INITIATOR && k_ == i -> k_++
-        :: k_ <= INITIATOR && k_ != i -> bids[TO(k_, i)] = ON_BUS; k_++
+        :: k_ <= INITIATOR && k_ != i -> bids[TO(k_, i)] = ON_BUS; on_way[k_] = on_way[k_] + 1; k_++
         :: k_ > INITIATOR -> break
         od;
         k_ = 0
@@ -101,6 +93,10 @@ inline quiet(i) {
 inline hear_bid(receiver, bidder) {
     atomic {
         bids[TO(receiver, bidder)] == ON_BUS || bids[TO(receiver, bidder)] == HEARD;
+        if
+        :: bids[TO(receiver, bidder)] == ON_BUS -> on_way[receiver] = on_way[receiver] - 1
+        :: else
+        fi;
         bids[TO(receiver, bidder)] = HEARD;
         if
         :: best[receiver] == NOBODY || rank[bidder] < rank[best[receiver]] -> best[receiver] = bidder
@@ -116,14 +112,13 @@ inline hear_bid(receiver, bidder) {
 inline miss_bid(receiver, bidder) {
     atomic {
         bids[TO(receiver, bidder)] == ON_BUS && losses < LOSSES;
-        bids[TO(receiver, bidder)] = MISSED; losses++
+        bids[TO(receiver, bidder)] = MISSED; on_way[receiver] = on_way[receiver] - 1; losses++
     }
 }
 
 inline deadline(i) {
     atomic {
-        state[i] == PRE_ASSIGNED;
-        settled(i);
+        state[i] == PRE_ASSIGNED && on_way[i] == 0;
         somebody_passed = true;
 #ifdef SILENT_AWARD
         state[i] = ASSIGNED; alone(i)
@@ -139,8 +134,7 @@ inline lapse(i) {
 
 inline decide() {
     atomic {
-        stage == OPEN && best[INITIATOR] != NOBODY;
-        settled(INITIATOR);
+        stage == OPEN && best[INITIATOR] != NOBODY && on_way[INITIATOR] == 0;
         somebody_passed = true; winner = best[INITIATOR];
 #ifdef SILENT_AWARD
         stage = CLOSED
@@ -152,8 +146,7 @@ inline decide() {
 
 inline close_empty() {
     atomic {
-        stage == OPEN && best[INITIATOR] == NOBODY;
-        settled(INITIATOR);
+        stage == OPEN && best[INITIATOR] == NOBODY && on_way[INITIATOR] == 0;
         somebody_passed = true; stage = CLOSED; say_closing()
     }
 }

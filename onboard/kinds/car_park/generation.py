@@ -41,10 +41,15 @@ MAX_EXPANSIONS = 4_000
 
 
 class Alternative(NamedTuple):
-    """One evaluated solution: the place chosen and when it would be finished (bus us), None where impossible."""
+    """One solution that was weighed: the place chosen and when it would be finished (bus us), None where impossible.
+
+    ``bound_us`` stands instead of the date where that was not worked out: it is no earlier than this, and so no better
+    than the solution chosen.
+    """
 
     station: Station
     finish_us: int | None
+    bound_us: int | None = None
 
 
 class Solution(NamedTuple):
@@ -73,8 +78,7 @@ class CarParkGeneration:
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """Least finishing time (bus ms) that any robot could name, from call and site alone: it stands at the start."""
         start_us = self._deadline_us(call, now_us) + AWARD_LATENCY_US
-        ends = _one_a_segment(self._all_candidates(call))
-        return min(to_bus_ms(self._lower_us(call, place, self._front(call, place), start_us)) for place in ends)
+        return to_bus_ms(min(self._lower_bounds(call, self._all_candidates(call), None, start_us).values()))
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
@@ -87,9 +91,9 @@ class CarParkGeneration:
         if not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
             return None
         _, segment, start_us = self._start(call, now_us)
-        places = _one_a_segment(self._candidates(call, now_us))
-        ends = [self._lower_us(call, place, segment, start_us) for place in places]
-        return to_bus_ms(min(ends)) if ends else None
+        bounds = self._lower_bounds(call, self._candidates(call, now_us), segment, start_us)
+        least_us = min(bounds.values(), default=FOREVER)
+        return to_bus_ms(least_us) if least_us < FOREVER else None
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
         """First request: the best solution as a bid with a tentative itinerary, or None: silence (row P45)."""
@@ -120,9 +124,9 @@ class CarParkGeneration:
 
         A bid comes behind what this machine has bid for already (``behind_bids``); a task that is won does not.
 
-        Candidates whose free-flow bound is no better than the best found are not searched. Where there is no solution
-        around machines that only stand there, one that counts on their giving way (design, section 5: idle machines
-        yield); they hear of it with the firm itinerary.
+        Candidates whose bound is no better than the best found are not searched; they are told with that bound. Where
+        there is no solution around machines that only stand there, one that counts on their giving way (design,
+        section 5: idle machines yield); they hear of it with the firm itinerary.
         """
         start = self._start(call, now_us, behind_bids=behind_bids)
         best, alternatives = self._search(call, now_us, start, self.mirror.reservations)
@@ -177,7 +181,8 @@ class CarParkGeneration:
         routes: dict[Segment, Route | None] = {}
         for bound_us, _, place in bounds:
             if best is not None and bound_us >= best.finish_us:
-                break
+                alternatives.append(Alternative(place, None, bound_us))
+                continue
             if place.segment not in routes:
                 routes[place.segment] = self._route(call, place, segment, start_us, now_us, reservations)
             route = routes[place.segment]
@@ -201,18 +206,14 @@ class CarParkGeneration:
         """
         _, segment, start_us = start
         places = self._candidates(call, now_us)
-        if len(places) < FEW_PLACES or call.from_station == ANY_STATION:
-            return sorted((self._lower_us(call, one, segment, start_us), n, one) for n, one in enumerate(places))
-        take, _ = self._visits(call, places[0], start_us)
-        route = self._plan(reservations, segment, start_us, (take,), now_us)
-        if route is None:
-            return [(FOREVER, 0, places[0])]
-        taken_us = route.finish_us
-        bounds: dict[Segment, int] = {}
-        for place in places:
-            if place.segment not in bounds:
-                leave = self._visits(call, place, start_us)[1]
-                bounds[place.segment] = free_flow_us(self.site, take.segment, taken_us, (leave,))
+        taken_us = None
+        if len(places) >= FEW_PLACES and call.from_station != ANY_STATION:
+            take, _ = self._visits(call, places[0], start_us)
+            route = self._plan(reservations, segment, start_us, (take,), now_us)
+            if route is None:
+                return [(FOREVER, 0, places[0])]
+            taken_us = route.finish_us
+        bounds = self._lower_bounds(call, places, segment, start_us, taken_us)
         return sorted((bounds[one.segment], n, one) for n, one in enumerate(places))
 
     def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
@@ -270,10 +271,33 @@ class CarParkGeneration:
         found = open_refuges(self.site, self.mirror.others_standing())
         return frozenset(one for one in found if self.site.tracks[one.track].kind is not TrackKind.SPUR)
 
-    def _lower_us(self, call: CallForProposals, place: Station, origin: Segment, start_us: int) -> int:
-        return free_flow_us(self.site, origin, start_us, self._visits(call, place, start_us))
+    def _lower_bounds(
+        self,
+        call: CallForProposals,
+        places: list[Station],
+        origin: Segment | None,
+        start_us: int,
+        taken_us: int | None = None,
+    ) -> dict[Segment, int]:
+        """For each segment of ``places`` when the task would end there with nobody in the way; FOREVER: out of reach.
 
-    def _visits(self, call: CallForProposals, place: Station, near_us: int) -> tuple[Visit, ...]:
+        Without ``origin`` from where the car is taken; ``taken_us`` is when it is taken, by default as early as can be.
+        """
+        bounds: dict[Segment, int] = {}
+        begun: tuple[int, Visit, Visit] | None = None
+        for place in _one_a_segment(places):
+            if begun is None or call.from_station == ANY_STATION:
+                # Otherwise the car is taken at the same time and left in as long a time at whatever place.
+                take, leave = self._visits(call, place, start_us)
+                here = take.segment if origin is None else origin
+                least_us = free_flow_us(self.site, here, start_us, (take,)) if taken_us is None else taken_us
+                begun = least_us, take, leave
+            begun_us, take, leave = begun
+            leave = leave._replace(segment=self.ends(call, place)[1].segment)
+            bounds[place.segment] = free_flow_us(self.site, take.segment, begun_us, (leave,))
+        return bounds
+
+    def _visits(self, call: CallForProposals, place: Station, near_us: int) -> tuple[Visit, Visit]:
         source, sink = self.ends(call, place)
         ready_us = 0
         if source in self.site.compartments.values():
@@ -296,9 +320,6 @@ class CarParkGeneration:
         source = place if call.from_station == ANY_STATION else Station.from_number(call.from_station)
         sink = place if call.to_station == ANY_STATION else Station.from_number(call.to_station)
         return source, sink
-
-    def _front(self, call: CallForProposals, place: Station) -> Segment:
-        return self.ends(call, place)[0].segment
 
     def _all_candidates(self, call: CallForProposals) -> list[Station]:
         if ANY_STATION not in (call.from_station, call.to_station):

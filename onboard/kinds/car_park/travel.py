@@ -160,7 +160,11 @@ class Carriage:
         if self.goal is None or self.sensed is None or self.arrived:
             return self._rest(now_us)
         ahead = self._ahead()
-        effects = self._ask(ahead, now_us)
+        effects: list[Effect] = []
+        for slot in self.occupied():
+            # Pushed there by hand, or found there after a restart: a body asks for what it is in.
+            effects += self.fleet.tokens.want(segment_token(slot), now_us)
+        effects += self._ask(ahead, now_us)
         reach, reason = self._reach(ahead)
         if self.whole.slots and not self.whole.is_complete:
             reach, reason = None, Reason.NOT_AUTHORISED

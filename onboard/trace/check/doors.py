@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import DoorAction, DoorName, DoorPosition
+from onboard.core.codes import DoorAction, DoorName, DoorPosition, ShuttleMode
 from onboard.core.messages import BayState, DoorOrder, DoorState, ShuttleState
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
@@ -87,7 +87,8 @@ class Doors(Rule):
         bay = self.picture.site.compartments[node]
         for robot, state in self._shuttles.items():
             body = self.picture.bodies.get(robot)
-            inside = body is not None and (body.track, body.index, state.side) == bay and state.extension_mm > 0
+            out = state.extension_mm > 0 or state.mode not in (ShuttleMode.HOME, ShuttleMode.FAULT)
+            inside = out and body is not None and (body.track, body.index, state.side) == bay
             what = f"the shuttle of {robot} is in the bay while its door is not open"
             self._state(event, node, what, holds=inside and doors.output_door is not DoorPosition.OPEN)
 

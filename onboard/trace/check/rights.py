@@ -1,9 +1,13 @@
 """Tokens: one holder each, by versions that rise, given by the holder only (design, section 5)."""
 
+from collections.abc import Callable
+from typing import Any
+
 from onboard.core.codes import TokenKind
 from onboard.core.messages import TokenGrant, TokenHeld
 from onboard.core.serial import is_newer, successor
-from onboard.trace.check.event import Event
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.trace.check.tokens_seen import VERSION_BITS, Handover, Token
 
@@ -18,15 +22,25 @@ class OneHolder(Rule):
     title = "one holder a token"
     source = "design 5: erase, journal, then send; versions rise by one"
 
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        #: What was told last of a token: frames that are said again show nothing new.
+        self._told: dict[Token, str] = {}
+
     def handlers(self) -> Handlers:
         """Grants, and statements of who holds."""
         return {TokenGrant: self._on_grant, TokenHeld: self._on_held}
+
+    def _tell(self, event: Event[Any], token: Token, machines: tuple[int, ...], what: str) -> None:
+        if self._told.get(token) != what:
+            self._told[token] = what
+            self.find(event, machines, what)
 
     def _on_grant(self, event: Event[TokenGrant]) -> None:
         grant = event.message
         token, version = Token(grant.token_kind, grant.token), grant.version
         if grant.holder == grant.sender:
-            self.find(event, (grant.sender,), f"gives {token} to itself")
+            self._tell(event, token, (grant.sender,), f"gives {token} to itself")
         last = self.picture.tokens.last(token)
         if last is None:
             self._judge_first(event, token)
@@ -34,18 +48,20 @@ class OneHolder(Rule):
             before = self.picture.tokens.under(token, version)
             if before is not None and not _is_repeat(grant, before):
                 who = f"{before.giver} to {before.holder}" if before.giver else f"{before.holder} has it"
-                self.find(event, (grant.sender, grant.holder), f"gives {token} under version {version} again: {who}")
+                self._tell(
+                    event, token, (grant.sender, grant.holder), f"gives {token} under version {version} again: {who}"
+                )
         elif grant.sender != last.holder:
             what = f"gives {token} under version {version}, but {last.holder} holds it under {last.version}"
-            self.find(event, (grant.sender, last.holder), what)
+            self._tell(event, token, (grant.sender, last.holder), what)
         elif version != successor(last.version, VERSION_BITS) and not self.picture.disturbed:
-            self.find(event, (grant.sender,), f"gives {token} under version {version}, after {last.version}")
+            self._tell(event, token, (grant.sender,), f"gives {token} under version {version}, after {last.version}")
 
     def _judge_first(self, event: Event[TokenGrant], token: Token) -> None:
         """The first time that a token moves: only where the log begins at power-up is it known whose it is."""
         first = self.picture.tokens.holder(token)
         if first not in (None, event.message.sender):
-            self.find(event, (event.message.sender, first or 0), f"gives {token}, which is {first}'s at first")
+            self._tell(event, token, (event.message.sender, first or 0), f"gives {token}, which is {first}'s at first")
 
     def _on_held(self, event: Event[TokenHeld]) -> None:
         held = event.message
@@ -54,18 +70,20 @@ class OneHolder(Rule):
         if last is None:
             first = tokens.holder(token)
             if token.kind is not TokenKind.CAR and first not in (None, held.sender):
-                self.find(event, (held.sender, first or 0), f"says it holds {token}, which is {first}'s at first")
+                self._tell(
+                    event, token, (held.sender, first or 0), f"says it holds {token}, which is {first}'s at first"
+                )
         elif held.version == last.version:
             if held.sender != last.holder:
                 what = f"says it holds {token} under version {held.version}, which {last.holder} holds"
-                self.find(event, (held.sender, last.holder), what)
+                self._tell(event, token, (held.sender, last.holder), what)
         elif is_newer(held.version, last.version, VERSION_BITS):
             if not self.picture.disturbed:
                 what = f"says it holds {token} under version {held.version}, which nobody gave"
-                self.find(event, (held.sender, last.holder), what)
+                self._tell(event, token, (held.sender, last.holder), what)
         elif not self.picture.disturbed and event.time_us - last.time_us > STALE_US:
             what = f"says it holds {token} under version {held.version}, which it gave on: now {last.version}"
-            self.find(event, (held.sender, last.holder), what)
+            self._tell(event, token, (held.sender, last.holder), what)
 
 
 def _is_repeat(grant: TokenGrant, before: Handover) -> bool:

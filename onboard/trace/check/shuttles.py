@@ -71,8 +71,10 @@ class TornCar(Rule):
 
     def _on_shuttle(self, event: Event[ShuttleState]) -> None:
         state = event.message
+        known = self._shuttles.get(state.sender)
+        was_out = known is not None and known.is_out
         seen = self._shuttles.setdefault(state.sender, ShuttleSeen(state))
-        was_out, seen.state = seen.is_out, state
+        seen.state = state
         station = self._station(state.sender, state) if seen.is_out else None
         if station is None or was_out:
             return

@@ -1,0 +1,178 @@
+"""What the controllers of a run did with tokens and calls, as steps of the models. Nothing here judges them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from onboard.core.authority import TokenBook, TokenKey, genesis_holder
+from onboard.core.effects import Effect, Record, Send
+from onboard.core.messages import Bid, TokenGrant, TokenHeld
+from onboard.core.negotiation.initiator import Event as InitiatorEvent
+from onboard.core.negotiation.initiator import Initiator
+from onboard.core.negotiation.initiator import State as InitiatorState
+from onboard.core.negotiation.participant import Event, Participant, State
+
+#: What each event of an initiator is called in the model.
+_INITIATOR_STEPS = {
+    InitiatorEvent.DEADLINE_WITH_BID: "decide()",
+    InitiatorEvent.DEADLINE_EMPTY: "close_empty()",
+    InitiatorEvent.EXHAUSTED: "close_empty()",
+    InitiatorEvent.WITHDRAW: "withdraw()",
+    InitiatorEvent.REPEAT: "award_again()",
+    InitiatorEvent.HEARD: "heard_acting()",
+    InitiatorEvent.FORFEIT: "given_back()",
+}
+_WAITING = (State.WAITING_BOUND, State.WAITING_COST, State.ASKING)
+Call = tuple[int, int]
+
+
+@dataclass
+class Recorder:
+    """Steps by token and by call, in the order in which they happened; machines are numbered as they appear."""
+
+    tokens: dict[TokenKey, list[str]] = field(default_factory=dict)
+    calls: dict[Call, list[str]] = field(default_factory=dict)
+    nodes: dict[object, list[int]] = field(default_factory=dict)
+    costs: dict[Call, dict[int, int]] = field(default_factory=dict)
+    heard: dict[Call, set[tuple[int | str, int]]] = field(default_factory=dict)
+
+    def index(self, thing: object, node: int) -> int:
+        """The number of a machine in one token's or call's steps."""
+        known = self.nodes.setdefault(thing, [])
+        if node not in known:
+            known.append(node)
+        return known.index(node)
+
+    def attach(self, patch: pytest.MonkeyPatch) -> None:
+        """Listen to every token book and negotiation until the patch is undone."""
+        for name in ("give", "on_grant", "on_held"):
+            patch.setattr(TokenBook, name, self._token_listener(getattr(TokenBook, name)))
+        patch.setattr(Participant, "_fire", self._participant_listener(Participant._fire))
+        patch.setattr(Initiator, "_fire", self._initiator_listener(Initiator._fire))
+        patch.setattr(Participant, "on_bid", self._bid_listener(Participant.on_bid))
+        patch.setattr(Initiator, "on_bid", self._bid_listener(Initiator.on_bid))
+
+    # --- tokens ------------------------------------------------------------------------------------------------
+
+    def _token_listener(self, method: Callable[..., list[Effect]]) -> Callable[..., list[Effect]]:
+        def listen(book: TokenBook, what: Any, *rest: Any) -> list[Effect]:
+            key = what if isinstance(what, TokenKey) else TokenKey(what.token_kind, what.token)
+            before = (book.seen.get(key), key in book.leaving)
+            self.nodes.setdefault(key, [genesis_holder(book.site, key)])
+            effects = method(book, what, *rest)
+            if (book.seen.get(key), key in book.leaving) != before:
+                self._token_steps(book, key, what, rest, effects)
+            return effects
+
+        return listen
+
+    def _token_steps(self, book: TokenBook, key: TokenKey, what: Any, rest: Any, effects: list[Effect]) -> None:
+        steps = self.tokens.setdefault(key, [])
+        node = self.index(key, book.node_id)
+        if isinstance(what, TokenKey):
+            steps.append(f"give({node}, {self.index(key, rest[0])})")
+        elif isinstance(what, TokenHeld) and not any(isinstance(one, Record) for one in effects):
+            steps.append(f"learn({node}, {what.version}, {self.index(key, what.sender)})")
+        elif isinstance(what, TokenHeld):
+            steps.append(f"confirmed({node})")
+        elif what.holder == book.node_id:
+            steps.append(f"accept({node}, {what.version})")
+        else:
+            steps.append(f"learn({node}, {what.version}, {self.index(key, what.holder)})")
+        for effect in effects:
+            if isinstance(effect, Record):
+                name = str(effect.entry["record"]).removeprefix("token_")
+                steps.append(f"record_{name}({node})")
+            elif isinstance(effect, Send) and isinstance(effect.message, TokenGrant):
+                steps.append(f"send_grant({node})")
+            elif isinstance(effect, Send) and isinstance(effect.message, TokenHeld):
+                steps.append(f"state_held({node})")
+        leaving = book.leaving[key].version if key in book.leaving else 0
+        holds = str(key in book.held).lower()
+        steps.append(f"expect({node}, {holds}, {book.seen[key]}, {leaving})")
+
+    # --- calls -------------------------------------------------------------------------------------------------
+
+    def _participant_listener(self, fire: Callable[..., Any]) -> Callable[..., Any]:
+        def listen(one: Participant, event: Event, now_us: int) -> Any:
+            before = one.state
+            outcome = fire(one, event, now_us)
+            if one.call.hold_ms == 0 and one.state is not before:
+                self._participant_steps(one, before, event)
+            return outcome
+
+        return listen
+
+    def _participant_steps(self, one: Participant, before: State, event: Event) -> None:
+        call = one.key
+        steps, i = self.calls.setdefault(call, []), self.index(call, one.node_id)
+        if before in _WAITING and one.state in _WAITING:
+            return
+        if one.state is State.PRE_ASSIGNED:
+            assert one.proposal is not None
+            self.costs.setdefault(call, {})[i] = one.proposal.cost
+            steps.append(f"bid({i})")
+        elif event in (Event.AWARD_ME, Event.AWARD_OTHER):
+            steps.append(f"hear_closing({i})")
+        elif event is Event.SUPERSEDED:
+            steps.append(f"superseded({i})")
+        elif event is Event.LAPSE:
+            steps.append(f"lapse({i})")
+        elif before is State.PRE_ASSIGNED and event is Event.DEADLINE:
+            self._miss(call, i)
+            steps.append(f"deadline({i})")
+        elif event is Event.BEATEN and before is State.PRE_ASSIGNED:
+            return
+        elif before in _WAITING:
+            steps.append(f"quiet({i})")
+        steps.append(f"expect({i}, {one.state.name})")
+        if one.state is State.ASSIGNED:
+            steps.append(f"act({i})")
+
+    def _miss(self, call: Call, receiver: int | str) -> None:
+        """What a receiver has not heard when it decides, it has missed."""
+        for i in self.costs.get(call, {}):
+            if i != receiver and (receiver, i) not in self.heard.setdefault(call, set()):
+                self.heard[call].add((receiver, i))
+                self.calls[call].append(f"miss_bid({receiver}, {i})")
+
+    def _initiator_listener(self, fire: Callable[..., Any]) -> Callable[..., Any]:
+        def listen(one: Initiator, event: InitiatorEvent, now_us: int) -> Any:
+            before = one.state
+            if one.deadline_us is None and one.call is not None and before is not InitiatorState.CLOSED:
+                self._initiator_steps(one, event)
+            return fire(one, event, now_us)
+
+        return listen
+
+    def _initiator_steps(self, one: Initiator, event: InitiatorEvent) -> None:
+        assert one.call is not None
+        call = (one.node_id, one.call.call)
+        steps = self.calls.setdefault(call, [])
+        if event is InitiatorEvent.HEARD and one.state is not InitiatorState.AWARDING:
+            return
+        if event is InitiatorEvent.WITHDRAW and one.state is not InitiatorState.OPEN:
+            return
+        if event not in (InitiatorEvent.REPEAT, InitiatorEvent.HEARD, InitiatorEvent.FORFEIT, InitiatorEvent.WITHDRAW):
+            self._miss(call, "INITIATOR")
+        if event in _INITIATOR_STEPS:
+            steps.append(_INITIATOR_STEPS[event])
+
+    def _bid_listener(self, on_bid: Callable[..., Any]) -> Callable[..., Any]:
+        def listen(one: Participant | Initiator, bid: Bid, now_us: int) -> Any:
+            late = one.counters.late_bids_ignored
+            outcome = on_bid(one, bid, now_us)
+            is_whole = one.call is not None and one.call.hold_ms == 0
+            if is_whole and one.counters.late_bids_ignored == late:
+                call = (bid.initiator, bid.call)
+                me: Any = "INITIATOR" if isinstance(one, Initiator) else self.index(call, one.node_id)
+                bidder = self.index(call, bid.sender)
+                self.heard.setdefault(call, set()).add((me, bidder))
+                self.calls.setdefault(call, []).append(f"hear_bid({me}, {bidder})")
+                if isinstance(one, Participant) and one.state not in _WAITING:
+                    self.calls[call].append(f"expect({me}, {one.state.name})")
+            return outcome
+
+        return listen

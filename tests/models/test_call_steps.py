@@ -1,0 +1,49 @@
+"""What the controllers do in the calls of a run with lost frames is a sequence of steps of the model."""
+
+from pathlib import Path
+
+import pytest
+
+from bus_sim.can.faults import Fault, FaultKind
+from bus_sim.sites import find_site
+from onboard.core.negotiation import participant
+from tests.models.recorder import Call, Recorder
+from tests.models.spin import NEGOTIATION, first_refused
+from tests.system.scene import play, stays
+
+
+def _refused(folder: Path, seed: int) -> tuple[int, dict[Call, str]]:
+    """How many calls a run of the small site had, and the first refused step of each."""
+    recorder = Recorder()
+    faults = [Fault(FaultKind.OMISSION, probability=0.03, seed=seed)]
+    with pytest.MonkeyPatch.context() as patch:
+        recorder.attach(patch)
+        play(find_site("small"), stays((0, 120)), seed=seed, limit_s=240, faults=faults, extra_s=0)
+    refused = {}
+    for call, steps in recorder.calls.items():
+        nodes, costs = recorder.nodes.get(call, [0]), recorder.costs.get(call, {})
+        # Lower cost, then lower node-ID; who did not bid comes last.
+        order = sorted(range(len(nodes)), key=lambda i: (i not in costs, costs.get(i, 0), nodes[i]))
+        begin = "; ".join(["begin()", *(f"rank[{i}] = {place}" for place, i in enumerate(order))])
+        step = first_refused(folder, NEGOTIATION, steps, begin, f"MACHINES={len(nodes)}", "LOSSES=200")
+        if step is not None:
+            refused[call] = step
+    return len(recorder.calls), refused
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_calls_of_a_run_with_lost_frames_go_as_in_the_model(seed: int, tmp_path: Path) -> None:
+    calls, refused = _refused(tmp_path, seed)
+    assert calls > 4
+    assert refused == {}
+
+
+def test_a_participant_that_takes_its_belief_for_an_award_is_caught(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = (participant.State.PRE_ASSIGNED, participant.Event.DEADLINE)
+    hasty = (participant.State.ASSIGNED, participant.Participant.assign)
+    monkeypatch.setitem(participant.TABLE, before, hasty)
+    _, refused = _refused(tmp_path, 1)
+    assert refused
+    assert all(step.startswith("expect") and "ASSIGNED" in step for step in refused.values())

@@ -1,0 +1,140 @@
+"""Rules of the negotiation, of tasks and cars."""
+
+import pytest
+
+from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, Reason, TaskPhase
+from onboard.core.messages import Message, Reference
+from tests.trace.checking import (
+    MR1,
+    MR2,
+    Tape,
+    award,
+    bid,
+    call,
+    car_at,
+    car_grant,
+    one_alley,
+    power_up,
+    report,
+)
+
+BAY, PLACE, OTHER_PLACE = 0x0104, 0x0106, 0x0107
+#: A whole task, step by step: second, messages.
+STORY: list[tuple[float, list[Message]]] = [
+    (1, [car_at(1, BAY, 1), call(1, 2)]),
+    (1.5, [bid(MR2, 60_000)]),
+    (1.8, [bid(MR1, 50_000)]),
+    (2, [award(MR1), award(MR1), report(MR1, TaskPhase.AWARDED)]),
+    (20, [report(MR1, TaskPhase.STARTED), car_grant(2, 1, MR1)]),
+    (30, [car_at(MR1, ANY_STATION, 2), report(MR1, TaskPhase.LOADED)]),
+    (50, [report(MR1, TaskPhase.DONE, PLACE), car_at(MR1, PLACE, 2), car_grant(3, MR1, 1), car_at(1, PLACE, 3)]),
+]
+
+
+def tell(story: list[tuple[float, list[Message]]], *, disturbed: bool = False) -> Tape:
+    tape = Tape(one_alley(), disturbed=disturbed)
+    for at_s, messages in story:
+        tape.say(at_s, *messages)
+    return tape
+
+
+def told(step: int, messages: list[Message], at_s: float | None = None) -> list[tuple[float, list[Message]]]:
+    """The story up to a step, and that step told in another way."""
+    return [*STORY[:step], (STORY[step][0] if at_s is None else at_s, messages)]
+
+
+def test_a_task_as_it_should_be_breaks_nothing() -> None:
+    assert tell(STORY).broken(60) == {}
+
+
+WRONG: dict[str, tuple[int, list[Message], dict[str, int]]] = {
+    "awarded to two": (3, [award(MR1), award(MR2)], {"calls-closed": 1, "one-owner": 1}),
+    "awarded, then refused": (3, [award(MR1), award(0, CallResult.REFUSED)], {"calls-closed": 1}),
+    "awarded to the worse bid": (3, [award(MR2)], {"bids-go-down": 1}),
+    "a worse bid after a better one": (2, [bid(13, 70_000)], {"bids-go-down": 1}),
+    "an equal bid of a higher node": (2, [bid(13, 60_000)], {"bids-go-down": 1}),
+    "awarded to one that never bid": (3, [award(13)], {"bids-in-time": 1}),
+    "taken without an award": (3, [report(MR1, TaskPhase.AWARDED)], {"one-owner": 1}),
+    "carried out by another": (4, [report(MR2, TaskPhase.STARTED)], {"one-owner": 1}),
+    "the car stated by another": (5, [car_at(MR2, ANY_STATION, 2)], {"one-custodian": 1}),
+    "the car stated under a version that nobody gave": (5, [car_at(MR1, ANY_STATION, 3)], {"one-custodian": 1}),
+    "the car put down unsaid": (6, [report(MR1, TaskPhase.DONE, PLACE)], {"one-custodian": 1}),
+    "the car leaves from the shuttle": (6, [car_at(MR1, OUTSIDE, 2)], {"cars-conserved": 1}),
+    "refused without why": (3, [report(1, TaskPhase.REFUSED)], {"tasks-served": 1}),
+}
+
+
+@pytest.mark.parametrize(("step", "messages", "broken"), WRONG.values(), ids=WRONG.keys())
+def test_what_is_wrong_is_found_by_its_rule(step: int, messages: list[Message], broken: dict[str, int]) -> None:
+    found = tell(told(step, messages)).broken(STORY[step][0] + 1.5)
+    assert found == broken
+
+
+def test_two_bids_may_cross_on_their_way() -> None:
+    assert tell(told(2, [bid(13, 70_000)], at_s=1.51)).broken() == {}
+
+
+def test_with_faults_a_bidder_may_not_have_heard_the_better_bid() -> None:
+    verdict = tell(told(2, [bid(13, 70_000)]), disturbed=True).verdict()
+    assert verdict.is_good and "bids-go-down" in verdict.left_out
+
+
+def test_a_bid_after_the_deadline_does_not_win() -> None:
+    tape = tell(STORY[:1]).say(2.1, bid(MR1, 50_000)).say(2.2, award(MR1))
+    assert tape.broken() == {"bids-in-time": 1}
+
+
+def test_a_call_that_is_never_closed_is_found() -> None:
+    assert tell(STORY[:3]).broken(4.5) == {"calls-closed": 1}
+
+
+def test_a_call_whose_initiator_started_anew_is_over() -> None:
+    assert tell(STORY[:3]).say(3, power_up(2)).say(5, power_up(2)).broken() == {}
+
+
+def test_a_winner_may_give_the_task_back_before_it_was_heard() -> None:
+    rejected = [award(MR1), report(MR1, TaskPhase.FORFEITED, reason=Reason.IMPOSSIBLE), award(0, CallResult.REJECTED)]
+    tape = tell(told(3, [*rejected])).say(3, call(2, 4), bid(MR2, 70_000, 2)).say(4, award(MR2, number=2))
+    assert tape.say(5, report(MR2, TaskPhase.AWARDED)).broken() == {}
+
+
+def test_the_custodian_may_award_anew_under_a_raised_version() -> None:
+    again = [call(2, 3.9), bid(MR2, 70_000, 2)]
+    same = tell(STORY[:4]).say(3, *again).say(4, award(MR2, number=2))
+    assert same.broken() == {"one-owner": 1}
+    raised = tell(STORY[:4]).say(3, *again).say(4, award(MR2, number=2, version=2))
+    assert raised.broken() == {}
+
+
+CARS: dict[str, tuple[list[Message], str]] = {
+    "two cars in one place": ([car_at(1, PLACE, 3), car_at(1, PLACE, 5, Reference(1, 9))], "cars-conserved"),
+    "a car that jumps": ([car_at(1, PLACE, 3), car_at(1, OTHER_PLACE, 3)], "cars-conserved"),
+    "a car that comes back": ([car_at(1, BAY, 3), car_at(1, OUTSIDE, 3), car_at(1, BAY, 3)], "cars-conserved"),
+    "two cars on one shuttle": (
+        [car_at(MR1, ANY_STATION, 3), car_at(MR1, ANY_STATION, 3, Reference(1, 9))],
+        "cars-conserved",
+    ),
+    "a car that changes shuttles": ([car_at(MR1, ANY_STATION, 3), car_at(MR2, ANY_STATION, 4)], "cars-conserved"),
+}
+
+
+@pytest.mark.parametrize(("messages", "rule"), CARS.values(), ids=CARS.keys())
+def test_cars_are_conserved(messages: list[Message], rule: str) -> None:
+    assert Tape(one_alley(), started=False).say(1, *messages).broken() == {rule: 1}
+
+
+def test_a_car_that_never_came_in_is_found_where_the_log_has_the_beginning() -> None:
+    assert Tape(one_alley()).say(1, car_at(1, PLACE, 1)).broken() == {"cars-conserved": 1}
+    assert Tape(one_alley(), started=False).say(1, car_at(1, PLACE, 1)).broken() == {}
+
+
+def test_a_task_that_stays_open_is_found() -> None:
+    tape = tell(STORY[:4])
+    assert tape.say(3_590, power_up()).broken(3_610)["tasks-served"] == 1
+
+
+def test_the_finding_names_time_machines_and_frame() -> None:
+    verdict = tell(told(4, [report(MR2, TaskPhase.STARTED)])).verdict()
+    (finding,) = verdict.findings
+    assert (finding.time_us, finding.rule, finding.machines) == (20_000_000, "one-owner", (MR2, MR1))
+    assert "task 1.1" in finding.what and "TaskReport" in finding.evidence
