@@ -123,9 +123,7 @@ class _Part(NamedTuple):
     end_us: int
 
 
-def itinerary_windows(
-    site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
-) -> list[Window]:
+def itinerary_windows(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> list[Window]:
     """All windows of an itinerary; after the last leg the machine stands where it ends, without end.
 
     The first leg begins at ``first_begin_us``, by default when the task was awarded. Legs on tracks that the site does
