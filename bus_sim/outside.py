@@ -21,6 +21,8 @@ class Outside:
         self._console = console
         self._server: SocketcandServer | None = None
         self._bridges: list[Bridge] = []
+        #: Host and port that are served, once they are.
+        self.served: tuple[str, int] | None = None
 
     async def __aenter__(self) -> None:
         if self._address is not None or self._buses:
@@ -50,6 +52,7 @@ class Outside:
         )
         bound = await server.start()
         self._server = server
+        self.served = (host or "127.0.0.1", bound)
         channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
         self._console.print(
             f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False

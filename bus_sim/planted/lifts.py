@@ -81,7 +81,7 @@ def _platform_from_afar(simulation: Simulation) -> None:
     """Platform and gate are granted to the robot of the next ride wherever the lift is."""
 
     def plant(lift: Any) -> None:
-        replace(lift, "_stands_at", lambda old: lambda index: lift.ride is None or old(index))
+        replace(lift, "_stands_at", lambda old: lambda index: not lift._gate_was_out or old(index))
 
     in_behaviour(simulation, KindCode.LIFT, plant)
 

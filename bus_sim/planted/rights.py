@@ -115,18 +115,28 @@ def _a_point(simulation: Simulation) -> None:
     in_behaviour(simulation, KindCode.ROBOT, plant)
 
 
-def _grants_to_all(simulation: Simulation) -> None:
-    """Stewards grant segments to whoever asks, and robots plan as if they were alone."""
+def _others_are_mine(simulation: Simulation) -> None:
+    """A steward takes slots that are others' for its own, and grants them."""
     _steward_for_ever(simulation)
     _alone(simulation)
 
 
+def _all_is_mine(simulation: Simulation) -> None:
+    """Robots take every slot for their own, and plan as if they were alone."""
+    _alone(simulation)
+
+    def plant(controller: Controller) -> None:
+        replace(controller.holon.tokens, "holds", lambda old: lambda key: key.kind is TokenKind.SEGMENT or old(key))
+
+    at_start(simulation, KindCode.ROBOT, plant)
+
+
 BUGS = (
     PlantedBug("version-not-raised", "one-holder", "a token is given under the version it had", _version_not_raised),
-    PlantedBug("steward-for-ever", "one-holder", "a steward takes others' slots for its own", _grants_to_all),
+    PlantedBug("steward-for-ever", "one-holder", "a steward takes others' slots for its own", _others_are_mine),
     PlantedBug("keeps-what-it-gives", "doors", "a compartment gives its bay and does not erase it", _without_erasing),
     PlantedBug("drives-unasked", "inside-authority", "a robot drives to its goal, whatever it holds", _unasked),
     PlantedBug("body-is-a-point", "inside-authority", "a robot gives slots back while its rear is in", _a_point),
-    PlantedBug("grants-to-all", "one-body", "stewards grant to whoever asks", _grants_to_all),
+    PlantedBug("all-is-mine", "one-body", "robots take every slot for their own", _all_is_mine),
     PlantedBug("drives-through", "one-body", "robots plan and drive as if they were alone", _sees_nobody),
 )

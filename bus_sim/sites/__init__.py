@@ -18,14 +18,20 @@ def site_names() -> list[str]:
     )
 
 
+def site_text(name: str) -> str:
+    """The text of a site file that ``find_site`` has read."""
+    if name in site_names():
+        return files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
+    return Path(name).read_text(encoding="utf-8")
+
+
 def find_site(name: str) -> Site:
     """A shipped site by its name, else a site file by its path.
 
     Raises ``SiteNotFoundError`` where there is neither, and ``ConfigError`` for a file with mistakes.
     """
     if name in site_names():
-        file = f"{name}.toml"
-        return parse_site(files(__name__).joinpath(file).read_text(encoding="utf-8"), file)
+        return parse_site(site_text(name), f"{name}.toml")
     if not Path(name).exists():
         raise SiteNotFoundError(
             f'site "{name}": no such file, and no such shipped site; shipped: {", ".join(site_names())}'

@@ -23,12 +23,12 @@ CONNECT_TIMEOUT_S = 5.0
 class SocketcandBus:
     """One node's connection to a channel of a socketcand server, in raw mode.
 
-    While the server is away ``send`` refuses, ``health`` tells bus-off, and the connection is tried again for ever
-    with growing pauses. The protocol confirms nothing: ``on_sent`` is called once the frame is handed to TCP.
-    Remote frames do not exist in the protocol and are refused.
+    While the server is away ``send`` refuses, ``health`` tells bus-off, and the connection is tried again with growing
+    pauses: for ever, or until it has been away for ``give_up_s``. The protocol confirms nothing: ``on_sent`` is called
+    once the frame is handed to TCP. Remote frames do not exist in the protocol and are refused.
     """
 
-    def __init__(self, host: str, port: int, channel: str) -> None:
+    def __init__(self, host: str, port: int, channel: str, give_up_s: float | None = None) -> None:
         """``start`` connects."""
         self.name = f"socketcand:{channel}@{host}:{port}"
         self.counts: Counter[str] = Counter()
@@ -39,6 +39,8 @@ class SocketcandBus:
         self._connection: _Connection | None = None
         self._returning: asyncio.Task[None] | None = None
         self._closed = False
+        self._give_up_s = give_up_s
+        self._lost: asyncio.Future[str] = self._loop.create_future()
 
     async def start(self) -> None:
         """Connect for the first time. Raises ``BusOpenError``."""
@@ -73,9 +75,8 @@ class SocketcandBus:
         )
 
     async def wait_lost(self) -> str:
-        """Never returns: the connection always may come back."""
-        await self._loop.create_future()
-        raise AssertionError("unreachable")
+        """As ``OpenBus`` says; without ``give_up_s`` it never returns, for the server always may come back."""
+        return await asyncio.shield(self._lost)
 
     async def close(self) -> None:
         """As in the port."""
@@ -103,10 +104,14 @@ class SocketcandBus:
         self._connection = made
 
     async def _return(self) -> None:
-        """Connect again, for ever; the server's refusals are no different from its absence."""
+        """Connect again, until given up; the server's refusals are no different from its absence."""
         pause_s = BACKOFF_S
+        lost_at = self._loop.time()
         while True:
             await asyncio.sleep(pause_s)
+            if self._give_up_s is not None and self._loop.time() - lost_at >= self._give_up_s:
+                self._lost.set_result(f"no server at {self.name} for {self._give_up_s:g} s")
+                return
             self.counts["reconnect_attempts"] += 1
             try:
                 await self._connect()
@@ -222,16 +227,24 @@ _OnEnd = Callable[[_Connection], None]
 
 
 async def open_socketcand(settings: BusSettings) -> SocketcandBus:
-    """Open the channel of ``settings``; ``host`` and ``port`` are its further arguments. Raises ``BusOpenError``."""
+    """Open the channel of ``settings``, with ``host``, ``port`` and ``give_up_s`` as further arguments.
+
+    Raises ``BusOpenError``.
+    """
     extra = dict(settings.extra)
     host, port = extra.pop("host", "127.0.0.1"), extra.pop("port", DEFAULT_PORT)
+    give_up_s = extra.pop("give_up_s", None)
     if extra:
         unknown = ", ".join(sorted(extra))
-        raise BusOpenError(f"interface {settings.interface}: unknown argument {unknown}; it takes host and port")
+        raise BusOpenError(
+            f"interface {settings.interface}: unknown argument {unknown}; it takes host, port and give_up_s"
+        )
     if isinstance(port, bool) or not isinstance(port, int) or not 0 < port < 1 << 16:
         raise BusOpenError(f"interface {settings.interface}: port = {port}: must be a number from 1 to 65535")
+    if give_up_s is not None and (isinstance(give_up_s, bool | str) or not give_up_s > 0):
+        raise BusOpenError(f"interface {settings.interface}: give_up_s = {give_up_s}: must be a number above 0")
     if not settings.channel or any(letter in "<> " for letter in settings.channel):
         raise BusOpenError(f'interface {settings.interface}: channel = "{settings.channel}": must be one word')
-    bus = SocketcandBus(str(host), port, settings.channel)
+    bus = SocketcandBus(str(host), port, settings.channel, give_up_s)
     await bus.start()
     return bus

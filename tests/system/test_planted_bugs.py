@@ -25,7 +25,7 @@ ON_ONE_ALLEY = {
     "version-not-raised",
     "steward-for-ever",
     "keeps-what-it-gives",
-    "grants-to-all",
+    "all-is-mine",
     "drives-through",
     "segments-kept",
 }
@@ -37,16 +37,16 @@ def site_for(bug: str) -> Site:
     return one_floor(2) if bug in ON_ONE_ALLEY else find_site("small")
 
 
-def hunt(site: Site, bug: str, rule: str) -> tuple[Verdict, Simulation]:
-    """Run three cars in and out until the rule finds something, or to the limit."""
+def hunt(site: Site, bug: str, rule: str, limit_s: int = LIMIT_S) -> tuple[Verdict, Simulation]:
+    """Run three cars in and out until the rule, or without one the oracle, finds something, or to the limit."""
     loop = VirtualTimeLoop()
     try:
-        return loop.run_until_complete(_hunt(site, bug, rule, loop))
+        return loop.run_until_complete(_hunt(site, bug, rule, limit_s, loop))
     finally:
         loop.close()
 
 
-async def _hunt(site: Site, bug: str, rule: str, loop: VirtualTimeLoop) -> tuple[Verdict, Simulation]:
+async def _hunt(site: Site, bug: str, rule: str, limit_s: int, loop: VirtualTimeLoop) -> tuple[Verdict, Simulation]:
     simulation = build(site, RunOptions(), loop)
     checks = Checks(site)
 
@@ -64,12 +64,13 @@ async def _hunt(site: Site, bug: str, rule: str, loop: VirtualTimeLoop) -> tuple
     if bug:
         BUGS[bug].plant(simulation)
     simulation.start()
-    served = simulation.plant.street
+    oracle, street = simulation.plant.oracle, simulation.plant.street
 
     def over() -> bool:
-        return checks.verdict.counts[rule] > 0 or (not bug and served.is_over)
+        found = checks.verdict.counts[rule] > 0 if rule else bool(oracle.violations)
+        return found or (not bug and street.is_over)
 
-    await run_until(simulation, over, LIMIT_S * 1_000_000, 1_000_000)
+    await run_until(simulation, over, limit_s * 1_000_000, 1_000_000)
     await asyncio.sleep(0)
     return checks.finish(), simulation
 
@@ -83,7 +84,7 @@ def test_a_planted_bug_is_found_by_its_rule(name: str) -> None:
 
 def test_without_a_bug_nothing_is_found() -> None:
     for site in (one_floor(2), find_site("small")):
-        verdict, simulation = hunt(site, "", "none")
+        verdict, simulation = hunt(site, "", "any")
         assert verdict.is_good, "\n".join(verdict.lines())
         assert simulation.plant.oracle.finish() == []
 
@@ -96,5 +97,5 @@ def test_every_rule_has_two_planted_bugs() -> None:
 
 @pytest.mark.parametrize("name", ["drives-through", "no-light-curtain", "no-door-interlock", "all-places-free"])
 def test_the_oracle_in_the_plant_finds_what_really_happens(name: str) -> None:
-    _, simulation = hunt(site_for(name), name, "none of them")
+    _, simulation = hunt(site_for(name), name, "", limit_s=600)
     assert simulation.plant.oracle.finish()

@@ -1,0 +1,195 @@
+"""Every machine of a site as an operating-system process that runs the ordinary ``onboard`` program."""
+
+import asyncio
+import os
+import resource
+import signal
+import sys
+import tempfile
+from asyncio.subprocess import DEVNULL, Process
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+import onboard
+from bus_sim.processes.plan import ProcessPlan, Span, machine_file, spans_of
+from bus_sim.run import Simulation
+
+#: How long a process may take to end once it was told to, s: two closings of a connection and a journal write.
+GRACE_S = 5.0
+#: A process that was told to end says 0, or was told before it could listen.
+_ENDED_AS_TOLD = (0, -signal.SIGTERM)
+
+
+class ProcessesError(Exception):
+    """The processes cannot be started; ``str`` is one line for a person."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Running:
+    process: Process
+    ended: asyncio.Task[int]
+
+
+class ProcessFleet:
+    """The controllers of a simulated site in processes of their own, for the time of a run.
+
+    Each has a machine file, a journal and a log in one directory. A process that ends without having been told to is
+    told in ``failures`` with its last words, and ends the run: ``is_over``. So do the signals INT and TERM. Entering
+    raises ``ProcessesError``.
+    """
+
+    def __init__(self, simulation: Simulation, plan: ProcessPlan, outside: frozenset[str], console: Console) -> None:
+        """``outside`` are machines that somebody else runs, or nobody. Raises ``ValueError`` for a bad plan."""
+        names = [machine.name for machine in simulation.site.machines.values() if machine.name not in outside]
+        self.failures: list[str] = []
+        self.is_over = False
+        self._simulation = simulation
+        self._plan = plan
+        self._spans = spans_of(plan.moments, names)
+        self._console = console
+        self._directory = Path()
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+        self._running: dict[str, _Running] = {}
+        self._lives: list[asyncio.Task[None]] = []
+        self._started = 0
+        self._cpu_before_s = _cpu_of_children_s()
+        self._begin_s = 0.0
+
+    async def start(self, host: str, port: int) -> None:
+        """Write the machine files and start all that are on from the beginning; the others start in their time."""
+        self._write_files(host, port)
+        for medium in self._simulation.devices.values():
+            # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
+            medium.attach("process host", None)
+        loop = asyncio.get_running_loop()
+        self._begin_s = loop.time()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self._interrupt, number)
+        self._lives = [loop.create_task(self._live(name, spans)) for name, spans in self._spans.items()]
+        self._console.print(f"{len(self._lives)} machines in processes of their own", highlight=False)
+
+    async def stop(self) -> None:
+        """End all processes, politely first, and forget their files unless a directory was named."""
+        loop = asyncio.get_running_loop()
+        span_s = self._since_s()
+        for life in self._lives:
+            life.cancel()
+        for ended in await asyncio.gather(*self._lives, return_exceptions=True):
+            if isinstance(ended, Exception):
+                raise ended
+        await asyncio.gather(*(self._end(name, signal.SIGTERM) for name in list(self._running)))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.remove_signal_handler(number)
+        if self._temporary is not None:
+            self._temporary.cleanup()
+        if self._started and span_s > 0:
+            share = (_cpu_of_children_s() - self._cpu_before_s) / span_s
+            self._console.print(
+                f"{self._started} processes were started; together they took {share:.1%} of one processor, starting "
+                f"included; the simulator fell {self._simulation.loop.slipped_s:.1f} s behind the clock",
+                highlight=False,
+                soft_wrap=True,
+            )
+
+    # --- one machine -------------------------------------------------------------------------------------------
+
+    async def _live(self, name: str, spans: list[Span]) -> None:
+        for span in spans:
+            await asyncio.sleep(self._left_s(span.begin_s))
+            running = await self._start(name)
+            await asyncio.wait([running.ended], timeout=self._left_s(span.end.at_s) if span.end is not None else None)
+            if running.ended.done():
+                del self._running[name]
+                self._fail(name, f"ended by itself, {_status(running.ended.result())}")
+            elif span.end is not None:
+                await self._end(name, span.end.change.signal)
+                self._tell(f"{name} {'was killed' if span.end.change.signal is signal.SIGKILL else 'has left'}")
+
+    def _since_s(self) -> float:
+        return asyncio.get_running_loop().time() - self._begin_s
+
+    def _left_s(self, at_s: float) -> float:
+        return max(0.0, at_s - self._since_s())
+
+    async def _start(self, name: str) -> _Running:
+        root = str(Path(onboard.__file__).parents[1])
+        paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
+        with self._log(name).open("ab") as log:
+            process = await asyncio.create_subprocess_exec(
+                *(sys.executable, "-m", "onboard", "--machine", f"{name}.toml"),
+                cwd=self._directory,
+                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
+                stdin=DEVNULL,
+                stdout=DEVNULL,
+                stderr=log,
+                # A key pressed in this terminal ends the run, and the run ends its processes.
+                start_new_session=True,
+            )
+        running = _Running(process, asyncio.get_running_loop().create_task(process.wait()))
+        self._running[name] = running
+        self._started += 1
+        self._tell(f"{name} is process {process.pid}")
+        return running
+
+    async def _end(self, name: str, how: signal.Signals) -> None:
+        running = self._running.pop(name)
+        if not running.ended.done():
+            running.process.send_signal(how)
+        _, late = await asyncio.wait([running.ended], timeout=GRACE_S)
+        if late:
+            running.process.kill()
+            await running.ended
+            self._fail(name, f"did not end within {GRACE_S:.0f} s of {how.name} and was killed")
+        elif running.ended.result() not in (*_ENDED_AS_TOLD, -how):
+            self._fail(name, f"was told to end, {_status(running.ended.result())}")
+
+    def _fail(self, name: str, what: str) -> None:
+        words = self._log(name).read_text(encoding="utf-8", errors="replace").split("\n")
+        last = next((line.removeprefix("onboard: ") for line in reversed(words) if line.strip()), "it said nothing")
+        self.failures.append(f"{name}: its process {what}; last words: {last}")
+        self.is_over = True
+
+    # --- all of them -------------------------------------------------------------------------------------------
+
+    def _interrupt(self, number: signal.Signals) -> None:
+        self._tell(f"{number.name}: ending")
+        self.is_over = True
+
+    def _tell(self, what: str) -> None:
+        self._console.print(f"{self._since_s():7.1f} s  {what}", highlight=False, soft_wrap=True)
+
+    def _log(self, name: str) -> Path:
+        return self._directory / f"{name}.log"
+
+    def _write_files(self, host: str, port: int) -> None:
+        try:
+            if self._plan.directory is None:
+                self._temporary = tempfile.TemporaryDirectory(prefix="bus-sim-")
+                self._directory = Path(self._temporary.name)
+            else:
+                self._directory = self._plan.directory.resolve()
+                self._directory.mkdir(parents=True, exist_ok=True)
+                if any(self._directory.glob("journal-*")):
+                    raise ProcessesError(
+                        f"{self._plan.directory}: holds the journals of another run, which tell of another world; "
+                        "name an empty directory"
+                    )
+            (self._directory / "site.toml").write_text(self._plan.site_text, encoding="utf-8")
+            for name in self._spans:
+                (self._directory / f"{name}.toml").write_text(machine_file(name, host, port), encoding="utf-8")
+        except OSError as error:
+            raise ProcessesError(
+                f"{error.filename}: cannot be written ({error.strerror}); name another directory"
+            ) from error
+
+
+def _status(code: int) -> str:
+    return f"status {code}" if code >= 0 else f"by {signal.Signals(-code).name}"
+
+
+def _cpu_of_children_s() -> float:
+    """Processor time of all children that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
