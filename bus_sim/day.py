@@ -183,6 +183,7 @@ class _Day:
         clock = Clock(self._zero)
         show = TerminalShow(simulation.site, simulation.view, clock, lambda: _figures(simulation), console)
         async with AsyncExitStack() as stack:
+            stack.callback(simulation.close)
             if self._window is None:
                 await stack.enter_async_context(outside)
                 simulation.start()
@@ -200,7 +201,6 @@ class _Day:
                 await stack.enter_async_context(outside)
                 await self._through(self._window, show)
         wall_s = time.monotonic() - self._begin_s
-        simulation.close()
         summary = self._summarise(wall_s)
         for line in summary.lines():
             console.print(line, highlight=False, soft_wrap=True)
