@@ -1,0 +1,1 @@
+"""What the simulator adds for each system: its plant, picture and demand."""
