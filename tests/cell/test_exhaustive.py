@@ -106,6 +106,15 @@ def test_c13_the_filter_by_the_start_loses_nothing(seed: int) -> None:
         assert with_it.messages <= without.messages
 
 
+def test_c12_a_part_that_comes_back_is_not_found() -> None:
+    """The paper's proviso: without circular paths. Here the only chain is R1, R2, R1, R4 (found by drawing cells)."""
+    arms, goal = _cell(Random(229))
+    homes = {one.node_id: one.home for one in arms}
+    round_about = ContractTree(arms, homes, filters=frozenset()).solve(goal)
+    assert round_about is not None and round_about.nodes == (1, 2, 1, 4)
+    assert ContractTree(arms, homes).solve(goal) is None
+
+
 def test_c20_goal_messages_stay_below_the_bound() -> None:
     random = Random(7)
     for _ in range(40):
