@@ -13,7 +13,7 @@ ARGS ?=
 PYTEST_ARGS ?=
 export REQUIRE
 
-.PHONY: help run test lint format models bench docs clean
+.PHONY: help run test coverage lint format models bench docs clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
@@ -22,8 +22,11 @@ help: ## this list
 run: $(VENV)/.run ## set up, then show the busiest hour of a real day on the standard site in about a minute
 	@$(BIN)/bus-sim run $(ARGS)
 
-test: lint ## set up, lint, then all tests with coverage; REQUIRE=all makes a skipped test a failure
-	$(BIN)/python -m pytest --cov --cov-report=term $(PYTEST_ARGS)
+test: lint ## set up, lint, then all tests on all processors; REQUIRE=all makes a skipped test a failure
+	$(BIN)/python -m pytest --numprocesses auto $(PYTEST_ARGS)
+
+coverage: $(VENV)/.test ## all tests once more, with the lines that they ran; takes twice as long
+	$(BIN)/python -m pytest --numprocesses auto --cov --cov-report=term $(PYTEST_ARGS)
 
 lint: $(VENV)/.test ## set up, then ruff (rules and format) and mypy --strict
 	$(BIN)/ruff check .

@@ -20,7 +20,8 @@ from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import CallResult, KindCode
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
-from onboard.core.site import RideCalls, Site
+from onboard.core.site import Site
+from onboard.kinds.car_park.site import RideCalls
 from onboard.kinds.registry import factory_for
 from onboard.wire.codec import fleet_codec
 
@@ -38,7 +39,7 @@ class Mode(NamedTuple):
 
     name: str
     rides: RideCalls
-    factories: Callable[[KindCode], BehaviourFactory]
+    factories: Callable[[Site, KindCode], BehaviourFactory]
 
 
 MODES = (

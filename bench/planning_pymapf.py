@@ -4,12 +4,12 @@
 
 One place and one floor take a tick, a ride a tick more, carriers are as long as a place and speed up at once. So both
 planners can be as good as the other: pymapf (https://github.com/openplan-labs/pymapf, 0.9) moves from cell to cell,
-ours in runs of any length. What others hold becomes vertex constraints: a carrier that comes from, or goes to, the next cell
-is in both for that tick, so a cell held during ``[a, b)`` is forbidden from tick a to tick b. A lift is a row of cells
-beside its platforms that is forbidden while others use the lift. pymapf plans one leg, and to where nobody comes any
-more; its two legs are two searches, the second around what is left after the first. Only searches are timed (processor
-time), with all of pymapf's constraints made before, and its heuristic once as the distance on the grid (its default)
-and once as the true distances, worked out before.
+ours in runs of any length. What others hold becomes vertex constraints: a carrier that comes from, or goes to, the next
+cell is in both for that tick, so a cell held during ``[a, b)`` is forbidden from tick a to tick b. A lift is a row of
+cells beside its platforms that is forbidden while others use the lift. pymapf plans one leg, and to where nobody comes
+any more; its two legs are two searches, the second around what is left after the first. Only searches are timed
+(processor time), with all of pymapf's constraints made before, and its heuristic once as the distance on the grid (its
+default) and once as the true distances, worked out before.
 """
 
 import argparse

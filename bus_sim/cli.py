@@ -3,7 +3,7 @@
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
@@ -18,6 +18,7 @@ from bus_sim.processes.options import ANY_PORT, add_processes, process_plan
 from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names
+from bus_sim.systems.registry import RUNNERS, SystemOptions
 from onboard import __version__
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
@@ -177,20 +178,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
-        if args.command == "sites":
-            print("\n".join(site_names() if args.site is None else site_report(find_site(args.site))))
-            return 0
-        if args.command == "compare":
-            return run_compare(args)
-        if args.command == "campaign":
-            return run_campaign_command(args)
-        if args.command == "run" and args.scenario is not None:
-            return _run_scenario(args)
-        site = find_site(args.site or DEFAULT_SITE)
-        if args.command == "dbc":
-            sys.stdout.write(site_dbc(site))
-            return 0
-        summary = run_day(site, _day_options(args, site))
+        return COMMANDS[args.command](args)
     except (
         ConfigError,
         DemandError,
@@ -205,9 +193,38 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except BrokenPipeError:
         return 1
+
+
+def _sites(args: argparse.Namespace) -> int:
+    print("\n".join(site_names() if args.site is None else site_report(find_site(args.site))))
+    return 0
+
+
+def _dbc(args: argparse.Namespace) -> int:
+    sys.stdout.write(site_dbc(find_site(args.site)))
+    return 0
+
+
+def _run(args: argparse.Namespace) -> int:
+    if args.scenario is not None:
+        return _run_scenario(args)
+    site = find_site(args.site or DEFAULT_SITE)
+    if site.system in RUNNERS:
+        return RUNNERS[site.system](site, _system_options(args, site))
+    summary = run_day(site, _day_options(args, site))
     if args.json is not None:
         args.json.write_text(json.dumps(summary.to_json(), indent=2) + "\n", encoding="utf-8")
     return 0 if summary.is_good else 1
+
+
+#: What each command does with its options; they return the exit status.
+COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
+    "run": _run,
+    "sites": _sites,
+    "dbc": _dbc,
+    "compare": run_compare,
+    "campaign": run_campaign_command,
+}
 
 
 class OptionError(ValueError):
@@ -258,13 +275,37 @@ def _run_scenario(args: argparse.Namespace) -> int:
     return run_scenario(args.scenario, args.trace, args.json)
 
 
-def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
+def _faults(args: argparse.Namespace) -> list[AnyFault]:
     faults: list[AnyFault] = []
     for text in args.fault:
         try:
             faults.append(parse_injection(text))
         except ValueError as error:
             raise OptionError(f"--fault {text}: {error}") from error
+    return faults
+
+
+def _system_options(args: argparse.Namespace, site: Site) -> SystemOptions:
+    """The options for a system that is no car park. Raises ``OptionError`` for one that only a car park has."""
+    usual = build_parser().parse_args(["run"])
+    taken = {"command", "site", "seed", "speed", "limit_s", "trace", "devices", "json", "fault"}
+    for name, value in vars(args).items():
+        if name not in taken and value != getattr(usual, name):
+            option = f"--{name.removesuffix('_s').replace('_', '-')}"
+            raise OptionError(f"{option}: only a car park has it, and {site.name} is a {site.system}; leave it out")
+    return SystemOptions(
+        seed=args.seed,
+        speed=_speed(args.speed),
+        limit_s=args.limit_s,
+        trace=args.trace,
+        devices=args.devices,
+        json=args.json,
+        faults=tuple(_faults(args)),
+    )
+
+
+def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
+    faults = _faults(args)
     speed = _speed(args.speed)
     try:
         parse_bus_specs(args.bus, 500_000)

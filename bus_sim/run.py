@@ -7,6 +7,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Protocol
 
 from bus_sim.can.faults import Fault
 from bus_sim.can.medium import Medium, Tap
@@ -21,11 +22,11 @@ from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.messages import Message
 from onboard.core.site import Machine, Site
-from onboard.kinds.registry import factory_for
+from onboard.kinds.registry import factory_for, system_of
 from onboard.ports.bus import Bus
 from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
-from onboard.wire.codec import device_codec, fleet_codec
+from onboard.wire.codec import codecs
 from onboard.wire.decoder import Decoder
 
 #: The fleet bus in a log and on the served socket.
@@ -73,29 +74,39 @@ class NoWatchdog:
         """Nothing to tell."""
 
 
+class PlantPort(Protocol):
+    """What a run asks of the plant of any system: everything that is not a controller."""
+
+    def start(self) -> None:
+        """Power on: every device tells how it stands."""
+
+
 @dataclass
-class Simulation:
-    """A site that can be run. Build it on its own loop with ``build``; then ``run_until``."""
+class BusRun:
+    """A site of any system that can be run: buses, plant and controllers, connected but not switched on."""
 
     site: Site
     options: RunOptions
     loop: VirtualTimeLoop
     fleet: Medium
     devices: dict[int, Medium]
-    plant: Plant
-    view: SiteView
+    plant: PlantPort
     log: EventLog = field(default_factory=EventLog)
     controllers: dict[int, Controller] = field(default_factory=dict)
     journals: dict[int, SimulatedJournal] = field(default_factory=dict)
     writer: CandumpWriter | None = None
     #: Which behaviour drives which kind; baselines put their own in before ``start``.
-    factories: Callable[[KindCode], BehaviourFactory] = factory_for
+    factories: Callable[[Site, KindCode], BehaviourFactory] = factory_for
     #: What the controllers are made of; faults put in one whose clock and processor may fail.
     holon_class: type[Holon] = Holon
-    #: Told every message of the fleet bus with its time, after the view.
+    #: Told every message of the fleet bus with its time, in this order.
     observers: list[Callable[[Message, int], None]] = field(default_factory=list)
     #: Given every controller when it is powered up, before it starts: planted bugs come in here, and nothing else.
     before_start: list[Callable[[Controller], None]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        system = system_of(self.site)
+        self.codecs = codecs(system.name, system.messages)
 
     def start(self) -> None:
         """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop."""
@@ -111,7 +122,7 @@ class Simulation:
         entries = journal.replay()
         boots = sum(1 for entry in entries if entry.get("record") == "boot")
         holon = self.holon_class(
-            self.site, machine, self.factories(machine.kind), boot=boots % 255 + 1, entries=entries
+            self.site, machine, self.factories(self.site, machine.kind), boot=boots % 255 + 1, entries=entries
         )
         ports = Ports(
             self.fleet.attach(machine.name, machine.node_id),
@@ -120,7 +131,7 @@ class Simulation:
             self.log,
             NoWatchdog(),
         )
-        controller = Controller(holon, ports, fleet_codec(), device_codec())
+        controller = Controller(holon, ports, self.codecs.fleet, self.codecs.device)
         self.controllers[machine.node_id] = controller
         for prepare in self.before_start:
             prepare(controller)
@@ -166,14 +177,13 @@ class Simulation:
     def _tap(self) -> None:
         if self.options.trace is not None:
             self.writer = CandumpWriter(self.options.trace)
-        decoder = Decoder(fleet_codec())
+        decoder = Decoder(self.codecs.fleet)
 
         def on_fleet(frame: Frame, time_us: int, _: str) -> None:
             if self.writer is not None:
                 self.writer.write(self.options.epoch_us + time_us, FLEET, frame)
             message: Message | None = decoder.feed(frame, time_us)
             if message is not None:
-                self.view.feed(message, time_us)
                 for observer in self.observers:
                     observer(message, time_us)
 
@@ -190,16 +200,34 @@ class Simulation:
         return on_device
 
 
-def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
-    """All parts of a run, connected but not switched on."""
+@dataclass
+class Simulation(BusRun):
+    """A car park that can be run. Build it on its own loop with ``build``; then ``run_until``."""
+
+    plant: Plant
+    view: SiteView = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.view = SiteView(self.site)
+        self.observers.append(self.view.feed)
+
+
+def buses_of(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> tuple[Medium, dict[int, Medium]]:
+    """The fleet bus, and each machine's device bus by its node-ID."""
     fleet = Medium(loop, bit_rate=site.bitrate, faults=options.faults)
-    devices = {node_id: Medium(loop, bit_rate=site.bitrate) for node_id in site.machines}
+    return fleet, {node_id: Medium(loop, bit_rate=site.bitrate) for node_id in site.machines}
+
+
+def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
+    """All parts of a run of a car park, connected but not switched on."""
+    fleet, devices = buses_of(site, options, loop)
     plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()}, options.seed)
-    return Simulation(site, options, loop, fleet, devices, plant, SiteView(site))
+    return Simulation(site, options, loop, fleet, devices, plant)
 
 
 async def run_until(
-    simulation: Simulation,
+    simulation: BusRun,
     done: Callable[[], bool],
     limit_us: int,
     step_us: int,

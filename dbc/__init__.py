@@ -1,4 +1,4 @@
-"""The wire contract as data: ``fleet.dbc`` and ``device.dbc``. The files are the truth; this only finds them."""
+"""The wire contract as data: ``fleet.dbc``, ``device.dbc`` and what single systems add. This only finds the files."""
 
 from importlib.resources import files
 
@@ -11,3 +11,15 @@ def fleet_dbc_text() -> str:
 def device_dbc_text() -> str:
     """Text of the contract between a machine and its own drives, doors and sensors."""
     return files(__name__).joinpath("device.dbc").read_text(encoding="utf-8")
+
+
+def systems() -> list[str]:
+    """Names of the systems that have a file of their own."""
+    names = (entry.name for entry in files(__name__).iterdir() if entry.name.endswith(".dbc"))
+    return sorted(name.removesuffix(".dbc") for name in names if name not in ("fleet.dbc", "device.dbc"))
+
+
+def system_dbc_text(system: str) -> str | None:
+    """Text of ``<system>.dbc``: what one system says beyond the two others, on both buses; None for nothing."""
+    file = files(__name__).joinpath(f"{system}.dbc")
+    return file.read_text(encoding="utf-8") if file.is_file() else None

@@ -16,8 +16,8 @@ from onboard.io.console import ConsoleTelemetry
 from onboard.io.journal import FileJournal
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.io.watchdog import SystemdWatchdog
-from onboard.kinds.registry import factory_for
-from onboard.wire.codec import device_codec, fleet_codec
+from onboard.kinds.registry import factory_for, system_of
+from onboard.wire.codec import codecs
 
 EXIT_STATUS = """\
 exit status:
@@ -89,13 +89,17 @@ async def run(config: MachineConfig, fleet_settings: BusSettings, journal_direct
     journal = FileJournal(journal_directory)
     entries = journal.replay()
     boot = next_boot(entries)
-    holon = Holon(config.site, config.machine, factory_for(config.machine.kind), boot=boot, entries=entries)
+    holon = Holon(
+        config.site, config.machine, factory_for(config.site, config.machine.kind), boot=boot, entries=entries
+    )
     fleet_bus = device_bus = await open_bus(fleet_settings)
     device_settings = BusSettings.of(config.device_bus)
     if device_settings != fleet_settings:
         device_bus = await open_bus(device_settings)
     ports = Ports(fleet_bus, device_bus, journal, ConsoleTelemetry(), SystemdWatchdog())
-    controller = Controller(holon, ports, fleet_codec(), device_codec())
+    system = system_of(config.site)
+    codec = codecs(system.name, system.messages)
+    controller = Controller(holon, ports, codec.fleet, codec.device)
     controller.start()
     status, why = await _until_ended(controller, fleet_bus, device_bus)
     if why:

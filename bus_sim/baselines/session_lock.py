@@ -68,6 +68,6 @@ class LockingRobotFactory(RobotFactory):
         return super().estimator(site, machine, mirror)
 
 
-def factories(kind: KindCode) -> BehaviourFactory:
+def factories(site: Site, kind: KindCode) -> BehaviourFactory:
     """The factory of one kind, robots with session locks."""
-    return LockingRobotFactory() if kind is KindCode.ROBOT else factory_for(kind)
+    return LockingRobotFactory() if kind is KindCode.ROBOT else factory_for(site, kind)

@@ -15,6 +15,7 @@ from bus_sim.plant.door import BOLT_US
 from onboard.core.kinematics import run_duration_us
 from onboard.core.roads import roads_of
 from onboard.core.site import Site
+from onboard.kinds.car_park.site import car_park
 
 
 class Acts(NamedTuple):
@@ -45,11 +46,12 @@ class FreeFlow:
     def of(cls, site: Site) -> "FreeFlow":
         """The least times of a site."""
         roads = roads_of(site)
+        park = car_park(site)
         fronts = frozenset(station.segment for station in site.compartments.values())
         return cls(
             close_us=site.timing.door_us + BOLT_US,
             open_us=site.timing.door_us,
-            handle_us=2 * run_duration_us(site.shuttle_reach_mm, site.shuttle) + site.timing.grip_us,
+            handle_us=2 * run_duration_us(park.shuttle_reach_mm, park.shuttle) + site.timing.grip_us,
             way_us=min(roads.nearest_us(place.segment, fronts) for place in site.places),
         )
 

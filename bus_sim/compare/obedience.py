@@ -120,9 +120,9 @@ class DispatchedRobotFactory(RobotFactory):
         return DispatchedGeneration(usual.site, usual.machine, usual.mirror, usual.program)
 
 
-def factories(kind: KindCode) -> BehaviourFactory:
+def factories(site: Site, kind: KindCode) -> BehaviourFactory:
     """The factory of one kind, robots that plan from the moment of the award."""
-    return DispatchedRobotFactory() if kind is KindCode.ROBOT else factory_for(kind)
+    return DispatchedRobotFactory() if kind is KindCode.ROBOT else factory_for(site, kind)
 
 
 def install(simulation: Simulation) -> dict[int, ObedientNegotiation]:

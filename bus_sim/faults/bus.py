@@ -169,7 +169,7 @@ class NoDevices:
 def double_id(simulation: Simulation, injection: Injection) -> None:
     """A second board with the same machine file, a journal of its own that is empty, and no devices behind it."""
     machine = next(one for one in simulation.site.machines.values() if one.name == injection.target)
-    holon = Holon(simulation.site, machine, simulation.factories(machine.kind))
+    holon = Holon(simulation.site, machine, simulation.factories(simulation.site, machine.kind))
     fleet = simulation.fleet.attach(f"{machine.name} again {injection.at_us}", machine.node_id)
     ports = Ports(fleet, NoDevices(), SimulatedJournal(), simulation.log, NoWatchdog())
     controller = Controller(holon, ports, fleet_codec(), device_codec())

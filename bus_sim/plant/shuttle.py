@@ -7,6 +7,7 @@ from bus_sim.plant.world import RobotBody, World
 from onboard.core.codes import ShuttleAction, ShuttleMode, Side
 from onboard.core.messages import Message, ShuttleOrder, ShuttleState
 from onboard.core.site import Site, Station
+from onboard.kinds.car_park.site import car_park
 
 #: The grippers hold a car whose wheelbase differs from the shuttle's by at most this, mm (ours).
 WHEELBASE_TOLERANCE_MM = 50
@@ -39,13 +40,13 @@ class Shuttle:
         self.mode = ShuttleMode.HOME
         self.fault = ""
         self.busy_refusals = 0
-        self._site = site
+        self._site = car_park(site)
         self._world = world
         self._timers = timers
         self._link = link
         self._order: ShuttleOrder | None = None
         self._sequence = 0
-        self._wheelbase_mm = site.cars.min_wheelbase_mm
+        self._wheelbase_mm = self._site.cars.min_wheelbase_mm
         self._station: Station | None = None
         self._action_timer: Timer | None = None
         self._repeat_timer: Timer | None = None

@@ -15,6 +15,7 @@ from onboard.core.codes import ANY_STATION, KindCode, ShuttleAction, TokenKind
 from onboard.core.effects import Send
 from onboard.core.messages import CarAt, Message, ShuttleOrder, TokenGrant
 from onboard.kinds.car_park.handling import Phase
+from onboard.kinds.car_park.site import car_park
 
 
 def _all_places_free(simulation: Simulation) -> None:
@@ -71,7 +72,7 @@ def _everybodys_car(simulation: Simulation) -> None:
 
 def _one_size(simulation: Simulation) -> None:
     """The shuttle is set to the shortest wheelbase, whatever the car's."""
-    shortest_mm = simulation.site.cars.min_wheelbase_mm
+    shortest_mm = car_park(simulation.site).cars.min_wheelbase_mm
 
     def say(message: Message) -> list[Message]:
         if isinstance(message, ShuttleOrder) and message.action is ShuttleAction.GRIP:

@@ -1,1 +1,1 @@
-"""What the simulator adds for each system: its plant, picture and demand."""
+"""The other systems in simulation: what each needs beside buses and controllers, in a package of its own."""

@@ -14,8 +14,10 @@ from onboard.config.machines import Fleet, read_fleet, read_stewards
 from onboard.config.problems import Problems
 from onboard.config.reader import Table
 from onboard.config.room import check_room
+from onboard.config.systems import READERS, Common
 from onboard.core.codes import KindCode
-from onboard.core.site import RideCalls, Site, TrackKind
+from onboard.core.site import Site, TrackKind
+from onboard.kinds.car_park.site import CarPark, RideCalls
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
@@ -33,8 +35,20 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     """
     problems = Problems(file)
     root = root_table(text, problems)
-    head, lift = root.table("site", required=True), root.table("lift")
-    name, bitrate = _read_name(head), head.integer("bitrate", 10_000, 1_000_000, 500_000)
+    head = root.table("site", required=True)
+    common = Common(_read_name(head), head.integer("bitrate", 10_000, 1_000_000, 500_000))
+    system = head.choice("system", [CarPark.system, *READERS], CarPark.system)
+    if system in READERS:
+        site = READERS[system](root, common)
+        root.check_unknown()
+        problems.raise_if_any()
+    else:
+        site = _read_car_park(root, common, crowded=crowded)
+    return replace(site, digest=site_digest(site))
+
+
+def _read_car_park(root: Table, common: Common, *, crowded: bool) -> Site:
+    problems, lift, bitrate = root.problems, root.table("lift"), common.bitrate
     floor_height_mm = lift.integer("floor_height_mm", 1000, 10_000, 2_500)
     layout = read_layout(root, floor_height_mm)
     fleet = read_fleet(root, layout)
@@ -48,8 +62,8 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     _check_whole(root, layout, fleet)
     root.check_unknown()
     problems.raise_if_any()
-    site = Site(
-        name=name,
+    site = CarPark(
+        name=common.name,
         digest=0,
         bitrate=bitrate,
         tracks=layout.tracks,
@@ -70,7 +84,7 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     if not crowded:
         check_room(root, site, fleet)
         problems.raise_if_any()
-    return replace(site, digest=site_digest(site))
+    return site
 
 
 def site_digest(site: Site) -> int:

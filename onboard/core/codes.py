@@ -22,6 +22,15 @@ class KindCode(IntEnum):
     LIFT = 2
     COMPARTMENT = 3
     OBSERVER = 4
+    VEHICLE = 5
+    DESK = 6
+    NODE = 7
+    ARM = 8
+    LATHE = 9
+
+
+#: What moves about; all other machines are fixed, keep tokens at first and one of them gives the bus time.
+MOBILE_KINDS = frozenset({KindCode.ROBOT, KindCode.VEHICLE, KindCode.ARM})
 
 
 class Operation(IntEnum):
@@ -32,6 +41,9 @@ class Operation(IntEnum):
     RIDE = 2
     GIVE_WAY = 3
     RECEIVE = 4
+    TRANSPORT = 5
+    REACH = 6
+    MACHINE = 7
 
 
 class Criterion(IntEnum):

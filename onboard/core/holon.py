@@ -11,7 +11,7 @@ from typing import Any
 from onboard.core.authority import Claim, TokenBook, TokenKey, genesis_holder
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BusClock
-from onboard.core.codes import CONTRACT_VERSION, NOBODY, KindCode, MachineState, Reason, TokenKind
+from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
     Award,
@@ -186,7 +186,7 @@ class Holon:
         if not self._is_time_source(message.sender):
             # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
             machine = self.site.machines.get(message.sender)
-            if machine is None or machine.kind is KindCode.ROBOT:
+            if machine is None or machine.kind in MOBILE_KINDS:
                 self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         first = not self.clock.is_set
@@ -209,9 +209,9 @@ class Holon:
     def _is_time_source(self, sender: int) -> bool:
         """Whether bus time from ``sender`` counts: a fixed machine of the site, below me if I am one myself."""
         machine = self.site.machines.get(sender)
-        if machine is None or machine.kind is KindCode.ROBOT:
+        if machine is None or machine.kind in MOBILE_KINDS:
             return False
-        return self.machine.kind is KindCode.ROBOT or sender < self.node_id
+        return self.machine.kind in MOBILE_KINDS or sender < self.node_id
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -404,13 +404,13 @@ class Holon:
 
     def _elect_time_source(self, local_us: int) -> None:
         """The lowest live fixed node sends bus time (design, section 5)."""
-        if self.machine.kind is KindCode.ROBOT:
+        if self.machine.kind in MOBILE_KINDS:
             return
         now_us = self.clock.bus_us(local_us)
         lower = [
             node
             for node in self.mirror.alive(now_us)
-            if node < self.node_id and self.mirror.peers[node].kind in (KindCode.LIFT, KindCode.COMPARTMENT)
+            if node < self.node_id and self.mirror.peers[node].kind not in (*MOBILE_KINDS, KindCode.OBSERVER)
         ]
         self.clock.is_source = not lower
         if lower:

@@ -5,10 +5,10 @@ Read from a TOML file by ``onboard.config``. Words: a *track* is a line of *segm
 a car can stand: a place or a compartment, on one side of a segment.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from onboard.core.codes import KindCode, Side
 
@@ -97,17 +97,6 @@ class Machine:
 
 
 @dataclass(frozen=True, slots=True)
-class CarLimits:
-    """What cars the park takes (row P33); all in mm and kg."""
-
-    min_wheelbase_mm: int
-    max_wheelbase_mm: int
-    max_length_mm: int
-    max_height_mm: int
-    max_load_kg: int
-
-
-@dataclass(frozen=True, slots=True)
 class Timing:
     """Protocol and device times of a site, in microseconds unless named otherwise."""
 
@@ -127,42 +116,36 @@ class Timing:
     sub_call_percent: int = 50
 
 
-class RideCalls(Enum):
-    """When a robot asks lifts for the rides of a task (row P39).
-
-    AFTER winning it, when everybody's itineraries have told enough before; BEFORE its bid, by sub-calls as options.
-    """
-
-    AFTER = "after"
-    BEFORE = "before"
+#: A site without machines that move along tracks: nobody reads it.
+_NO_AXIS = Axis(1, 1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Site:
-    """Everything a machine knows beforehand. Built and checked by ``onboard.config.site``; frozen thereafter.
+    """Everything a machine knows beforehand, of any system. Built and checked by ``onboard.config``; frozen thereafter.
 
-    ``places`` in the order of the file's floors, sides and indices. ``stewards`` maps each track number to the node-ID
-    of the fixed machine that holds its segments', places' and stored cars' tokens at first. ``digest`` is 16 bits over
-    the canonical content: two files that mean the same have the same.
+    ``stewards`` maps each track number to the node-ID of the fixed machine that holds its segments', places' and stored
+    cars' tokens at first. ``digest`` is 16 bits over the canonical content: two files that mean the same have the same.
+    A system whose machines do not move along tracks has none, nor what follows; it adds its own in a class of its own.
     """
+
+    #: Which system this is, as the site file says it; it chooses the kinds' behaviours.
+    system: ClassVar[str] = ""
 
     name: str
     digest: int
     bitrate: int
-    tracks: dict[int, Track]
-    places: tuple[Station, ...]
     machines: dict[int, Machine]
-    stewards: dict[int, int]
-    carrier: Axis
-    carrier_length_mm: int
-    carrier_clearance_mm: int
-    shuttle: Axis
-    shuttle_reach_mm: int
-    lift: Axis
-    floor_height_mm: int
-    cars: CarLimits
     timing: Timing
-    rides: RideCalls = RideCalls.AFTER
+    stewards: dict[int, int] = field(default_factory=dict)
+    tracks: dict[int, Track] = field(default_factory=dict)
+    #: In the order of the file's floors, sides and indices.
+    places: tuple[Station, ...] = ()
+    carrier: Axis = _NO_AXIS
+    carrier_length_mm: int = 0
+    carrier_clearance_mm: int = 0
+    lift: Axis = _NO_AXIS
+    floor_height_mm: int = 0
 
     @cached_property
     def compartments(self) -> dict[int, Station]:

@@ -1,18 +1,46 @@
-"""Which behaviour drives which kind of machine: the one place to add a kind to the image."""
+"""Which behaviour drives which kind of machine, system by system: the one place to add a system or a kind to the image.
+
+docs/new-kind.md shows how.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
+from onboard.core.messages import Message
+from onboard.core.site import Site
 from onboard.kinds.car_park.compartment import CompartmentFactory
 from onboard.kinds.car_park.lift import LiftFactory
 from onboard.kinds.car_park.robot import RobotFactory
+from onboard.kinds.car_park.site import CarPark
 
-_FACTORIES: dict[KindCode, BehaviourFactory] = {
-    KindCode.ROBOT: RobotFactory(),
-    KindCode.COMPARTMENT: CompartmentFactory(),
-    KindCode.LIFT: LiftFactory(),
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """One kind of site. ``messages`` are the classes of what ``dbc/<name>.dbc`` adds to the contracts of all."""
+
+    name: str
+    factories: Mapping[KindCode, BehaviourFactory]
+    messages: tuple[type[Message], ...] = ()
+
+
+_SYSTEMS: dict[str, System] = {
+    system.name: system
+    for system in (
+        System(
+            CarPark.system,
+            {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
+        ),
+    )
 }
 
 
-def factory_for(kind: KindCode) -> BehaviourFactory:
-    """The factory of one kind. Raises ``KeyError`` for a kind that this image cannot drive."""
-    return _FACTORIES[kind]
+def system_of(site: Site) -> System:
+    """The system of a site. Raises ``KeyError`` for one that this image does not know."""
+    return _SYSTEMS[site.system]
+
+
+def factory_for(site: Site, kind: KindCode) -> BehaviourFactory:
+    """The factory of one kind of machine. Raises ``KeyError`` for a kind that this image cannot drive there."""
+    return system_of(site).factories[kind]

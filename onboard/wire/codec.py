@@ -99,8 +99,8 @@ def _flat_types(cls: type[Message]) -> dict[str, Any]:
     return flat
 
 
-def _compile(layout: MessageLayout) -> _Layout:
-    cls = _SINGLE.get(layout.name)
+def _compile(layout: MessageLayout, single: dict[str, type[Message]]) -> _Layout:
+    cls = single.get(layout.name)
     if cls is None and layout.name not in _PART_TYPES:
         raise ValueError(f"the DBC has a message {layout.name} that no class stands for")
     types = _flat_types(cls) if cls is not None else _PART_TYPES[layout.name]
@@ -177,17 +177,17 @@ def _builder(cls: type[Message], layout: _Layout) -> Callable[[int, tuple[Any, .
 class Codec:
     """One bus's contract. ``encode`` and ``decode_part`` are pure; sets of frames are put together by ``Decoder``."""
 
-    def __init__(self, layouts: tuple[MessageLayout, ...]) -> None:
-        compiled = [_compile(layout) for layout in layouts]
+    def __init__(self, layouts: tuple[MessageLayout, ...], messages: tuple[type[Message], ...] = ()) -> None:
+        """``messages`` are a system's own classes, each one frame. ``ValueError`` for a layout without a class."""
+        single = _SINGLE | {cls.__name__: cls for cls in messages}
+        compiled = [_compile(layout, single) for layout in layouts]
         self._by_name = {layout.name: layout for layout in compiled}
         self._by_id = {layout.frame_id: layout for layout in compiled}
         self._build = {
-            layout.name: _builder(_SINGLE[layout.name], layout) for layout in compiled if layout.name in _SINGLE
+            layout.name: _builder(single[layout.name], layout) for layout in compiled if layout.name in single
         }
         self._single = {
-            layout.name: (layout, _getter(_SINGLE[layout.name], layout))
-            for layout in compiled
-            if layout.name in _SINGLE
+            layout.name: (layout, _getter(single[layout.name], layout)) for layout in compiled if layout.name in single
         }
         self._part = lru_cache(maxsize=_MEMORY)(self._decode)
 
@@ -325,13 +325,25 @@ def _wheelbase_mm(call: m.CallForProposals) -> int:
     return call.wheelbase_mm or NO_WHEELBASE_MM
 
 
-@cache
-def fleet_codec() -> Codec:
-    """The codec of the fleet bus."""
-    return Codec(fleet_layouts())
+class Codecs(NamedTuple):
+    """The contracts of a machine's two buses."""
+
+    fleet: Codec
+    device: Codec
+
+
+def codecs(system: str, messages: tuple[type[Message], ...]) -> Codecs:
+    """Both codecs of a system, whose own classes are ``messages``."""
+    return Codecs(fleet_codec(system, messages), device_codec(system, messages))
 
 
 @cache
-def device_codec() -> Codec:
-    """The codec of a device bus."""
-    return Codec(device_layouts())
+def fleet_codec(system: str = "", messages: tuple[type[Message], ...] = ()) -> Codec:
+    """The codec of the fleet bus, with what a system adds to it and the classes of what it adds anywhere."""
+    return Codec(fleet_layouts(system), messages)
+
+
+@cache
+def device_codec(system: str = "", messages: tuple[type[Message], ...] = ()) -> Codec:
+    """The codec of a device bus, likewise."""
+    return Codec(device_layouts(system), messages)

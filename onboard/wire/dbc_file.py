@@ -11,7 +11,7 @@ from cantools.database import Signal as DbcSignal
 from cantools.database import load_string
 from cantools.database.can.database import Database
 
-from dbc import device_dbc_text, fleet_dbc_text
+from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,13 +110,26 @@ def read_nodes(text: str) -> tuple[tuple[str, str], ...]:
     return tuple((node.name, node.comment or "") for node in _load(text).nodes)
 
 
-@cache
-def fleet_layouts() -> tuple[MessageLayout, ...]:
-    """Layouts of ``dbc/fleet.dbc``."""
-    return read_layouts(fleet_dbc_text())
+#: The node of a DBC that is a machine's controller on its own device bus: others do not hear what it says there.
+CONTROLLER = "Controller"
 
 
 @cache
-def device_layouts() -> tuple[MessageLayout, ...]:
-    """Layouts of ``dbc/device.dbc``."""
-    return read_layouts(device_dbc_text())
+def fleet_layouts(system: str = "") -> tuple[MessageLayout, ...]:
+    """Layouts of ``dbc/fleet.dbc``, and of what a system adds to the fleet bus."""
+    return (*read_layouts(fleet_dbc_text()), *system_layouts(system)[0])
+
+
+@cache
+def device_layouts(system: str = "") -> tuple[MessageLayout, ...]:
+    """Layouts of ``dbc/device.dbc``, and of what a system adds to the device buses of its machines."""
+    return (*read_layouts(device_dbc_text()), *system_layouts(system)[1])
+
+
+@cache
+def system_layouts(system: str) -> tuple[tuple[MessageLayout, ...], tuple[MessageLayout, ...]]:
+    """What a system says beyond the two contracts of all: on the fleet bus, and on device buses."""
+    text = system_dbc_text(system) if system else None
+    layouts = read_layouts(text) if text is not None else ()
+    device = tuple(one for one in layouts if CONTROLLER in (*one.senders, *one.receivers))
+    return tuple(one for one in layouts if one not in device), device

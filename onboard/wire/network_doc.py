@@ -5,9 +5,9 @@ from collections.abc import Iterable
 from enum import IntEnum
 from pathlib import Path
 
-from dbc import device_dbc_text, fleet_dbc_text
+from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
 from onboard.core import codes
-from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts, read_nodes
+from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts, read_nodes, system_layouts
 
 _HEAD = """\
 # The network
@@ -58,9 +58,14 @@ def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
 
 def _values(signal: SignalLayout) -> str:
     if signal.choices:
-        return _link(_value_tables()[signal.choices])
+        return _link(_table_name(signal))
     scale = "" if (signal.scale, signal.offset) == (1, 0) else f"; raw x {signal.scale} + {signal.offset}"
     return f"{signal.minimum} to {signal.maximum}{f' {signal.unit}' if signal.unit else ''}{scale}"
+
+
+def _table_name(signal: SignalLayout) -> str:
+    """The enumeration's name; a table that only one system has goes by its signal's name."""
+    return _value_tables().get(signal.choices) or "".join(word.capitalize() for word in signal.name.split("_"))
 
 
 def _when(layout: MessageLayout) -> str:
@@ -104,11 +109,15 @@ def _message(layout: MessageLayout) -> list[str]:
 
 def _tables(layouts: Iterable[MessageLayout]) -> list[str]:
     """Every value table that is used, once, in the order of its first use."""
-    names = _value_tables()
-    used = dict.fromkeys(signal.choices for layout in layouts for signal in layout.signals if signal.choices)
+    used = {
+        (_table_name(signal), signal.choices): signal.choices
+        for layout in layouts
+        for signal in layout.signals
+        if signal.choices
+    }
     lines = ["## Value tables"]
-    for choices in used:
-        lines += ["", f"### {names[choices]}", "", "| value | name |", "|---|---|"]
+    for (name, _), choices in used.items():
+        lines += ["", f"### {name}", "", "| value | name |", "|---|---|"]
         lines += [f"| {value} | {name} |" for value, name in choices]
     return lines
 
@@ -119,8 +128,15 @@ def network_page() -> str:
         _HEAD,
         *_bus("Fleet bus", fleet_dbc_text(), fleet_layouts()),
         *_bus("Device bus", device_dbc_text(), device_layouts()),
-        *_tables((*fleet_layouts(), *device_layouts())),
     ]
+    layouts = [*fleet_layouts(), *device_layouts()]
+    for system in systems():
+        text = system_dbc_text(system)
+        assert text is not None
+        added = (*system_layouts(system)[0], *system_layouts(system)[1])
+        lines += _bus(f"What the system {system} adds", text, added)
+        layouts += added
+    lines += _tables(layouts)
     return "\n".join(lines).rstrip("\n") + "\n"
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 
 from onboard.core.codes import MAX_NODE_ID, KindCode
 from onboard.core.site import Machine, Site
-from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
+from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts, system_layouts
 
 #: The node of the fleet contract that each kind of machine is.
 _ROLES: dict[KindCode, str] = {
@@ -16,6 +16,8 @@ _ROLES: dict[KindCode, str] = {
     KindCode.LIFT: "Lift",
     KindCode.COMPARTMENT: "Compartment",
 }
+#: What machines of all other kinds are there; in the contract of their system they go by their kind's name.
+_MACHINE = "Machine"
 #: Device messages by the roles of both ends: a robot's controller sends nothing to doors.
 _ENDS: dict[KindCode, frozenset[str]] = {
     KindCode.ROBOT: frozenset({"Controller", "Drive", "Shuttle"}),
@@ -31,12 +33,22 @@ _EXTENDED = 1 << 31
 _NO_NODE = "Vector__XXX"
 
 
-def _sent_by(machine: Machine, machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
+def _is_in(kind: KindCode, nodes: Iterable[str]) -> bool:
+    """Whether a kind of machine is among a contract's nodes."""
+    roles = {_ROLES[kind]} if kind in _ROLES else {_MACHINE, kind.name.capitalize()}
+    return not roles.isdisjoint(nodes)
+
+
+def _sent_by(system: str, machine: Machine, machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
     """What a machine, or its devices, say, and the names of those who listen."""
-    for layout in fleet_layouts():
-        if _ROLES[machine.kind] in layout.senders:
-            others = [one.name for one in machines if one != machine and _ROLES[one.kind] in layout.receivers]
+    for layout in fleet_layouts(system):
+        if _is_in(machine.kind, layout.senders):
+            others = [one.name for one in machines if one != machine and _is_in(one.kind, layout.receivers)]
             yield layout, ",".join(others) or _NO_NODE
+    if machine.kind not in _ENDS:
+        # A system's own contract does not say which of its kinds has which devices.
+        yield from ((layout, machine.name) for layout in system_layouts(system)[1])
+        return
     for layout in device_layouts():
         if set(layout.senders) | set(layout.receivers) <= _ENDS[machine.kind]:
             yield layout, machine.name
@@ -54,11 +66,11 @@ def _gateways(taken: Iterable[str]) -> dict[int, str]:
     return named
 
 
-def _sent_by_gateway(machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
+def _sent_by_gateway(system: str, machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
     """What a gateway says, an operator's orders foremost, and the names of the machines that listen."""
-    for layout in fleet_layouts():
+    for layout in fleet_layouts(system):
         if _GATEWAY in layout.senders:
-            hearing = [one.name for one in machines if _ROLES[one.kind] in layout.receivers]
+            hearing = [one.name for one in machines if _is_in(one.kind, layout.receivers)]
             yield layout, ",".join(hearing) or _NO_NODE
 
 
@@ -78,8 +90,8 @@ def site_dbc(site: Site) -> str:
     machines = list(site.machines.values())
     gateways = _gateways(machine.name for machine in machines)
     names = [machine.name for machine in machines] + list(gateways.values())
-    senders = [(one.node_id, one.name, list(_sent_by(one, machines))) for one in machines]
-    senders += [(node_id, name, list(_sent_by_gateway(machines))) for node_id, name in gateways.items()]
+    senders = [(one.node_id, one.name, list(_sent_by(site.system, one, machines))) for one in machines]
+    senders += [(node_id, name, list(_sent_by_gateway(site.system, machines))) for node_id, name in gateways.items()]
     lines = ['VERSION ""', "", "NS_ :", "\tCM_", "\tBA_DEF_", "\tBA_", "\tVAL_", "\tBA_DEF_DEF_", "", "BS_:", ""]
     lines += ["BU_: " + " ".join(names), ""]
     comments = [f'CM_ "Site {site.name}, digest {site.digest}: one message for each machine. Generated; do not edit.";']

@@ -3,7 +3,7 @@
 import pytest
 
 from onboard.config.problems import ConfigError
-from onboard.core.site import RideCalls
+from onboard.kinds.car_park.site import RideCalls
 from tests.sites import one_floor
 
 

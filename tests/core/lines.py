@@ -1,6 +1,7 @@
 """Small sites made of plain values, with axes and lengths that no site file would accept."""
 
-from onboard.core.site import Axis, CarLimits, Segment, Site, Timing, Track, TrackKind
+from onboard.core.site import Axis, Segment, Timing, Track, TrackKind
+from onboard.kinds.car_park.site import CarLimits, CarPark
 
 ALLEY = 1
 SPUR = 192
@@ -14,12 +15,12 @@ def line_site(
     clearance_mm: int = 0,
     spur_at: int | None = None,
     spur_length: int = 1,
-) -> Site:
+) -> CarPark:
     """One alley of ``length`` segments and, where asked for, a spur that joins it."""
     tracks = {ALLEY: Track(ALLEY, TrackKind.ALLEY, length, pitch_mm)}
     if spur_at is not None:
         tracks[SPUR] = Track(SPUR, TrackKind.SPUR, spur_length, pitch_mm, (Segment(ALLEY, spur_at),))
-    return Site(
+    return CarPark(
         name="line",
         digest=1,
         bitrate=500_000,

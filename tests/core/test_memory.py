@@ -16,7 +16,7 @@ STEWARD, ROBOT = 1, 11
 
 
 def holon(boot: int, *entries: dict[str, str | int]) -> Holon:
-    made = Holon(SITE, SITE.machines[STEWARD], factory_for(KindCode.COMPARTMENT), boot=boot, entries=entries)
+    made = Holon(SITE, SITE.machines[STEWARD], factory_for(SITE, KindCode.COMPARTMENT), boot=boot, entries=entries)
     made.start(0)
     return made
 

@@ -248,7 +248,7 @@ class Alley:
     def _holon(self, node: int, boot: int) -> Holon:
         machine = SITE.machines[node]
         if machine.kind is not KindCode.ROBOT:
-            return Holon(SITE, machine, factory_for(machine.kind), boot=boot, entries=tuple(self.journals[node]))
+            return Holon(SITE, machine, factory_for(SITE, machine.kind), boot=boot, entries=tuple(self.journals[node]))
         factory = WalkerFactory(self.turns[node], self.rounds[node], self.log)
         return Holon(SITE, machine, factory, boot=boot, entries=tuple(self.journals[node]))
 

@@ -288,7 +288,11 @@ def test_a_door_is_forced_when_both_are_locked() -> None:
     assert watch(seconds=3, cars=0, look=(0.02, output)).looks == [DoorPosition.LOCKED]
 
 
-def test_a_standing_carrier_can_be_pushed_but_not_off_its_track() -> None:
-    start_mm = _position_mm(watch(seconds=5, cars=0))
-    assert _position_mm(watch("moved:target=MR1,at_s=5,by_mm=-600", seconds=5.5, cars=0)) == start_mm - 600
-    assert _position_mm(watch("moved:target=MR1,at_s=5,by_mm=9000", seconds=5.5, cars=0)) == start_mm
+def test_a_standing_carrier_can_be_pushed_but_not_off_its_track_and_goes_back_to_its_mark() -> None:
+    def positions(fault: str) -> list[int]:
+        return [state.position_mm for state in _states(watch(fault, seconds=15, cars=0), from_s=5)]
+
+    start_mm = round(_position_mm(watch(seconds=5, cars=0)))
+    pushed = positions("moved:target=MR1,at_s=5,by_mm=-600")
+    assert (pushed[0], pushed[-1]) == (start_mm - 600, start_mm)
+    assert set(positions("moved:target=MR1,at_s=5,by_mm=9000")) == {start_mm}

@@ -19,6 +19,13 @@ CORE_TYPES = (
     "onboard.core.site",
 )
 
+#: What each system's machines know beforehand and what they say beyond the messages of all: values as well.
+SYSTEM_TYPES = tuple(
+    f"onboard.kinds.{system}.{noun}"
+    for system in ("car_park", "cell", "graph", "mapd", "terminal", "turning")
+    for noun in ("messages", "site")
+)
+
 #: Standard modules without I/O, clock, chance or tasks: all that decisions may use.
 PURE_STDLIB = frozenset(
     {
@@ -70,14 +77,16 @@ LAYERS: dict[str, Layer] = {
     "onboard.kinds": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
-    "onboard.config": Layer(("onboard.core",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
+    "onboard.config": Layer(("onboard.core", *SYSTEM_TYPES), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.controller": Layer(
         ("onboard.core", "onboard.wire", "onboard.ports"), not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"}
     ),
     "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
-    "onboard.trace": Layer((*CORE_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})),
+    "onboard.trace": Layer(
+        (*CORE_TYPES, *SYSTEM_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})
+    ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
-    "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace", "onboard.wire")),
+    "onboard.trace.cli": Layer((*CORE_TYPES, *SYSTEM_TYPES, "onboard.config", "onboard.trace", "onboard.wire")),
     "onboard": Layer(
         (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli"), not_stdlib=frozenset({"random", "threading", "time"})
     ),

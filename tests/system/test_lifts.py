@@ -3,6 +3,7 @@
 import pytest
 
 from bus_sim.sites import find_site
+from onboard.config.site import parse_site
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, Operation, TaskPhase
 from onboard.core.lifts import gate, platform
@@ -17,6 +18,7 @@ from onboard.core.messages import (
     TaskReport,
     TokenGrant,
 )
+from tests.system import checked
 from tests.system.scene import Scene, play, stays
 
 
@@ -91,3 +93,43 @@ def test_several_robots_share_lifts_and_serve_everybody(site: str, cars: int) ->
     summary = scene.simulation.plant.street.summary()
     assert (summary.parked, summary.served, summary.inside) == (cars, cars, 0)
     assert len({bid.sender for _, bid in scene.all(Bid) if bid.sender >= 11}) >= 2, "more than one robot took part"
+
+
+#: Machines so fast that a ride is over within the time for which its plan still counts, when it is told anew.
+FAST = """
+[site]
+name = "fast"
+[floors]
+count = 3
+positions = 4
+[carrier]
+speed_mm_s = 3_000
+acceleration_mm_s2 = 2_000
+[shuttle]
+speed_mm_s = 3_000
+acceleration_mm_s2 = 2_000
+[lift]
+speed_mm_s = 3_000
+acceleration_mm_s2 = 2_000
+[[compartments]]
+name = "IOC1"
+node = 1
+at = "p(1,3)"
+[[lifts]]
+name = "ER1"
+node = 5
+end = "left"
+[[robots]]
+name = "MR1"
+node = 11
+home = "p(2,2)"
+"""
+
+
+@pytest.mark.parametrize("ask_s", [50.0, 51.0, 52.0, 53.0, 54.0])
+def test_a_robot_that_wins_a_task_while_aboard_is_not_fetched_again(ask_s: float) -> None:
+    """Its new plan tells the ride under way once more: the lift has made it when it is over."""
+    scene = play(parse_site(FAST, "fast.toml"), stays((0, ask_s)), extra_s=200)
+    scene.assert_sound()
+    checked.assert_checked(scene)
+    assert scene.simulation.plant.street.summary().served == 1

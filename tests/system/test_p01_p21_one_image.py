@@ -107,7 +107,7 @@ def test_p21_one_interface_two_kinds_of_cost_with_and_without_the_others_plans(
         mirror = Mirror(site, node)
         if others:
             foreseen(mirror)
-        estimator: Estimator = factory_for(machine.kind).estimator(site, machine, mirror)
+        estimator: Estimator = factory_for(site, machine.kind).estimator(site, machine, mirror)
         if isinstance(estimator, CarParkGeneration):
             estimator.program.standing = Segment(1, 2)
         proposal = estimator.estimate(a_call(operation, machine.kind), 1_000_000)

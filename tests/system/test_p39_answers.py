@@ -13,12 +13,13 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.sipp import Route, Visit, plan_route
-from onboard.core.site import RideCalls, Segment, Site
+from onboard.core.site import Segment, Site
 from onboard.kinds.car_park.asking import TOLERANCE_US, AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.lift_generation import LiftGeneration, Promise
 from onboard.kinds.car_park.ride_calls import calls_after_winning, ride_terms, rides_of
 from onboard.kinds.car_park.robot import RobotFactory
+from onboard.kinds.car_park.site import RideCalls
 
 NOW_US = 100_000_000
 CAR = Reference(1, 7)

@@ -11,6 +11,7 @@ from onboard.core.messages import CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Site
+from onboard.kinds.car_park.site import car_park
 
 #: A driver gets in and drives out within this, us: 10 to 30 s (constants of the SimPy study in the systems list).
 DRIVER_US = 20_000_000
@@ -55,5 +56,6 @@ class BayGeneration:
 
     def _cycle_us(self) -> int:
         """One customer served: both doors twice, the shuttle's stroke twice, grip, and the driver."""
-        stroke_us = run_duration_us(self.site.shuttle_reach_mm, self.site.shuttle)
+        park = car_park(self.site)
+        stroke_us = run_duration_us(park.shuttle_reach_mm, park.shuttle)
         return 4 * self.site.timing.door_us + 2 * stroke_us + self.site.timing.grip_us + DRIVER_US

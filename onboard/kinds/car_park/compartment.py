@@ -57,6 +57,7 @@ from onboard.kinds.car_park.bay_memory import (
     ticket_record,
     winner_record,
 )
+from onboard.kinds.car_park.site import car_park
 from onboard.kinds.car_park.stewardship import Stewardship
 
 #: A call that nobody could serve is made again after this, us. Ours.
@@ -340,7 +341,7 @@ class Compartment:
     def _admit(self, now_us: int) -> list[Effect]:
         """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
         assert self.bay is not None
-        bay, limits = self.bay, self.fleet.site.cars
+        bay, limits = self.bay, car_park(self.fleet.site).cars
         if not bay.load_kg:
             return []
         too_large = bay.length_mm > limits.max_length_mm or bay.height_mm > limits.max_height_mm

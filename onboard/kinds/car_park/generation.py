@@ -21,6 +21,7 @@ from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Machine, Segment, Site, Station, TrackKind
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work, to_itinerary
+from onboard.kinds.car_park.site import car_park
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens. Ours, measured in tests.
 AWARD_LATENCY_US = 150_000
@@ -86,7 +87,7 @@ class CarParkGeneration:
             return None
         if self.program.standing is None or len(self.program.remaining) + 4 > MAX_STEPS:
             return None
-        limits = self.site.cars
+        limits = car_park(self.site).cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
         if not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
             return None
@@ -311,7 +312,8 @@ class CarParkGeneration:
 
     def handling_us(self, station: Station) -> int:
         """Reach, grip or release, retract; at a compartment its output door opens first."""
-        stroke_us = run_duration_us(self.site.shuttle_reach_mm, self.site.shuttle)
+        park = car_park(self.site)
+        stroke_us = run_duration_us(park.shuttle_reach_mm, park.shuttle)
         door_us = self.site.timing.door_us if station in self.site.compartments.values() else 0
         return door_us + 2 * stroke_us + self.site.timing.grip_us + HANDLING_OVERHEAD_US
 

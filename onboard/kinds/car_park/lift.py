@@ -315,11 +315,18 @@ class Lift:
     def _end_ride(self, now_us: int) -> list[Effect]:
         assert self.ride is not None
         # The robot need not tell its plan anew after a ride: it is remembered as made.
-        self._made[self.ride.robot] = self.ride.begin_us
+        self._made[self.ride.robot] = self._begin_as_told(self.ride, now_us)
         over = Record({"record": "ride_over", "robot": self.ride.robot})
         self.ride = None
         self.phase = LiftPhase.FREE
         return [over, *self._when_free(now_us)]
+
+    def _begin_as_told(self, ride: Ride, now_us: int) -> int:
+        """When a ride began by its robot's newest plan: who wins a task while aboard tells the same ride anew."""
+        itinerary = self.fleet.mirror.itineraries.get(ride.robot)
+        planned = rides_of(self.track, ride.robot, itinerary, now_us) if itinerary is not None else []
+        same = (one for one in planned if (one.board, one.leave) == (ride.board, ride.leave) and one.begin_us <= now_us)
+        return next((one.begin_us for one in same), ride.begin_us)
 
     # --- inner works -------------------------------------------------------------------------------------------
 

@@ -35,7 +35,7 @@ from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.reservations import FOREVER, Window
 from onboard.core.serial import to_bus_ms
-from onboard.core.site import Machine, RideCalls, Segment, Site, TrackKind
+from onboard.core.site import Machine, Segment, Site, TrackKind
 from onboard.kinds.car_park.asking import AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
@@ -44,6 +44,7 @@ from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, W
 from onboard.kinds.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
 from onboard.kinds.car_park.ride_calls import calls_after_winning
 from onboard.kinds.car_park.riding import Riding
+from onboard.kinds.car_park.site import RideCalls, car_park
 from onboard.kinds.car_park.travel import Carriage
 from onboard.kinds.car_park.way import way_to_refuge
 
@@ -63,7 +64,7 @@ class RobotFactory:
         # No carrier turns into a spur yet: none is planned for.
         spurs = [track for track in site.tracks.values() if track.kind is TrackKind.SPUR]
         mirror.reservations.reserve(NOBODY, (Window(Segment(track.number, 1), 0, FOREVER) for track in spurs))
-        generation = AskingGeneration if site.rides is RideCalls.BEFORE else CarParkGeneration
+        generation = AskingGeneration if car_park(site).rides is RideCalls.BEFORE else CarParkGeneration
         return generation(site, machine, mirror, Program(site))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Robot":

@@ -6,6 +6,7 @@ from math import sqrt
 from onboard.core.codes import CallResult, KindCode, Operation, TaskPhase
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Progress, Reference, TaskReport, Waiting
 from onboard.core.site import Axis, Site
+from onboard.kinds.car_park.site import car_park
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.geometry import body_of
 from onboard.trace.check.picture import Picture
@@ -25,7 +26,8 @@ def run_us(length_mm: float, axis: Axis) -> int:
 
 def longest_motion_us(site: Site) -> int:
     """The longest single motion of a site: a whole alley, a whole shaft, or one stroke of a shuttle or door."""
-    times = [run_us(site.shuttle_reach_mm, site.shuttle), site.timing.door_us, site.timing.grip_us]
+    shuttle = car_park(site)
+    times = [run_us(shuttle.shuttle_reach_mm, shuttle.shuttle), site.timing.door_us, site.timing.grip_us]
     for track in site.tracks.values():
         axis = site.lift if track.number in site.lifts else site.carrier
         times.append(run_us((track.length + 1) * track.pitch_mm, axis))
@@ -37,7 +39,8 @@ def longest_task_us(site: Site) -> int:
 
     Six runs and four rides (to the car, to its place, to a refuge), four doors and two handlings.
     """
-    handling_us = 2 * run_us(site.shuttle_reach_mm, site.shuttle) + site.timing.grip_us
+    shuttle = car_park(site)
+    handling_us = 2 * run_us(shuttle.shuttle_reach_mm, shuttle.shuttle) + site.timing.grip_us
     return 10 * longest_motion_us(site) + 4 * site.timing.door_us + 2 * handling_us
 
 

@@ -1,0 +1,34 @@
+"""How sites of all systems but the car park are run: the one place to add a system's plant, picture and indicators."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from bus_sim.faults.injection import AnyFault
+from onboard.core.site import Site
+
+
+@dataclass(frozen=True)
+class SystemOptions:
+    """What ``bus-sim run`` was asked for, beside the site.
+
+    ``speed`` is in simulated seconds a second, None for as fast as possible; ``epoch_us`` the wall time of loop time 0.
+    ``limit_s`` ends a run that does not end by itself.
+    """
+
+    seed: int = 1
+    speed: float | None = None
+    limit_s: float | None = None
+    trace: Path | None = None
+    devices: bool = False
+    json: Path | None = None
+    faults: tuple[AnyFault, ...] = ()
+    epoch_us: int = 0
+    quiet: bool = False
+
+
+#: Runs a site to its end, prints what came of it, and returns the exit status: 0, or 1 where a rule was broken.
+Runner = Callable[[Site, SystemOptions], int]
+
+#: By ``Site.system``.
+RUNNERS: dict[str, Runner] = {}

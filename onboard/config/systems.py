@@ -1,0 +1,22 @@
+"""How the site files of all systems but the car park are read: the one place to add a system's reader.
+
+A reader takes the whole document and what every site has. It notes every mistake in ``root.problems`` and returns what
+it made of the rest, with digest 0: the caller raises, refuses unknown keys and works out the digest.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from onboard.config.reader import Table
+from onboard.core.site import Site
+
+
+class Common(NamedTuple):
+    """What is read of every site file first: its name, and the fleet bus's bit/s."""
+
+    name: str
+    bitrate: int
+
+
+#: By the word after ``system =`` in the table ``[site]``.
+READERS: dict[str, Callable[[Table, Common], Site]] = {}
