@@ -85,6 +85,8 @@ def test_c11_the_tree_is_four_levels_deep_and_built_from_the_deepest() -> None:
     tree.solve(GOAL)
     names = [[node.arm.name for node in level] for level in tree.levels]
     assert names == [["R1"], ["R4", "R2", "R4"], ["R3", "R5"], ["R3", "R3"], []]
+    (root,) = tree.levels[0]
+    assert root.contract is not None and root.contract.nodes == (1, 2, 3)
     assert all(node.goal.level == level for level, nodes in enumerate(tree.levels) for node in nodes)
 
 

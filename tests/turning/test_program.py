@@ -4,7 +4,7 @@ from itertools import pairwise
 from math import atan2, cos, hypot, pi, sin
 
 import pytest
-from pygcode import Line
+from pygcode import Line  # type: ignore[import-untyped]  # the package has no types
 
 from onboard.kinds.turning.drawing import Drawing, Element
 from onboard.kinds.turning.lathe import Job, LatheState
@@ -100,9 +100,10 @@ def test_p25_the_contour_that_the_program_cuts_equals_the_drawing(drawing: Drawi
         for r, z in path:
             inside = [one for one in part if one[1] >= z]
             if inside and z < -1e-6:
-                assert r >= max(one[0] for one in inside) - TOLERANCE_MM or min(
-                    _distance((r, z), element) for element in drawn
-                ) <= TOLERANCE_MM
+                assert (
+                    r >= max(one[0] for one in inside) - TOLERANCE_MM
+                    or min(_distance((r, z), element) for element in drawn) <= TOLERANCE_MM
+                )
 
 
 def test_p25_five_named_stages_and_a_program_that_parses() -> None:

@@ -1,7 +1,7 @@
 """The drawing of a turned part: its contour from the front face towards the chuck, in whole micrometres.
 
-``u`` is the depth behind the front face, ``r`` the radius. A contour never falls back towards the axis (no undercut), so one
-right-hand tool can follow it: cylinders, faces, tapers, and arcs of at most a quarter circle.
+``u`` is the depth behind the front face, ``r`` the radius. A contour never falls back towards the axis (no undercut),
+so one right-hand tool can follow it: cylinders, faces, tapers, and arcs of at most a quarter circle.
 """
 
 from dataclasses import dataclass
