@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
-from onboard.core.messages import NO_REFERENCE, Award, CallForProposals, Itinerary, Reference
+from onboard.core.messages import NO_REFERENCE, Award, CallForProposals, Itinerary, Message, Reference
 
 
 class CallKey(NamedTuple):
@@ -18,7 +18,8 @@ class CallKey(NamedTuple):
 class Proposal(NamedTuple):
     """What a task would cost: ``cost`` in the call's unit, the tentative itinerary, and the kind's own data.
 
-    ``parts`` are the sub-calls whose options it rests on, by number; the others are given up when it is bid.
+    ``parts`` are the sub-calls whose options it rests on, by number; the others are given up when it is bid. ``detail``
+    is what a system's bids say beyond the number: said right before the bid.
     """
 
     cost: int
@@ -26,6 +27,7 @@ class Proposal(NamedTuple):
     program: tuple[Any, ...]
     alternatives: tuple[Any, ...]
     parts: tuple[int, ...] = ()
+    detail: tuple[Message, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +35,8 @@ class CallTerms:
     """What an initiator asks for; the negotiation adds call number, attempt and deadline.
 
     ``ready_us`` (bus time) is when a part can begin at the earliest, 0 for at once. The negotiation numbers the parts
-    of a bid itself: ``parent``, ``part`` and ``depth`` are for calls that a machine opens after winning.
+    of a bid itself: ``parent``, ``part`` and ``depth`` are for calls that a machine opens after winning. ``detail`` is
+    what a system's tasks need beyond a call's fields: said right before the call, each time that it is opened.
     """
 
     task: Reference
@@ -49,6 +52,7 @@ class CallTerms:
     parent: Reference = NO_REFERENCE
     part: int = 0
     ready_us: int = 0
+    detail: tuple[Message, ...] = ()
 
 
 class Answer(NamedTuple):

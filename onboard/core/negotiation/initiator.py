@@ -146,7 +146,7 @@ class Initiator:
             _in_steps_ms(terms.ready_us - self.due_us, READY_STEP_MS, MAX_READY_MS),
             _in_steps_ms(self.hold_until_us - self.due_us, HOLD_STEP_MS, MAX_HOLD_MS),
         )
-        return [Send(self.call)]
+        return [*(Send(message) for message in self.terms.detail), Send(self.call)]
 
     def on_bid(self, bid: Bid, now_us: int) -> Outcome:
         """A bid counts if received before the deadline minus the guard, by my own bus time (decision on flag 11)."""

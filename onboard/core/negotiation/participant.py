@@ -280,7 +280,7 @@ class Participant:
         version = itinerary.version if itinerary is not None else 0
         self.best = (self.proposal.cost, self.node_id)
         bid = Bid(self.node_id, self.call.sender, self.call.call, self.proposal.cost, version)
-        outcome: Outcome = [Send(bid)]
+        outcome: Outcome = [*(Send(message) for message in self.proposal.detail), Send(bid)]
         if itinerary is not None:
             outcome.append(Send(itinerary))
         outcome.append(PreAssigned(self.key, self.call, self.proposal))

@@ -1,0 +1,1 @@
+"""The manufacturing cell in the simulator."""

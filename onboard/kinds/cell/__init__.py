@@ -1,0 +1,1 @@
+"""The manufacturing cell of Panescu and Miron (2006): robots with working areas hand parts over to each other."""
