@@ -1,6 +1,7 @@
 """The temporal network of the paper's section 3 (rows M09 to M22, M30 to M34), on the numbers of its Fig. 3."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
@@ -38,7 +39,7 @@ def test_m09_m10_m12_m14_the_printed_plan_comes_out_to_the_second() -> None:
     traffic.take_up(plan, 10)
     found = intervals(traffic, 11, 10)
     assert [(step.action, step.entity, *at) for step, at in zip(plan.steps, found, strict=True)] == PRINTED
-    assert all(end == begin for (_, end), (begin, _) in zip(found, found[1:], strict=False))
+    assert all(end == begin for (_, end), (begin, _) in pairwise(found))
     assert (found[0][0], found[7][1], found[-1][1]) == (10, 83, 131)
 
 

@@ -2,7 +2,7 @@
 
 from onboard.kinds.terminal.messages import Action
 from onboard.kinds.terminal.mirror import TerminalMirror
-from onboard.kinds.terminal.plan import Step
+from onboard.kinds.terminal.plan import NO_STEP, Load
 from onboard.kinds.terminal.site import Entity, EntityKind, Terminal
 from onboard.kinds.terminal.traffic import Node, Traffic
 
@@ -23,7 +23,7 @@ def plan_table(site: Terminal, traffic: Traffic, owner: int, now: int, tick: int
         step = steps[number]
         load = next((one for one in owned.plan.loads if number <= one.put or number == len(steps) - 1), None)
         name = "" if load is None else site.boxes[load.box - 1].name
-        now_task = _task(steps, [one.pick for one in owned.plan.loads], number)
+        now_task = _task(owned.plan.loads, number)
         words = f"{_WORDS[step.action]} {site.entities[step.entity].name}" if step.action in _WORDS else ""
         if step.action in _LOADS:
             words = f"{_LOADS[step.action]} Box {name}"
@@ -35,9 +35,11 @@ def plan_table(site: Terminal, traffic: Traffic, owner: int, now: int, tick: int
     return lines
 
 
-def _task(steps: tuple[Step, ...], picks: list[int], number: int) -> str:
-    """A step belongs to the loading task until the box is up and the station left."""
-    return "Loading Task" if any(number <= pick + 1 for pick in picks if pick < len(steps)) else "Unloading Task"
+def _task(loads: tuple[Load, ...], number: int) -> str:
+    """A step belongs to the next handling that it leads to, or undocks from."""
+    ends = [(load.pick + 1, "Loading Task") for load in loads if load.pick < NO_STEP]
+    ends += [(load.put + 1, "Unloading Task") for load in loads]
+    return min((end for end in ends if end[0] >= number), default=(0, "Unloading Task"))[1]
 
 
 def picture(site: Terminal, mirror: TerminalMirror, now_us: int) -> list[str]:

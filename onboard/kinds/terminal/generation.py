@@ -4,25 +4,29 @@ from dataclasses import dataclass, field, replace
 
 from onboard.core.codes import Operation
 from onboard.core.messages import CallForProposals
-from onboard.core.negotiation import Proposal
+from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.plan import Load, Plan
 from onboard.kinds.terminal.routes import free_flow_us
-from onboard.kinds.terminal.search import Found, Job, Search, copy_of, remaining
+from onboard.kinds.terminal.search import Found, Job, Search, remaining
 from onboard.kinds.terminal.site import EntityKind, Terminal
-from onboard.kinds.terminal.traffic import Traffic
+from onboard.kinds.terminal.traffic import Traffic, copy_of
 
 
 @dataclass
 class VehicleGeneration:
-    """An ``Estimator``. ``has_queue`` is true while a task was won that is in no plan yet: nothing more is bid for."""
+    """An ``Estimator``. ``has_queue`` is true while a task was won that is in no plan yet: nothing more is bid for.
+
+    ``promised`` are the calls in which this machine's bid stands best.
+    """
 
     site: Terminal
     machine: Machine
     mirror: TerminalMirror
     has_queue: bool = False
+    promised: set[CallKey] = field(default_factory=set)
     searches: int = 0
     _handling_us: int = field(init=False)
 
@@ -49,7 +53,9 @@ class VehicleGeneration:
         return None if way_us is None or carry_us is None else to_bus_ms(free_us + way_us + carry_us)
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """The end of the best plan."""
+        """The end of the best plan; none while a bid for another call stands best: what that brings goes first."""
+        if self.promised - {CallKey(call.sender, call.call)}:
+            return None
         found = self.plan(job_of(self.mirror, call), now_us, version=1)
         if found is None:
             return None

@@ -22,7 +22,7 @@ from onboard.kinds.terminal.plan import (
 )
 from onboard.kinds.terminal.routes import routes
 from onboard.kinds.terminal.site import EntityKind, Terminal
-from onboard.kinds.terminal.traffic import Node, Traffic, Visit
+from onboard.kinds.terminal.traffic import Node, Traffic, Visit, copy_of
 
 _EVER = 1 << 62
 
@@ -202,9 +202,11 @@ class Search:
         mine = next((n for n, one in enumerate(row) if one.owner == self.owner and self.traffic.is_inside(one)), None)
         if is_kept or mine is None:
             return [Room(len(row), -_EVER, _EVER, -_EVER, _EVER)]
-        is_lane = self.site.entities[stay.entity].kind is EntityKind.LANE
-        ahead = [self.traffic.begin_and_end(one, self.now)[1] for one in row[:mine]] if is_lane else []
-        return [Room(mine, -_EVER, _EVER, max(ahead, default=-_EVER) + self.site.gap_us, _EVER)]
+        if self.site.entities[stay.entity].kind is not EntityKind.LANE:
+            return [Room(mine, -_EVER, _EVER, -_EVER, _EVER)]
+        ends = [self.traffic.begin_and_end(one, self.now)[1] for one in row]
+        low = max(ends[:mine], default=-_EVER) + self.site.gap_us
+        return [Room(mine, -_EVER, _EVER, low, min(ends[mine + 1 :], default=_EVER) - self.site.gap_us)]
 
     def _leave(self, stay: _Stay, enter: int) -> int:
         """When a stay can end at the earliest."""
@@ -265,17 +267,35 @@ class Search:
     def _push(
         self, steps: list[Step], stays: list[_Stay], began: int, job: Job, version: int, kept: Plan | None
     ) -> Plan | None:
-        """Behind everybody in every list, before whoever must not come first; None where that makes a circle."""
-        told: list[Step] = []
-        at = began
-        for stay in stays:
-            row = [visit for visit in self.traffic.lists.get(stay.entity, ()) if visit.owner != self.owner]
-            place = self._stack_places(row, stay.box)[1]
-            after = row[place - 1].key if place else NOBODY_BEFORE
-            for step in stay.steps:
-                at = max(at + step.duration, self.now)
-                told.append(step._replace(end=at, after=after))
-        return self._dated(self._joined(told, began, job, version, kept))
+        """Where others are delayed: before those only who follow on the lane in hand, behind all, or before all.
+
+        None where each of these makes a circle.
+        """
+        followers = self._followers(stays[0].entity)
+        for ahead_of in (followers, frozenset[int](), frozenset(self.traffic.plans)):
+            told: list[Step] = []
+            at = began
+            for stay in stays:
+                row = [visit for visit in self.traffic.lists.get(stay.entity, ()) if visit.owner != self.owner]
+                place = self._stack_places(row, stay.box)[1]
+                first = (n for n, one in enumerate(row) if one.owner in ahead_of and not self.traffic.is_inside(one))
+                place = min(place, next(first, len(row)))
+                after = row[place - 1].key if place else NOBODY_BEFORE
+                for step in stay.steps:
+                    at = max(at + step.duration, self.now)
+                    told.append(step._replace(end=at, after=after))
+            plan = self._dated(self._joined(told, began, job, version, kept))
+            if plan is not None:
+                return plan
+        return None
+
+    def _followers(self, entity: int) -> frozenset[int]:
+        """Machines behind this one on the lane that it is in."""
+        row = self.traffic.lists.get(entity, [])
+        if self.site.entities[entity].kind is not EntityKind.LANE:
+            return frozenset()
+        mine = next((n for n, one in enumerate(row) if one.owner == self.owner), len(row))
+        return frozenset(one.owner for one in row[mine + 1 :])
 
     def _dated(self, plan: Plan) -> Plan | None:
         """A plan with the dates that follow when it is put between the others; None where they would never end."""
@@ -299,18 +319,6 @@ def _stays(steps: list[Step], box: int) -> list[_Stay]:
         if step.action is Action.PICK_UP:
             found[-1] = found[-1]._replace(box=box)
     return found
-
-
-def copy_of(traffic: Traffic) -> Traffic:
-    """A mirror to try things on."""
-    return Traffic(
-        traffic.site,
-        {owner: replace(owned) for owner, owned in traffic.plans.items()},
-        {entity: list(row) for entity, row in traffic.lists.items()},
-        dict(traffic.blocked),
-        dict(traffic.before),
-        dict(traffic.below),
-    )
 
 
 def remaining(traffic: Traffic, owner: int, now: int) -> Plan | None:

@@ -6,7 +6,7 @@ on an entity in the order of its list; a new plan says after whom it comes, so a
 """
 
 from collections import deque
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from onboard.kinds.terminal.plan import Load, Plan, VisitKey
@@ -272,8 +272,7 @@ class Traffic:
         dates = self.dates(now)
         found = []
         if dates.circle:
-            latest = max(dates.circle, key=lambda owner: (self.plans[owner].plan.begin, owner))
-            return [Violation(latest, "plans wait for each other")]
+            return [Violation(self._breaker(dates.circle, now), "plans wait for each other")]
         for owner, owned in self.plans.items():
             for load in owned.plan.loads:
                 date = self.date_of(load)
@@ -282,9 +281,33 @@ class Traffic:
                     break
         return found
 
+    def _breaker(self, circle: frozenset[int], now: int) -> int:
+        """Whose plan is to be made anew to end a circle: the latest without which there is none, else the latest."""
+        ranked = sorted(circle, key=lambda owner: (self.plans[owner].plan.begin, owner), reverse=True)
+        for owner in ranked:
+            trial, owned = copy_of(self), self.plans[owner]
+            _, last = next(visit for visit in owned.plan.visits() if visit[1] >= owned.current)
+            steps = owned.plan.steps[owned.current : last + 1]
+            trial.take_up(Plan(owner, owned.plan.version, owned.began, steps), now)
+            if not trial.dates(now).circle:
+                return owner
+        return ranked[0]
+
     def through(self, lane: int) -> list[int]:
         """Machines that plan to enter a lane and are not in it."""
         return sorted({visit.owner for visit in self.lists.get(lane, ()) if not self.is_inside(visit)})
+
+
+def copy_of(traffic: Traffic) -> Traffic:
+    """A picture to try things on."""
+    return Traffic(
+        traffic.site,
+        {owner: replace(owned) for owner, owned in traffic.plans.items()},
+        {entity: list(row) for entity, row in traffic.lists.items()},
+        dict(traffic.blocked),
+        dict(traffic.before),
+        dict(traffic.below),
+    )
 
 
 def earliest(floors: dict[Node, int], edges: list[Edge]) -> Dates:

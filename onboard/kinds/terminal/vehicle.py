@@ -14,7 +14,7 @@ from onboard.core.codes import ANY_STATION, Grade, KindCode, MachineState, Reaso
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, Stamp, TaskReport
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Released
+from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.terminal.body import Body
@@ -42,8 +42,9 @@ RETRY_US = 5_000_000
 AGAIN_US = 10_000_000
 #: A task that was won and is in no plan yet is spoken of again after this, us. Ours.
 SAY_US = 20_000_000
-#: So long after the one before it in order of node-IDs a vehicle takes its turn to plan around a blocked lane, us. Ours.
-TURN_US = 500_000
+#: Plans are adopted in turns of bus time, one vehicle so long after the other, us: each sees what the one before has
+#: told, so that no two plans are made at once around the same gaps. Ours.
+TURN_US = 50_000
 #: What a statement about a box says where that about a car has a wheelbase (dbc/fleet.dbc).
 NO_WHEELBASE_MM = 1500
 _NO_STAMP = Stamp(0, 0, 0)
@@ -87,7 +88,10 @@ class Vehicle:
     _again_at_us: int | None = None
     _patience_at_us: int | None = None
     _retry_at_us: int | None = None
+    _may_retry: bool = False
+    _queue_at_us: int | None = None
     _said_at_us: int | None = None
+    _turn_at_us: int | None = None
     _told_blocked: bool = False
     _actions: dict[Action, Callable[[Owned, int], list[Effect]]] = field(init=False, repr=False)
 
@@ -164,10 +168,13 @@ class Vehicle:
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Awarded: the plan is made a second time, around what is known now (row P20), and told."""
         match event:
-            case Awarded(call=call):
+            case PreAssigned(call_key=key):
+                self.generation.promised.add(key)
+            case Released(call_key=key):
+                self.generation.promised.discard(key)
+            case Awarded(call_key=key, call=call):
+                self.generation.promised.discard(key)
                 return self._awarded(call, now_us)
-            case Released():
-                return []
         return []
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
@@ -178,7 +185,10 @@ class Vehicle:
         """One step of the plan, where its condition is met."""
         if not self.body.is_known:
             return []
-        effects = self.body.repeat(now_us) + self._give_back(now_us) + self._mend(now_us)
+        if self._retry_at_us is not None and self._retry_at_us <= now_us:
+            self._retry_at_us, self._may_retry = None, True
+        effects = self.body.repeat(now_us) + self._give_back(now_us)
+        effects += self._in_turn(now_us)
         owned = self.owned
         if effects:
             return effects
@@ -187,14 +197,12 @@ class Vehicle:
             self._said_at_us = now_us + SAY_US
             job = self.queue[0]
             return [Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.AWARDED, job.target, Reason.NONE))]
-        if owned is None:
-            return self._next_in_queue(now_us)
-        return self._actions[owned.plan.steps[owned.current].action](owned, now_us)
+        return self._actions[owned.plan.steps[owned.current].action](owned, now_us) if owned is not None else []
 
     def next_wake(self) -> int | None:
-        """Repeats, retries, and the end of patience."""
+        """Repeats, retries, the end of patience, and my next turn where there is something to plan."""
         said = self._said_at_us if self.queue else None
-        times = (self.body.due_us, self._retry_at_us, self._again_at_us, self._patience_at_us, said)
+        times = (self.body.due_us, self._retry_at_us, said, self._turn_at_us)
         return min((time for time in times if time is not None), default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
@@ -210,7 +218,8 @@ class Vehicle:
     def _awarded(self, call: CallForProposals, now_us: int) -> list[Effect]:
         self.stamp = Stamp(to_bus_ms(now_us), call.sender, call.call & 0xFF)
         taken = Send(TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.to_station, Reason.NONE))
-        return [taken, *self._take(job_of(self.mirror, call), now_us)]
+        self._take(job_of(self.mirror, call))
+        return [taken]
 
     def _assigned(self, order: Assignment, now_us: int) -> list[Effect]:
         taken = Send(TaskReport(self.fleet.node_id, order.task, TaskPhase.AWARDED, order.target, Reason.NONE))
@@ -220,34 +229,60 @@ class Vehicle:
             return [taken]
         before = self.mirror.traffic.before.get(order.task, 0)
         job = Job(order.box, order.task, self.mirror.station_of(order.box), order.target, before)
-        return [taken, *self._take(job, now_us)] if job.source else []
+        if job.source:
+            self._take(job)
+        return [taken] if job.source else []
 
-    def _take(self, job: Job, now_us: int) -> list[Effect]:
-        if self.mirror.in_plans(job.box) not in (None, self.fleet.node_id):
-            return [self._phase(job.task, TaskPhase.FORFEITED, job.source)]
-        found = self.generation.plan(job, now_us, version=successor(self.version, 8))
-        if found is None:
-            self.queue.append(job)
-            self.generation.has_queue = True
-            return []
-        return self._adopt(found.plan, now_us)
+    def _take(self, job: Job) -> None:
+        """It is planned in my next turn."""
+        self.queue.append(job)
+        self.generation.has_queue = True
 
-    def _next_in_queue(self, now_us: int) -> list[Effect]:
-        if not self.queue or (self._retry_at_us is not None and now_us < self._retry_at_us):
+    def _plan_next(self, now_us: int) -> list[Effect]:
+        """Put the oldest task won behind what is planned; forfeit one whose box is in another's plan."""
+        if not self.queue or (self._queue_at_us is not None and now_us < self._queue_at_us):
             return []
         job = self.queue[0]
-        if self.mirror.in_plans(job.box) is not None:
-            self.queue.popleft()
-            self.generation.has_queue = bool(self.queue)
+        if self.mirror.in_plans(job.box) not in (None, self.fleet.node_id):
+            self._drop_first()
             return [self._phase(job.task, TaskPhase.FORFEITED, job.source)]
         found = self.generation.plan(job, now_us, version=successor(self.version, 8))
         if found is None:
-            self._retry_at_us = now_us + RETRY_US
+            self._queue_at_us = now_us + RETRY_US
             return []
-        self.queue.popleft()
-        self._retry_at_us = None
-        self.generation.has_queue = bool(self.queue)
+        self._drop_first()
         return self._adopt(found.plan, now_us)
+
+    def _in_turn(self, now_us: int) -> list[Effect]:
+        """What is only done in my turn; I wake for the turn in which something is due."""
+        turn_us = self._turn_us(now_us)
+        effects: list[Effect] = []
+        if turn_us == now_us:
+            effects = self._plan_next(now_us) + self._mend(now_us)
+            turn_us = self._turn_us(now_us + TURN_US)
+        due_us = self._planning_due(now_us)
+        self._turn_at_us = max(turn_us, self._turn_us(due_us)) if due_us is not None else None
+        return effects
+
+    def _planning_due(self, now_us: int) -> int | None:
+        """When there is something to plan, or to look at."""
+        times = [self._again_at_us, self._patience_at_us]
+        if self.queue:
+            times.append(self._queue_at_us or now_us)
+        if self.owned is not None and self.mirror.traffic.changes != self._looked_at:
+            times.append(now_us)
+        return min((time for time in times if time is not None), default=None)
+
+    def _drop_first(self) -> None:
+        self.queue.popleft()
+        self._queue_at_us = None
+        self.generation.has_queue = bool(self.queue)
+
+    def _turn_us(self, now_us: int) -> int:
+        """When my turn to adopt plans is, or begins next; ``now_us`` itself while it is."""
+        count, rank = len(self.site.vehicles), self.site.vehicles.index(self.fleet.node_id)
+        behind = (now_us // TURN_US - rank) % count
+        return now_us if not behind else (now_us // TURN_US + count - behind) * TURN_US
 
     # --- plans -------------------------------------------------------------------------------------------------
 
@@ -303,9 +338,9 @@ class Vehicle:
     def _mend(self, now_us: int) -> list[Effect]:
         """Make my plan anew if it is violated, and mine only (M31); a blocked lane is waited for first (M33)."""
         owned, traffic = self.owned, self.mirror.traffic
-        self._patience_at_us = self._patience_end(now_us)
         if owned is None or self._is_busy():
             return []
+        self._patience_at_us = self._patience_end(now_us)
         due = self._again_at_us is not None and self._again_at_us <= now_us
         if traffic.changes == self._looked_at and not due:
             return []
@@ -334,9 +369,7 @@ class Vehicle:
 
     def _patience_end(self, now_us: int) -> int | None:
         """When the next blocked lane on my way has been waited for long enough."""
-        # One after the other: whoever comes later sees what the others have planned.
-        turn_us = self.site.vehicles.index(self.fleet.node_id) * TURN_US
-        ends = [since + self.site.patience_us + turn_us for since in self.mirror.traffic.blocked.values()]
+        ends = [since + self.site.patience_us for since in self.mirror.traffic.blocked.values()]
         coming = min((end for end in ends if end > now_us), default=None)
         if self._patience_at_us is not None and self._patience_at_us <= now_us:
             self._looked_at = -1
@@ -424,15 +457,15 @@ class Vehicle:
         return next((load for load in owned.plan.loads if step in (load.pick, load.put)), None)
 
     def _handle(self, action: Action, box: int, now_us: int) -> list[Effect]:
-        if self.body.is_handling or (self._retry_at_us is not None and now_us < self._retry_at_us):
+        if self.body.is_handling or self._retry_at_us is not None:
             return []
         assert self.body.handler is not None
-        if self.body.handler.mode is HandlerMode.FAILED and self._retry_at_us is None:
+        if self.body.handler.mode is HandlerMode.FAILED and not self._may_retry:
             self._retry_at_us = now_us + RETRY_US
             owned = self.owned
             assert owned is not None
             return [Send(self._report(owned, owned.current, now_us, StepResult.FAILED))]
-        self._retry_at_us = None
+        self._may_retry = False
         return self.body.handle(action, box, now_us)
 
     def _dock(self, owned: Owned, now_us: int) -> list[Effect]:
