@@ -6,7 +6,7 @@ from onboard.core.codes import KindCode
 from onboard.core.messages import NO_REFERENCE
 from onboard.core.site import Machine, Segment, Timing
 from onboard.kinds.terminal.messages import Action
-from onboard.kinds.terminal.plan import Load, Plan, drive_steps, handling_steps
+from onboard.kinds.terminal.plan import Load, Plan, VisitKey, drive_steps, handling_steps
 from onboard.kinds.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
 from onboard.kinds.terminal.traffic import Node, Traffic
 
@@ -24,20 +24,22 @@ OUT, BACK = (A1, L3, C1, L2, A4, S2), (A4, L11, C1, A2, S1)
 
 def fig3(lane_capacity: int = 0, vehicles: int = 3) -> Terminal:
     """Durations in seconds; crossings as in the paper, without a limit."""
-    lane = {"capacity": lane_capacity, "kind": EntityKind.LANE}
-    area = {"capacity": 0, "kind": EntityKind.AREA}
-    station = {"capacity": 1, "kind": EntityKind.STATION, "station": StationKind.STACK}
+
+    def lane(number: int, name: str, seconds: int, leads_to: int) -> Entity:
+        return Entity(number, name, EntityKind.LANE, seconds, lane_capacity, (leads_to,))
+
+    def area(number: int, name: str, seconds: int, *leads_to: int) -> Entity:
+        return Entity(number, name, EntityKind.AREA, seconds, 0, leads_to)
+
+    def station(number: int, name: str, within: int) -> Entity:
+        return Entity(number, name, EntityKind.STATION, 0, 1, (within,), area=within, station=StationKind.STACK, room=9)
+
     entities = [
-        Entity(A1, "A1", duration_us=30, leads_to=(L3,), **area),  # type: ignore[arg-type]  # a row of a table
-        Entity(L3, "L3", duration_us=10, leads_to=(C1,), **lane),  # type: ignore[arg-type]
-        Entity(C1, "C1", EntityKind.CROSSING, 5, 0, (L2, A2), turns=((L11, A2, 6),)),
-        Entity(L2, "L2", duration_us=12, leads_to=(A4,), **lane),  # type: ignore[arg-type]
-        Entity(A4, "A4", duration_us=10, leads_to=(L11, S2), **area),  # type: ignore[arg-type]
-        Entity(L11, "L11", duration_us=20, leads_to=(C1,), **lane),  # type: ignore[arg-type]
-        Entity(A2, "A2", duration_us=6, leads_to=(C1, S1), **area),  # type: ignore[arg-type]
-        Entity(S2, "S2", duration_us=0, leads_to=(A4,), area=A4, **station),  # type: ignore[arg-type]
-        Entity(S1, "S1", duration_us=0, leads_to=(A2,), area=A2, **station),  # type: ignore[arg-type]
-    ]
+        area(A1, "Area 1", 30, L3), lane(L3, "Lane 3", 10, C1),
+        Entity(C1, "Crossing 1", EntityKind.CROSSING, 5, 0, (L2, A2), turns=((L11, A2, 6),)),
+        lane(L2, "Lane 2", 12, A4), area(A4, "Area 4", 10, L11, S2), lane(L11, "Lane 11", 20, C1),
+        area(A2, "Area 2", 6, C1, S1), station(S2, "Station 2", A4), station(S1, "Station 1", A2),
+    ]  # fmt: skip
     machines = {1: Machine(1, "desk", KindCode.DESK, Segment(0, 0))}
     machines |= {10 + n: Machine(10 + n, f"R{n}", KindCode.VEHICLE, Segment(A1, 1)) for n in range(1, vehicles + 1)}
     return Terminal(
@@ -68,7 +70,7 @@ def plan_of(site: Terminal, owner: int, box: int = 3, begin: int = 10, before: i
 
 def behind(plan: Plan, owner: int) -> Plan:
     """The same, after another machine wherever that goes."""
-    steps = [step._replace(after=(owner, number)) for number, step in enumerate(plan.steps)]  # type: ignore[arg-type]
+    steps = [step._replace(after=VisitKey(owner, number)) for number, step in enumerate(plan.steps)]
     return replace(plan, steps=tuple(steps))
 
 

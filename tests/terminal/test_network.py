@@ -85,7 +85,7 @@ def lane_alone(capacity: int) -> list[tuple[int, int]]:
     site = fig3()
     waiting = {90 + n: Entity(90 + n, f"W{n}", EntityKind.AREA, n, 0, (L3,)) for n in range(4)}
     lane = Entity(L3, "L3", EntityKind.LANE, 10, capacity, (C1,))
-    site.entities.update({**waiting, L3: lane})  # type: ignore[attr-defined]  # a mapping for machines, a dict here
+    site = replace(site, entities={**site.entities, **waiting, L3: lane})
     traffic = Traffic(site)
     for number in range(4):
         after = VisitKey(10 + number, 1) if number else VisitKey(0, 0)
@@ -103,9 +103,9 @@ def test_m18_m19_one_lane_alone() -> None:
 def test_m17_the_upper_box_is_picked_up_first() -> None:
     """B4 stands on B3; whoever comes for B3 waits until B4 is up, and a tick more."""
     site = fig3()
+    site = replace(site, entities={**site.entities, S2: replace(site.entities[S2], capacity=2)})
     traffic = Traffic(site, below={4: (3,)})
     traffic.take_up(plan_of(site, 11, box=4), 10)
-    site.entities[S2] = replace(site.entities[S2], capacity=2)  # type: ignore[index]  # a dict here
     steps = (Step(Action.GOTO, A4, 10), *(one._replace(after=VisitKey(11, 5)) for one in plan_of(site, 12).steps[5:8]))
     traffic.take_up(Plan(12, 1, 60, steps, (Load(3, NO_REFERENCE, 2, 31),)), 10)
     dates = intervals(traffic, 12, 10)

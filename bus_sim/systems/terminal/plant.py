@@ -3,6 +3,7 @@
 import asyncio
 import random
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from bus_sim.plant.link import BusDeviceLink
 from bus_sim.plant.timers import LoopTimers
@@ -121,7 +122,7 @@ class VehicleDevices:
             return
         self.mode, self.at_end = MoveMode.MOVING, False
         self._tell_move()
-        self.plant.after(self._really(duration_us), lambda run=self._run: self._crossed(run))  # type: ignore[misc]
+        self.plant.after(self._really(duration_us), partial(self._crossed, self._run))
 
     def _crossed(self, run: int) -> None:
         if run == self._run:

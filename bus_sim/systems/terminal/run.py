@@ -121,7 +121,7 @@ def outcome(run: TerminalRun) -> Outcome:
         tuple(deliveries(site, run.plant.world.handled)),
         ordered,
         max((one.time_us for one in run.plant.world.handled), default=0),
-        sum(vehicle.touched for vehicle in vehicles),
+        sum(vehicle.planner.touched for vehicle in vehicles),
         len(site.blockages),
         statistics.frames,
         statistics.mean_load,

@@ -61,7 +61,7 @@ class Body:
         else:
             self.handler = message
             pending = self.handler_order
-            over = message.mode is not HandlerMode.WORKING
+            over = message.gear is not HandlerMode.WORKING
             if pending is not None and message.sequence == pending.sequence and over:
                 self.handler_order = None
         if self.move_order is None and self.handler_order is None:

@@ -173,10 +173,10 @@ class HandlerOrder(Message):
 
 @dataclass(frozen=True, slots=True)
 class HandlerState(Message):
-    """``mode`` after order ``sequence``; ``box`` is the number of the one aboard as its label reads, 0 for none."""
+    """``gear`` after order ``sequence``; ``box`` is the number of the one aboard as its label reads, 0 for none."""
 
     sequence: int
-    mode: HandlerMode
+    gear: HandlerMode
     box: int
 
 
