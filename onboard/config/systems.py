@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from onboard.config.reader import Table
+from onboard.config.terminal import read_terminal
 from onboard.core.site import Site
 
 
@@ -19,4 +20,6 @@ class Common(NamedTuple):
 
 
 #: By the word after ``system =`` in the table ``[site]``.
-READERS: dict[str, Callable[[Table, Common], Site]] = {}
+READERS: dict[str, Callable[[Table, Common], Site]] = {
+    "terminal": read_terminal,
+}

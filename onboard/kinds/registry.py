@@ -14,6 +14,10 @@ from onboard.kinds.car_park.compartment import CompartmentFactory
 from onboard.kinds.car_park.lift import LiftFactory
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.car_park.site import CarPark
+from onboard.kinds.terminal.desk import DeskFactory
+from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
+from onboard.kinds.terminal.site import Terminal
+from onboard.kinds.terminal.vehicle import VehicleFactory
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +35,11 @@ _SYSTEMS: dict[str, System] = {
         System(
             CarPark.system,
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
+        ),
+        System(
+            Terminal.system,
+            {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: DeskFactory()},
+            TERMINAL_MESSAGES,
         ),
     )
 }

@@ -26,7 +26,7 @@ def of_kind(site: Site, kind: KindCode) -> list[Machine]:
 
 
 def test_p30_every_shipped_site_has_the_size_that_it_is_known_for() -> None:
-    assert site_names() == sorted(SIZES)
+    assert [name for name in site_names() if find_site(name).system == "car-park"] == sorted(SIZES)
     for name, size in SIZES.items():
         site = find_site(name)
         tracks = list(site.tracks.values())
