@@ -21,13 +21,17 @@ class Stage(Enum):
 
 @dataclass
 class Undertaking:
-    """A contract in hand. ``successor`` is the sub-contractor's node-ID, 0 for nobody or not yet known."""
+    """A contract in hand. ``successor`` is the sub-contractor's node-ID, 0 for nobody or not yet known.
+
+    Until it ``was_heard`` taking the award on it may not know of it: only then is it kept in the journal.
+    """
 
     contract: Contract
     manager: int
     sub_goal: Goal | None
     stage: Stage = Stage.WON
     successor: int = 0
+    was_heard: bool = False
 
     @property
     def task(self) -> Reference:
@@ -45,14 +49,14 @@ def won_record(one: Undertaking) -> Record:
     entry |= {"approach": _text(move.approach), "path": " ".join(str(node) for node in goal.path)}
     entry |= {"own": one.contract.own_cost.hex(), "cost": one.contract.cost.hex()}
     entry |= {"nodes": " ".join(str(node) for node in one.contract.nodes)}
-    entry |= {"sub": one.sub_goal.task.number if one.sub_goal is not None else 0, "next": one.successor}
+    entry |= {"sub": one.sub_goal.task.number if one.sub_goal is not None else 0}
     return Record(entry)
 
 
 def stage_record(one: Undertaking) -> Record:
     """How far it is now, and who goes on."""
     entry: dict[str, str | int] = {"record": "stage", "origin": one.task.origin, "number": one.task.number}
-    return Record(entry | {"stage": one.stage.name, "next": one.successor})
+    return Record(entry | {"stage": one.stage.name, "next": one.successor if one.was_heard else 0})
 
 
 def undertakings(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, Undertaking]:
@@ -67,6 +71,7 @@ def undertakings(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, 
             if task in found:
                 found[task].stage = Stage[str(entry["stage"])]
                 found[task].successor = int(entry["next"])
+                found[task].was_heard = bool(found[task].successor)
     return found
 
 
@@ -85,7 +90,6 @@ def _undertaking(entry: Mapping[str, str | int]) -> Undertaking:
         contract,
         task.origin,
         goal.part_of(node, sub, move.via) if sub else None,
-        successor=int(entry["next"]),
     )
 
 

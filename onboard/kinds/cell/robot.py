@@ -95,6 +95,8 @@ class ArmRobot:
                 self.over[one.task] = one.manager
             else:
                 self.in_hand[one.task] = one
+                if one.sub_goal is not None and not one.successor:
+                    self._call_at_us[one.task] = 0
         self._engage()
         self._table = {
             ArmPhase.TO_PART: self._when_going_there,
@@ -184,7 +186,9 @@ class ArmRobot:
         return effects
 
     def next_wake(self) -> int | None:
-        """When an order, a call, a question or a word is due."""
+        """When an order, a call, a question or a word is due; nothing is before the devices have told how they are."""
+        if self.driver.state is None or self.grip is None:
+            return None
         times = [self.driver.refresh_at_us, self._order_again_us, self._progress_at_us]
         times += [*self._call_at_us.values(), *self._ask_at_us.values()]
         return min((time for time in times if time is not None), default=None)
@@ -231,7 +235,8 @@ class ArmRobot:
         effects: list[Effect] = []
         if not one.successor and report.phase is not TaskPhase.FORFEITED:
             # It has won a call that I do not remember.
-            one.successor = report.sender
+            one.successor, one.was_heard = report.sender, True
+            effects.append(stage_record(one))
             self._call_at_us.pop(one.task, None)
             effects += self._withdraw_call(one, now_us)
         if report.phase is TaskPhase.DONE and report.sender == one.successor and one.stage is Stage.PUT:
@@ -251,11 +256,11 @@ class ArmRobot:
         if one is None or one.stage is Stage.OVER:
             return []
         if event.winner:
-            one.successor = event.winner
+            one.successor, one.was_heard = event.winner, True
             return [stage_record(one)]
         if one.successor and event.result is not CallResult.REJECTED:
             return []
-        one.successor = 0
+        one.successor, one.was_heard = 0, False
         self._call_at_us[one.task] = now_us + CALL_AGAIN_US
         return [stage_record(one)]
 
@@ -271,15 +276,14 @@ class ArmRobot:
         return [stage_record(one), self._report(one.task)]
 
     def _report(self, task: Reference) -> Send:
-        one = self.in_hand.get(task)
-        phases = {Stage.WON: TaskPhase.AWARDED, Stage.TAKEN: TaskPhase.LOADED, Stage.PUT: TaskPhase.STARTED}
-        phase = TaskPhase.DONE if one is None else phases[one.stage]
+        # The manager is told of completion and of nothing before (row C18).
+        phase = TaskPhase.AWARDED if task in self.in_hand else TaskPhase.DONE
         return Send(TaskReport(self.fleet.node_id, task, phase, 0, Reason.NONE))
 
     # --- manager of the rest -----------------------------------------------------------------------------------
 
     def _manage(self, now_us: int) -> list[Effect]:
-        """Call for rests that nobody has, and ask sub-contractors that have had the part for long."""
+        """Call for rests that nobody has, and ask sub-contractors that have had the part for long (row C17)."""
         effects: list[Effect] = []
         for task, due_us in list(self._call_at_us.items()):
             one = self.in_hand.get(task)
@@ -288,7 +292,10 @@ class ArmRobot:
             elif due_us <= now_us:
                 del self._call_at_us[task]
                 effects += self.fleet.negotiation.open(call_terms(one.sub_goal), now_us)
-        for task, one in self.in_hand.items():
+        for task, one in list(self.in_hand.items()):
+            if one.stage is Stage.PUT and one.sub_goal is None:
+                # The controller stopped between putting the part down and saying so.
+                effects += self._achieve(one)
             if one.stage is not Stage.PUT or not one.successor:
                 continue
             due_us = self._ask_at_us.setdefault(task, now_us + ASK_AGAIN_US)
@@ -350,7 +357,7 @@ class ArmRobot:
             return self.driver.go(one.contract.goal.start, now_us)
         one.stage = Stage.TAKEN
         self._engage()
-        return [*self.driver.rest(), stage_record(one), self._report(one.task), *self._to(ArmPhase.TAKING, now_us)]
+        return [*self.driver.rest(), stage_record(one), *self._to(ArmPhase.TAKING, now_us)]
 
     def _when_taking(self, one: Undertaking, now_us: int) -> list[Effect]:
         """The step is journalled before the order: whoever starts again looks into the gripper first."""
@@ -386,7 +393,7 @@ class ArmRobot:
         one.stage = Stage.PUT
         self.active = None
         self._engage()
-        effects: list[Effect] = [*self._grip_over(), stage_record(one), self._part_at(one), self._report(one.task)]
+        effects: list[Effect] = [*self._grip_over(), stage_record(one), self._part_at(one)]
         if one.sub_goal is None:
             effects += self._achieve(one)
         return effects
