@@ -82,5 +82,5 @@ class Scene:
 
 def wish(start: tuple[float, float], end: tuple[float, float], *, at_s: float = 0, within_s: int = 0) -> Wish:
     """A goal by metres and seconds."""
-    places = [Point(round(1000 * x), round(1000 * y)) for x, y in (start, end)]
-    return Wish(round(1000 * at_s), *places, within_s * 1000)
+    one, other = (Point(round(1000 * x), round(1000 * y)) for x, y in (start, end))
+    return Wish(round(1000 * at_s), one, other, within_s * 1000)
