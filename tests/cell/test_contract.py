@@ -1,5 +1,6 @@
 """``dbc/cell.dbc`` and ``dbc/turning.dbc`` are complete, and every message survives the wire."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from math import inf, nan
 
@@ -50,7 +51,7 @@ def test_every_message_survives_the_wire(system: str, end: str) -> None:
         assert Decoder(codec).feed(frame, 0) == message
 
 
-def _value(name: str, kind: str, signals: dict[str, object], end: str) -> object:
+def _value(name: str, kind: str, signals: Mapping[str, object], end: str) -> object:
     def of(signal: str) -> int:
         return int(getattr(signals[signal], end))
 

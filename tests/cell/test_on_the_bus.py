@@ -150,7 +150,7 @@ def test_p59_the_cell_runs_on_the_same_holon_as_the_car_park(scene: Scene) -> No
     core = Path(__file__).parents[2] / "onboard" / "core"
     for file in core.rglob("*.py"):
         assert "onboard.kinds" not in file.read_text(encoding="utf-8"), file
-    phases = [one.phase for _, one in scene.said(ArmProgress) if one.sender == 1]
+    phases = [one.arm_phase for _, one in scene.said(ArmProgress) if one.sender == 1]
     assert list(dict.fromkeys(phases))[:5] == [
         *(ArmPhase.IDLE, ArmPhase.WAITING, ArmPhase.TO_PART, ArmPhase.TAKING, ArmPhase.CARRYING)
     ]

@@ -151,7 +151,7 @@ class ArmDevice:
 
     def _gripped(self, order: GripOrder) -> None:
         parts, here = self._plant.parts, self.at(self._timers.now_us())
-        if order.action is GripAction.TAKE:
+        if order.grip_action is GripAction.TAKE:
             lies = parts.lying.get(order.part)
             empty = parts.of(self.arm.node_id) == _NO_PART
             if lies is not None and empty and hypot(lies.x_mm - here[0], lies.y_mm - here[1]) <= REACH_MM:
@@ -239,9 +239,9 @@ class Counter:
         entry = self.entries[message.order - 1]
         if entry.ended_us is not None:
             return
-        entry.result = message.result
+        entry.result = message.order_result
         entry.cost_mm = message.cost_mm or entry.cost_mm
-        if message.result in (OrderResult.DONE, OrderResult.REFUSED):
+        if message.order_result in (OrderResult.DONE, OrderResult.REFUSED):
             entry.ended_us = self._plant.timers.now_us()
             self._plant.check_end(Reference(self.node_id, entry.number), entry)
 

@@ -170,7 +170,7 @@ class ArmProgress(Message):
 
     x_mm: int
     y_mm: int
-    phase: ArmPhase
+    arm_phase: ArmPhase
     goal: int
 
 
@@ -203,7 +203,7 @@ class ArmState(Message):
     sequence: int
     x_mm: int
     y_mm: int
-    mode: ArmMode
+    arm_mode: ArmMode
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +211,7 @@ class GripOrder(Message):
     """One action of the gripper; a new ``sequence`` starts it, a repeated one does nothing."""
 
     sequence: int
-    action: GripAction
+    grip_action: GripAction
     part: Reference
 
 
@@ -220,7 +220,7 @@ class GripState(Message):
     """The gripper's mode for order ``sequence``, and the part in it."""
 
     sequence: int
-    mode: GripMode
+    grip_mode: GripMode
     part: Reference
 
 
@@ -248,7 +248,7 @@ class OrderAnswer(Message):
     """What becomes of an order; ``cost_mm`` in thousandths of the paper's unit, 0 before it is known."""
 
     order: int
-    result: OrderResult
+    order_result: OrderResult
     cost_mm: int
 
 

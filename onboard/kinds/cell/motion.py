@@ -51,7 +51,7 @@ class Driver:
 
     def stands_at(self, place: Point) -> bool:
         """Whether the robot has come to rest exactly there."""
-        return self.state is not None and self.state.mode is ArmMode.RESTING and self.position == place
+        return self.state is not None and self.state.arm_mode is ArmMode.RESTING and self.position == place
 
     def go(self, end: Point, now_us: int) -> list[Effect]:
         """Order the next stretch of the shortest way to ``end`` and keep the order fresh; none where it is closed."""

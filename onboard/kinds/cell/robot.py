@@ -363,9 +363,9 @@ class ArmRobot:
         """The step is journalled before the order: whoever starts again looks into the gripper first."""
         assert self.grip is not None
         part = one.contract.goal.part
-        if self.grip.mode is GripMode.HOLDING and self.grip.part == part:
+        if self.grip.grip_mode is GripMode.HOLDING and self.grip.part == part:
             return [*self._grip_over(), self._part_at(one), *self._to(ArmPhase.CARRYING, now_us)]
-        if self.grip.mode is GripMode.BUSY:
+        if self.grip.grip_mode is GripMode.BUSY:
             self._order_again_us = None
             return []
         if self.driver.stands_at(one.contract.move.via) and self._lies_here():
@@ -381,13 +381,13 @@ class ArmRobot:
 
     def _when_putting(self, one: Undertaking, now_us: int) -> list[Effect]:
         assert self.grip is not None
-        if self.grip.mode is GripMode.OPEN:
+        if self.grip.grip_mode is GripMode.OPEN:
             return self._put(one, now_us)
         return self._order(GripAction.PUT, one.contract.goal.part, now_us)
 
     def _lies_here(self) -> bool:
         """After a restart before the put-down was journalled: the gripper is open where the part is to lie."""
-        return self.grip is not None and self.grip.mode is GripMode.OPEN and self._ordered is None
+        return self.grip is not None and self.grip.grip_mode is GripMode.OPEN and self._ordered is None
 
     def _put(self, one: Undertaking, now_us: int) -> list[Effect]:
         one.stage = Stage.PUT
@@ -401,8 +401,8 @@ class ArmRobot:
     def _order(self, action: GripAction, part: Reference, now_us: int) -> list[Effect]:
         """One order, said again every second while it is not obeyed; NOTHING_THERE is tried anew."""
         assert self.grip is not None
-        failed = self.grip.mode is GripMode.NOTHING_THERE and self.grip.sequence == self._grip_sequence
-        if self._ordered is None or self._ordered.action is not action:
+        failed = self.grip.grip_mode is GripMode.NOTHING_THERE and self.grip.sequence == self._grip_sequence
+        if self._ordered is None or self._ordered.grip_action is not action:
             self._grip_sequence = successor(self._grip_sequence, 8)
         elif self._order_again_us is not None and self._order_again_us > now_us:
             return []
@@ -430,8 +430,8 @@ class ArmRobot:
         if state is None:
             return []
         here = Point(state.x_mm, state.y_mm)
-        told = (self.phase, state.mode)
-        moving = state.mode is ArmMode.GOING
+        told = (self.phase, state.arm_mode)
+        moving = state.arm_mode is ArmMode.GOING
         due = self._told != told
         if due:
             self._told = told
