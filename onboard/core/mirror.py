@@ -165,7 +165,7 @@ class Mirror:
             del self.cars[car]
 
     def others_standing(self) -> list[Segment]:
-        """Where the plans of all other machines end: there they stand until they plan anew; obstacles where they are."""
+        """Where the plans of all other machines end: there they stand until they plan anew; obstacles stand now."""
         found = [
             final_position(self.site, itinerary)
             for node, itinerary in sorted(self.itineraries.items())

@@ -60,6 +60,10 @@ class Obstacles:
         self.changes += 1
         return True
 
+    def is_at(self, slot: Segment) -> bool:
+        """Whether a slot is blocked, or some machine that is an obstacle has it."""
+        return slot in self.blocked or any(slot in obstacle.slots for obstacle in self.machines.values())
+
     def block(self, segment: Segment, node: int, now_us: int) -> bool:
         """``node`` says that nobody can pass a segment; True where that is news."""
         if segment in self.blocked or segment.track not in self.site.tracks:

@@ -1,6 +1,6 @@
 """Who takes part and who is in the way, by signs of life and by what machines say of themselves (design, section 5).
 
-Any message is a sign of life. Who is silent, says STOPPED or OBSTACLE, or speaks another contract or site is an obstacle
+Any message is a sign of life. Who is silent, says STOPPED or OBSTACLE, or speaks another contract or site is in the way
 until it is heard again as a machine that takes part; a robot that was started again, until it has told a plan.
 """
 
