@@ -9,9 +9,7 @@ from onboard.config.machines import Fleet
 from onboard.config.reader import Table
 from onboard.core.codes import KindCode, Side
 from onboard.core.site import Segment, Station
-from onboard.kinds.graph.network import Graph, edge
-from onboard.kinds.graph.rules import Rules
-from onboard.kinds.graph.site import MAX_CAPACITY, MAX_NODE, MAX_STOPS, FactoryGraph, Order
+from onboard.kinds.graph.site import MAX_CAPACITY, MAX_NODE, MAX_STOPS, FactoryGraph, Graph, Order, Rules, edge
 
 if TYPE_CHECKING:
     from onboard.config.systems import Common

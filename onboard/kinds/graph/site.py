@@ -9,6 +9,8 @@ from onboard.core.site import Machine, Site
 from onboard.kinds.graph.network import Edge, Graph, edge
 from onboard.kinds.graph.rules import Rules
 
+__all__ = ["Edge", "FactoryGraph", "Graph", "Order", "Rules", "edge"]
+
 #: Highest node number: a node is one byte on the wire, and 255 is none.
 MAX_NODE = 254
 #: Most slots of a node.
