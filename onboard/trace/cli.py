@@ -44,7 +44,13 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
-    args = build_parser().parse_args(argv)
+    parser = build_parser()
+    args, late = parser.parse_known_args(argv)
+    if late and (args.command != "dump" or any(word.startswith("-") for word in late)):
+        parser.error(f"unrecognized arguments: {' '.join(late)}")
+    if late:
+        # argparse gives a list of words up at the first option; candump's filters may come after its letters.
+        args.filters += late
     run: Callable[[argparse.Namespace], int] = args.run
     try:
         return run(args)

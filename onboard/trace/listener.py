@@ -69,10 +69,12 @@ class Listener:
     def lines(self) -> list[str]:
         """What came to nothing, one line for each reason."""
         words = [f"{kind}: {count}" for kind, count in sorted(self.others.items())]
-        return words + [
+        words += [
             f"frames that are no message ({reason.name.lower().replace('_', ' ')}): {count}"
             for reason, count in sorted(self.drops.items())
         ]
+        unfinished = sum(decoder.unfinished for pair in self._decoders.values() for decoder in pair)
+        return words + ([f"sets that were not whole at the end: {unfinished}"] if unfinished else [])
 
     def _decoders_of(self, channel: str) -> tuple[Decoder, Decoder]:
         found = self._decoders.get(channel)

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from onboard.core.frame import CAN_EFF_MASK, Frame
 
 #: Bits of the flags nibble of a CAN FD frame in a candump log (``struct canfd_frame``, linux/can.h).
-CANFD_BRS, CANFD_ESI = 0x1, 0x2
+CANFD_BRS, CANFD_ESI, CANFD_FDF = 0x1, 0x2, 0x4
 #: Flag bits above the identifier in a ``can_id`` of SocketCAN (linux/can.h).
 EFF_FLAG, RTR_FLAG, ERR_FLAG = 0x8000_0000, 0x4000_0000, 0x2000_0000
 #: Most data bytes of a CAN FD frame (ISO 11898-1).

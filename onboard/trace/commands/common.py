@@ -18,7 +18,12 @@ class Commands(Protocol):
     """What argparse gives for sub-commands; it has no public name there."""
 
     def add_parser(
-        self, name: str, *, help: str, epilog: str, formatter_class: type[argparse.HelpFormatter]
+        self,
+        name: str,
+        *,
+        help: str,  # noqa: A002  # argparse's own word
+        epilog: str,
+        formatter_class: type[argparse.HelpFormatter],
     ) -> argparse.ArgumentParser:
         """A parser for one command."""
 

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterable, Iterator
 
 from onboard.core.frame import CAN_EFF_MASK, CAN_MAX_DLC, CAN_SFF_MASK
-from onboard.trace.raw import CANFD_BRS, CANFD_ESI, CANFD_MAX_LEN, RawFrame
+from onboard.trace.raw import CANFD_BRS, CANFD_ESI, CANFD_FDF, CANFD_MAX_LEN, RawFrame
 from onboard.trace.readers.faults import LogFault, LogFaults
 
 _TIMED = re.compile(r"\s*(\d+)\.(\d{1,9})\s+(.*)")
@@ -28,6 +28,8 @@ _NO_FRAME = re.compile(
     re.IGNORECASE,
 )
 _ERROR_CLASS_BUS = 0x80
+#: Bits of the flags behind the data of a CANFD line, after duration and length in bits.
+_REMOTE_MARK, _FLEXIBLE_MARK = 0x10, 0x1000
 _ZONES = re.compile(r"\b(GMT|UTC)\b|,")
 _DATES = (
     *("%a %b %d %H:%M:%S %Y", "%a %b %d %I:%M:%S %p %Y", "%a %d %b %Y %H:%M:%S", "%a %b %d %I:%M:%S %p %Y"),
@@ -116,15 +118,28 @@ def _classic(time_us: int, match: re.Match[str], base: int) -> RawFrame | LogFau
 
 
 def _flexible(time_us: int, match: re.Match[str], base: int) -> RawFrame | LogFault:
-    bus, direction, digits, long, faster, error_state, _, length, rest = match.groups()
+    bus, direction, digits, long, faster, error_state, code, length, rest = match.groups()
     can_id, sent = _identifier(digits, long, base), direction.lower() != "rx"
     if can_id is None:
         return LogFault.IDENTIFIER
-    flags = CANFD_BRS * (faster == "1") | CANFD_ESI * (error_state == "1")
+    flags: int | None = CANFD_FDF | CANFD_BRS * (faster == "1") | CANFD_ESI * (error_state == "1")
     data = _data(rest, int(length), base) if int(length) <= CANFD_MAX_LEN else None
     if data is None:
         return LogFault.DATA
+    marks = _marks(rest.split()[len(data) :])
+    if not marks & _FLEXIBLE_MARK:
+        flags = None
+        if marks & _REMOTE_MARK:
+            return RawFrame(time_us, f"can{bus}", can_id, b"", bool(long), True, False, int(code, 16), None, sent)
     return RawFrame(time_us, f"can{bus}", can_id, data, bool(long), fd_flags=flags, sent=sent)
+
+
+def _marks(words: list[str]) -> int:
+    """Flags of a CANFD line; one that is cut short is taken for a CAN FD frame."""
+    try:
+        return int(words[2], 16)
+    except (IndexError, ValueError):
+        return _FLEXIBLE_MARK
 
 
 def _identifier(digits: str, long: str, base: int) -> int | None:

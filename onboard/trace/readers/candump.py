@@ -1,6 +1,6 @@
 """Logs as ``candump -L`` writes them: classic, CAN FD, remote and error frames, with or without marks of direction.
 
-The format is can-utils' (``lib.c``, ``parse_canframe``); the marks `` R`` and `` T`` come from ``candump -L -x`` and from python-can.
+The format is can-utils' (``lib.c``, ``parse_canframe``); marks of direction come from ``candump -L -x`` and python-can.
 """
 
 import re

@@ -76,16 +76,16 @@ class _Watched:
         self._first = b""
 
     def head(self) -> bytes:
-        """The first line, or the first 4096 bytes of one without an end; they are read again afterwards."""
-        self._first = self._file.readline(4096)
+        """The first line; it is read again afterwards. A binary log's first bytes hold a line's end."""
+        self._first = self._file.read(len(MAGIC))
+        if self._first != MAGIC and not self._first.endswith(b"\n"):
+            self._first += self._file.readline()
         return self._first
 
     def __iter__(self) -> Iterator[bytes]:
         first, self._first = self._first, b""
-        if first and not first.endswith(b"\n"):
-            first += self._file.readline()
-        if first:
-            yield first
+        self._done += len(first)
+        yield from first.splitlines(keepends=True)
         for line in self._file:
             self._done += len(line)
             if self._bar is not None:

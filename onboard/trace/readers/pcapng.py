@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from onboard.core.frame import CAN_EFF_MASK, CAN_MAX_DLC, CAN_SFF_MASK
-from onboard.trace.raw import CANFD_MAX_LEN, EFF_FLAG, ERR_FLAG, RTR_FLAG, RawFrame
+from onboard.trace.raw import CANFD_FDF, CANFD_MAX_LEN, EFF_FLAG, ERR_FLAG, RTR_FLAG, RawFrame
 from onboard.trace.readers.faults import LogFault, LogFaults
 
 #: A section header block, the first of every file; the same in both byte orders.
@@ -19,8 +19,6 @@ BYTE_ORDER_MAGIC = 0x1A2B_3C4D
 OPTION_END, OPTION_NAME, OPTION_RESOLUTION, OPTION_OFFSET, OPTION_FLAGS = 0, 2, 9, 14, 2
 #: Two lowest bits of a packet's flags: which way it went.
 INBOUND, OUTBOUND = 1, 2
-#: In the fifth byte of a SocketCAN packet: this is a CAN FD frame.
-CANFD_FDF = 0x04
 #: A block longer than this is taken for damage, bytes: a CAN frame's takes some hundred.
 _LONGEST_BLOCK = 1 << 24
 _HEAD = 8

@@ -2,13 +2,12 @@
 
 from typing import BinaryIO
 
-from onboard.trace.raw import RawFrame
+from onboard.trace.raw import CANFD_FDF, RawFrame
 from onboard.trace.readers.pcapng import (
     BLOCK_INTERFACE,
     BLOCK_PACKET,
     BLOCK_SECTION,
     BYTE_ORDER_MAGIC,
-    CANFD_FDF,
     INBOUND,
     LINKTYPE_SOCKETCAN,
     OPTION_END,
