@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from onboard.core.codes import LegAction
-from onboard.core.kinematics import Run, cleared_at_us, run_duration_us, time_at_us
+from onboard.core.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
 from onboard.core.lifts import PLATFORM_INDEX, lift_at, lift_index_of, platform, platform_on
 from onboard.core.messages import Itinerary, Leg
 from onboard.core.reservations import FOREVER, Use, Window
@@ -86,6 +86,22 @@ def _platform_at(site: Site, position: Segment) -> Segment | None:
         return None
     lift_track = lift_at(site, position)
     return None if lift_track is None else platform(lift_track)
+
+
+def turn_in_us(site: Site, spur: int) -> int:
+    """From standing in the mouth of a spur to standing in it, or back: the turn, then a run over one segment."""
+    return ceil_ms(site.carrier_turn_us) + run_duration_us(site.tracks[spur].pitch_mm, site.carrier)
+
+
+def hop_origin(site: Site, leg: Leg) -> Segment | None:
+    """Where a hop through a spur's mouth begins; None for every other leg."""
+    if leg.action is not LegAction.TRAVEL or leg.from_index != leg.to_index:
+        return None
+    here, track = Segment(leg.track, leg.from_index), site.tracks[leg.track]
+    if track.kind is TrackKind.SPUR:
+        return track.joins[0] if leg.from_index == 1 else None
+    spur = site.spurs.get(here)
+    return None if spur is None else Segment(spur, 1)
 
 
 def junction_segments(site: Site, origin: Segment, inside: Segment) -> list[Segment]:
@@ -230,6 +246,9 @@ def _part_windows(site: Site, part: _Part) -> list[Window]:
     if leg.action is not LegAction.TRAVEL:
         return _stays(standing_segments(site, origin), begin_us, end_us)
     windows = []
+    if here is None:
+        # A plan told anew while its machine turns begins with the hop.
+        here = hop_origin(site, leg)
     if here is not None and here.track != leg.track:
         windows = _stays(junction_segments(site, here, origin), begin_us, end_us)
     if leg.from_index != leg.to_index:
