@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.day import DayOptions, run_day
@@ -38,6 +39,7 @@ examples:
   bus-sim run standard --hour 16:30    from 16:30 to 17:30, after a hurried warm-up
   bus-sim run level1                   a day on the one-floor site
   bus-sim run level1 --one-car 300     one car by hand, fetched after five minutes
+  bus-sim run small --by-hand          press i for a car in, o for a car out
   bus-sim run level1 --serve           at the pace of the clock, the fleet bus on 127.0.0.1:29536 (socketcand)
   bus-sim run level1 --bus socketcan:vcan0
                                        the fleet bus on an interface, so that `candump vcan0` shows it
@@ -97,6 +99,12 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         "has several compartments, else the fourteen of level 1)",
     )
     demand.add_argument("--one-car", type=float, metavar="SECONDS", help="one car by hand, fetched after so long")
+    demand.add_argument(
+        "--by-hand",
+        action="store_true",
+        help="cars come in and are asked for by keys of this terminal while the site runs, ten times as fast as the "
+        "clock; or by the same letters in a pipe",
+    )
     demand.add_argument(
         "--random",
         nargs=2,
@@ -261,6 +269,7 @@ def _window(args: argparse.Namespace, *, live: bool) -> str | None:
         raise OptionError(f"--window {args.window}: must be FROM-TO, such as 06:30-09:00")
     asked: str | None = args.hour or args.window
     whole = args.site is not None or args.one_car is not None or args.random is not None or args.limit_s is not None
+    whole = whole or args.by_hand
     return asked if asked is not None or whole or live or args.without else "busiest"
 
 
@@ -316,6 +325,9 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
     if args.serve is not None and not args.serve.rpartition(":")[2].isdigit():
         raise OptionError(f"--serve {args.serve}: must be HOST:PORT, such as 127.0.0.1:29536")
     window = _window(args, live=live)
+    if args.by_hand and (window is not None or (speed is None and args.speed is not None)):
+        what = f"--speed {args.speed}" if window is None else "--hour, --window"
+        raise OptionError(f"{what}: does not go with --by-hand, which is at a person's pace; leave it out")
     if live and args.without and args.speed is not None and speed != 1.0:
         raise OptionError(
             f"--speed {args.speed}: a controller in another process lives at the clock's pace; leave it out"
@@ -326,12 +338,13 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
             "the clock's pace; leave out --hour and --window"
         )
     if args.speed is None:
-        speed = 1.0 if live else WINDOW_SPEED if window is not None else None
+        speed = 1.0 if live else WINDOW_SPEED if window is not None else HAND_SPEED if args.by_hand else None
     return DayOptions(
         sessions=args.sessions,
         day=args.day,
         stalls=tuple(name for name in args.stalls.split(",") if name),
         one_car_s=args.one_car,
+        by_hand=args.by_hand,
         random_s=tuple(args.random) if args.random is not None else None,
         cars=args.cars,
         seed=args.seed,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from bus_sim.by_hand import ByHand
 from bus_sim.demand import LEVEL1_DAY, WHOLE_DAY, Demand, DemandError
 from bus_sim.faults.arm import arm, check_targets, frame_faults
 from bus_sim.faults.injection import AnyFault
@@ -33,6 +34,8 @@ TAIL_US = 30_000_000
 PATIENCE_US = 2 * 3_600_000_000
 #: Looks at the clock between pictures, us of virtual time.
 STEP_US = 1_000_000
+#: A run that only a person ends, us: a century.
+_FOREVER_US = 100 * 366 * 86_400 * 1_000_000
 #: Without a terminal a window is told line by line, one in so long, us of virtual time.
 WINDOW_LINE_US = 300_000_000
 
@@ -60,6 +63,8 @@ class DayOptions:
     serve: str | None = None
     buses: tuple[str, ...] = ()
     processes: ProcessPlan | None = None
+    #: Cars come and go by keys of the terminal, and nobody comes otherwise.
+    by_hand: bool = False
     quiet: bool = False
 
 
@@ -69,6 +74,8 @@ def choose_demand(options: DayOptions, site: Site | None = None) -> Demand:
     Unless told otherwise a site with several compartments gets the shipped day of all 52 stalls, any other that of
     level 1, which one compartment can serve.
     """
+    if options.by_hand:
+        return Demand(())
     if options.one_car_s is not None:
         return Demand.one_car(stay_s=options.one_car_s, seed=options.seed)
     if options.random_s is not None:
@@ -145,6 +152,7 @@ class _Day:
         self._begin_s = 0.0
         self._indicators = Indicators(site)
         self._simulation = self._build(site)
+        self._hand: ByHand | None = None
         plan = options.processes
         self._processes = (
             ProcessFleet(self._simulation, plan, options.without, self._console) if plan is not None else None
@@ -188,6 +196,8 @@ class _Day:
                 await stack.enter_async_context(outside)
                 simulation.start()
                 stack.enter_context(show)
+                if options.by_hand:
+                    self._hand = stack.enter_context(ByHand(simulation.plant.street, options.seed, console))
                 if self._processes is not None:
                     assert outside.served is not None, "the options with processes name an address"
                     stack.push_async_callback(self._processes.stop)
@@ -210,15 +220,23 @@ class _Day:
         street = self._simulation.plant.street
         await run_until(
             self._simulation,
-            lambda: (or_over and street.is_over) or (self._processes is not None and self._processes.is_over),
+            lambda: self._is_ended() or (or_over and self._hand is None and street.is_over),
             limit_us,
             STEP_US,
             lambda: show.update(self._loop.now_us()),
         )
 
+    def _is_ended(self) -> bool:
+        """Whether a person, or a process that died, has ended the run."""
+        ended = [one.is_over for one in (self._hand, self._processes) if one is not None]
+        return any(ended)
+
     async def _to_the_end(self, show: TerminalShow) -> None:
         if self._options.limit_s is not None:
             await self._until(round(self._options.limit_s * 1_000_000), show, or_over=True)
+            return
+        if self._hand is not None:
+            await self._until(_FOREVER_US, show)
             return
         last_us = max((stay.departure_us or stay.arrival_us for stay in self._demand.stays), default=0)
         await self._until(last_us + self._origin_us + PATIENCE_US, show, or_over=True)

@@ -163,6 +163,11 @@ class Customer:
         if self.stay.cancel_us is not None:
             self._timers.call_at(origin_us + self.stay.cancel_us, lambda: self.on(Event.CANCEL))
 
+    @property
+    def is_leaving(self) -> bool:
+        """Whether a time to leave is set, or the customer came for the car already."""
+        return self._leave_us is not None
+
     def leave_now(self) -> None:
         """Come for the car now, or as soon as it is parked, whatever was planned."""
         self._leave_us = self._timers.now_us()

@@ -13,6 +13,7 @@ from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
 from onboard.core.messages import Message
 from onboard.core.site import Site
+from onboard.trace.check.checks import Checks, Verdict
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.decoder import Decoder
 
@@ -50,11 +51,20 @@ class Scene:
         raise AssertionError(f"no {kind.__name__} as expected after {after_us / 1e6:.3f} s")
 
     def assert_sound(self) -> None:
-        """Nothing broke in the plant, no controller halted."""
+        """Nothing broke in the plant, no controller halted, and no checker of what was said finds anything."""
         assert self.simulation.plant.oracle.finish() == []
+        verdict = self.verdict()
+        assert verdict.is_good, "\n" + "\n".join(verdict.lines())
         assert {
             c.holon.machine.name: c.holon.halted for c in self.simulation.controllers.values() if c.holon.halted
         } == {}
+
+    def verdict(self) -> Verdict:
+        """What the checkers say, which see only what was on the buses; frames that faults took away count as such."""
+        checks = Checks(self.simulation.site, disturbed=bool(self.simulation.options.faults))
+        for said in self.said:
+            checks.feed_message(said.time_us, said.message, said.bus)
+        return checks.finish()
 
 
 def car(number: int, *, wheelbase_mm: int = 2700, length_mm: int = 4300, height_mm: int = 1500) -> CarBody:

@@ -50,6 +50,24 @@ def test_one_car_by_hand_is_parked_and_fetched(tmp_path: Path, capsys: pytest.Ca
     assert summary["frames"] == len(lines)
 
 
+def test_p52_cars_come_and_go_by_keys_while_the_site_runs(tmp_path: Path) -> None:
+    """Two cars come, one is asked for while it comes in; letters that mean nothing change nothing."""
+    words = ["run", "level1", "--by-hand", "--speed", "500", "--seed", "2"]
+    run = subprocess.run(
+        [sys.executable, "-m", "bus_sim.cli", *words],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), "COLUMNS": "200"},
+        input="i\nx i o",
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE_S,
+        check=False,
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert "keys: i a car comes in" in run.stdout
+    assert "cars         in 2   out 1   inside 1" in run.stdout
+
+
 def test_the_real_day_serves_everybody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     status = bus_sim(["run", "level1", "--trace", str(tmp_path / "trace.log")])
     shown = capsys.readouterr().out

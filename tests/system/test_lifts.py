@@ -18,7 +18,6 @@ from onboard.core.messages import (
     TaskReport,
     TokenGrant,
 )
-from tests.system import checked
 from tests.system.scene import Scene, play, stays
 
 
@@ -131,5 +130,4 @@ def test_a_robot_that_wins_a_task_while_aboard_is_not_fetched_again(ask_s: float
     """Its new plan tells the ride under way once more: the lift has made it when it is over."""
     scene = play(parse_site(FAST, "fast.toml"), stays((0, ask_s)), extra_s=200)
     scene.assert_sound()
-    checked.assert_checked(scene)
     assert scene.simulation.plant.street.summary().served == 1

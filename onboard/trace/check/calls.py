@@ -113,7 +113,10 @@ class CallsClosed(_CallRule):
         for seen in self.calls.values():
             if seen.told or seen.outcome is not None or seen.option or seen.due_us is None:
                 continue
-            if now_us - seen.due_us > CLOSED_WITHIN_US and self.picture.is_alive(seen.call.sender, seen.boot):
+            # A sign of the same life after the time is over: before it, the initiator may have died without a word.
+            lived_us = self.picture.heard_us.get(seen.call.sender, 0)
+            late = lived_us - seen.due_us > CLOSED_WITHIN_US
+            if late and self.picture.is_alive(seen.call.sender, seen.boot):
                 seen.told = True
                 self.find(seen.event, (seen.call.sender,), f"call {seen.call.call} was never closed")
 

@@ -1,0 +1,83 @@
+"""Cars in and out by hand while a site runs (row P52, manual piloting): keys of the terminal, or letters of a pipe."""
+
+import asyncio
+import os
+import sys
+import termios
+import tty
+from types import TracebackType
+from typing import Any, Self
+
+from rich.console import Console
+
+from bus_sim.demand import Stay
+from bus_sim.plant.bodies import random_car
+from bus_sim.plant.customer import State
+from bus_sim.plant.street import Street
+
+#: How fast a site runs for a person who presses keys, simulated seconds a second, unless told otherwise.
+HAND_SPEED = 10.0
+KEYS = "keys: i a car comes in, o the car that came first is wanted out, q ends the run"
+#: What a person has done already: their car was asked for, or is on its way.
+_ASKED = frozenset({State.AT_DESK, State.AWAITING_DOOR, State.DRIVING_OUT, State.GONE})
+
+
+class ByHand:
+    """Turns keys into customers."""
+
+    def __init__(self, street: Street, seed: int, console: Console, descriptor: int | None = None) -> None:
+        self._is_quit = False
+        self._is_closed = False
+        self._street = street
+        self._seed = seed
+        self._console = console
+        self._in = sys.stdin.fileno() if descriptor is None else descriptor
+        self._terminal: list[Any] | None = None
+        self._came = 0
+        self._acts = {"i": self._car_in, "o": self._car_out, "q": self._quit}
+
+    @property
+    def is_over(self) -> bool:
+        """Whether somebody pressed q, or the pipe has ended and all that it asked for is done."""
+        return self._is_quit or (self._is_closed and self._street.is_over)
+
+    def __enter__(self) -> Self:
+        if os.isatty(self._in):
+            self._terminal = termios.tcgetattr(self._in)
+            tty.setcbreak(self._in)
+        self._console.print(KEYS, highlight=False, soft_wrap=True)
+        asyncio.get_running_loop().add_reader(self._in, self._read)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        asyncio.get_running_loop().remove_reader(self._in)
+        if self._terminal is not None:
+            termios.tcsetattr(self._in, termios.TCSADRAIN, self._terminal)
+
+    def _read(self) -> None:
+        keys = os.read(self._in, 1024)
+        if not keys:
+            asyncio.get_running_loop().remove_reader(self._in)
+            self._is_closed = True
+        for key in keys.decode("utf-8", errors="replace").lower():
+            act = self._acts.get(key)
+            if act is not None:
+                act()
+
+    def _car_in(self) -> None:
+        self._came += 1
+        now_us = round(asyncio.get_running_loop().time() * 1_000_000)
+        self._street.add(Stay(now_us, None, random_car(f"by hand {self._came}", self._seed)))
+
+    def _car_out(self) -> None:
+        """The owner of the car that came first, of those not asked for yet, comes back: now, or once it is parked."""
+        wanted = next((one for one in self._street.customers if one.state not in _ASKED and not one.is_leaving), None)
+        if wanted is None:
+            self._console.print("no car is inside that nobody has asked for", highlight=False)
+        else:
+            wanted.leave_now()
+
+    def _quit(self) -> None:
+        self._is_quit = True
