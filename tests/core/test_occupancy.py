@@ -109,6 +109,13 @@ def test_a_hop_into_a_spur_holds_its_mouth_until_it_ends() -> None:
     ]
 
 
+@pytest.mark.parametrize(("track", "index"), [(SPUR, 1), (ALLEY, 2)], ids=["into the spur", "out of it"])
+def test_a_plan_told_anew_in_the_middle_of_a_hop_still_holds_both_its_ends(track: int, index: int) -> None:
+    plan = itinerary(leg(LegAction.TRAVEL, track, index, index, 120))
+    held = [span for span in spans_ms(itinerary_windows(quick_site(), plan, 0)) if span[2] != -1]
+    assert sorted(held) == [("p(1,2)", 100, 120), ("p(192,1)", 100, 120)]
+
+
 def test_a_released_itinerary_holds_nothing() -> None:
     assert itinerary_windows(quick_site(), Itinerary(11, 1, Grade.RELEASED, Stamp(0, 0, 0), ()), 0) == []
 
