@@ -74,7 +74,13 @@ def alley_segments(site: Site, segment: Segment) -> list[Segment]:
 
 
 def standing_segments(site: Site, segment: Segment) -> list[Segment]:
-    """Segments that a carrier standing at ``segment`` occupies, a platform first, then those of its track."""
+    """Segments that a carrier standing at ``segment`` occupies, a platform first, then those of its track.
+
+    Index 0 of a spur is its mouth: whoever turns there is in both.
+    """
+    mouth = turned_in(site, segment)
+    if mouth is not None:
+        return junction_segments(site, mouth, Segment(segment.track, 1))
     on_track = alley_segments(site, segment)
     aboard = _platform_at(site, segment)
     return on_track if aboard is None else [aboard, *on_track]
@@ -91,6 +97,14 @@ def _platform_at(site: Site, position: Segment) -> Segment | None:
 def turn_in_us(site: Site, spur: int) -> int:
     """From standing in the mouth of a spur to standing in it, or back: the turn, then a run over one segment."""
     return ceil_ms(site.carrier_turn_us) + run_duration_us(site.tracks[spur].pitch_mm, site.carrier)
+
+
+def turned_in(site: Site, position: Segment) -> Segment | None:
+    """The mouth in which a machine at ``position`` is turned, which is index 0 of a spur; None for all others."""
+    track = site.tracks.get(position.track)
+    if track is None or track.kind is not TrackKind.SPUR or position.index != 0:
+        return None
+    return track.joins[0]
 
 
 def hop_origin(site: Site, leg: Leg) -> Segment | None:

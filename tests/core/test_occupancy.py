@@ -175,3 +175,7 @@ def test_wherever_the_body_is_during_a_run_its_segments_are_held(
     windows = travel_windows(site, Segment(ALLEY, origin), goal, 0, run_duration_us(distance_mm, axis))
     held = {w.segment.index for w in windows if w.from_us - 1 <= at_s * 1e6 <= w.to_us + 1}
     assert overlapped <= held
+
+
+def test_whoever_is_turned_in_the_mouth_of_a_spur_is_in_both() -> None:
+    assert standing_segments(quick_site(), Segment(SPUR, 0)) == [Segment(ALLEY, 2), Segment(SPUR, 1)]
