@@ -18,6 +18,10 @@ from onboard.kinds.cell.desk import DeskFactory
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
+from onboard.kinds.turning.desk import DeskFactory as OrderDeskFactory
+from onboard.kinds.turning.machine import LatheFactory
+from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
+from onboard.kinds.turning.site import Turning
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +41,11 @@ _SYSTEMS: dict[str, System] = {
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
         ),
         System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: DeskFactory()}, CELL_MESSAGES),
+        System(
+            Turning.system,
+            {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
+            TURNING_MESSAGES,
+        ),
     )
 }
 
