@@ -89,12 +89,18 @@ LAYERS: dict[str, Layer] = {
     "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
     # Its commands are a composition root too: they name the contract of a site's system, and replay runs a controller.
     "onboard.trace.commands": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
+    # The page shows what the trace knows; only its own command line opens files and buses.
+    "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
+    "onboard.web.cli": Layer(
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
+    ),
     "onboard": Layer(
-        (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli"), not_stdlib=frozenset({"random", "threading", "time"})
+        (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+        not_stdlib=frozenset({"random", "threading", "time"}),
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
-        ("onboard", "onboard.trace", *ALL_OF_ONBOARD, "dbc"),
+        ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
         ("numpy", "ortools", "rich"),
         not_stdlib=frozenset({"threading"}),
     ),
