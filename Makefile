@@ -13,7 +13,7 @@ ARGS ?=
 PYTEST_ARGS ?=
 export REQUIRE
 
-.PHONY: help run test coverage lint format models bench docs clean
+.PHONY: help run test coverage lint format models mutants bench docs clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
@@ -40,14 +40,18 @@ format: $(VENV)/.test ## put the sources into ruff's format and mend what ruff c
 models: $(VENV)/.test ## check the Promela models with SPIN, and runs of the controllers against them
 	$(BIN)/python -m pytest tests/models
 
+mutants: $(VENV)/.test ## break the product once for each row of the papers, and see the row's test fail
+	$(BIN)/python -m tests.mutate
+
 bench: $(VENV)/.test ## all figures of bench/, one table each
 	@set -e; for script in bench/[!_]*.py; do \
 		[ -e "$$script" ] || { echo "make bench: no script in bench/" >&2; exit 2; }; \
 		echo "== $$script"; $(BIN)/python "$$script"; \
 	done
 
-docs: $(VENV)/.test ## write docs/network.md anew from the DBC files
+docs: $(VENV)/.test ## write docs/network.md anew from the DBC files, docs/systems.md from docs/systems/
 	$(BIN)/python -m onboard.wire.network_doc
+	$(BIN)/python -m tests.systems_page
 
 clean: ## remove the environment and everything generated
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage htmlcov runs

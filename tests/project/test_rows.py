@@ -1,46 +1,16 @@
-"""Every row of the list of systems has a test that carries its name (docs/decisions.md says what the rows are).
+"""Every row of the papers has a test that carries its name, and a mutation of the product that this test finds.
 
-Rows P01 to P60 are what the paper on the robotized car park states (Pujo, Ounnar, Zanni 2006), in the order of its
-text; P29 was left free. A test for a row is called ``test_pNN_...``, or ``test_pNN_pMM_...`` for two.
+``docs/systems/*.toml`` has a table for each row; ``python -m tests.mutate`` makes the mutations.
 """
 
 import ast
-import re
-from collections.abc import Iterator
-from functools import cache
-from pathlib import Path
 
 import pytest
 
-TESTS = Path(__file__).parents[1]
-#: No such row.
-FREE = {29}
-#: The turning cell (P24 to P27) and the second domain (P59) are sites of their own, and not built yet.
-LATER = {24, 25, 26, 27, 59}
-ROWS = sorted(set(range(1, 61)) - FREE - LATER)
+from tests.project.rows import ROOT, TESTS, all_names, by_row, functions_of, page, read_rows, rows_of
 
-
-def rows_of(name: str) -> list[int]:
-    """The rows that a test's name begins with."""
-    found = re.match(r"test((?:_p\d\d)+)_\w", name)
-    return [int(row) for row in re.findall(r"p(\d\d)", found.group(1))] if found else []
-
-
-def functions_of(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name.startswith("test_"):
-            yield node
-
-
-@cache
-def named() -> dict[int, list[str]]:
-    """Tests by row."""
-    found: dict[int, list[str]] = {}
-    for path in sorted(TESTS.rglob("test_*.py")):
-        for function in functions_of(path):
-            for row in rows_of(function.name):
-                found.setdefault(row, []).append(f"{path.relative_to(TESTS)}::{function.name}")
-    return found
+#: Being built: a row in here may still lack its table. Empty before anything is called done.
+LATER: frozenset[str] = frozenset(name for name in all_names() if name not in read_rows())
 
 
 def asserts(function: ast.AST) -> bool:
@@ -55,15 +25,29 @@ def asserts(function: ast.AST) -> bool:
     return False
 
 
-@pytest.mark.parametrize("row", ROWS, ids=lambda row: f"P{row:02}")
-def test_every_row_has_a_test_of_its_name(row: int) -> None:
-    assert row in named(), f"no test is called test_p{row:02}_..."
+@pytest.mark.parametrize("name", [name for name in all_names() if name not in LATER])
+def test_every_row_is_done_or_says_why_not(name: str) -> None:
+    row = read_rows()[name]
+    if row.not_done is not None:
+        assert row.test is None and row.mutation is None
+        return
+    assert row.check
+    assert row.test in by_row().get(name, []), f"{row.test} is no test named after {name}"
+    assert row.mutation is not None and row.mutation.mistake is None
 
 
-def test_no_test_names_a_row_that_is_not_in_the_list() -> None:
-    known = set(ROWS) | LATER
-    unknown = {test for row, tests in named().items() if row not in known for test in tests}
-    assert not unknown
+def test_no_test_and_no_table_names_a_row_that_is_not_in_the_list() -> None:
+    assert not set(read_rows()) - set(all_names())
+    assert not set(by_row()) - set(all_names())
+
+
+def test_every_p_row_has_a_test_of_its_name() -> None:
+    turning = {"P24", "P25", "P26", "P27", "P59"}
+    assert not [name for name in all_names() if name[0] == "P" and name not in {*by_row(), *turning}]
+
+
+def test_the_page_shows_the_tables() -> None:
+    assert (ROOT / "docs" / "systems.md").read_text(encoding="utf-8") == page(), "run `make docs`"
 
 
 def test_every_test_of_a_row_judges_something() -> None:
@@ -77,6 +61,6 @@ def test_every_test_of_a_row_judges_something() -> None:
 
 
 def test_a_name_may_tell_several_rows_and_only_at_its_beginning() -> None:
-    assert rows_of("test_p10_p47_a_bid_comes") == [10, 47]
-    assert rows_of("test_p08_bids") == [8]
+    assert rows_of("test_p10_m07_a_bid_comes") == ["P10", "M07"]
+    assert rows_of("test_c08_bids") == ["C08"]
     assert rows_of("test_several_p08_bids") == rows_of("test_p8_bids") == rows_of("test_p08") == []
