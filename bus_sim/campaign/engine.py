@@ -46,7 +46,7 @@ def on_dask(address: str, function: Callable[[T], R], items: Sequence[T]) -> Ite
     with client:
         chunks = [list(items[begin : begin + CHUNK]) for begin in range(0, len(items), CHUNK)]
         futures = [client.submit(_play_all, function, chunk, pure=False) for chunk in chunks]
-        for future in as_completed(futures):  # type: ignore[no-untyped-call]  # Dask is not typed
+        for future in as_completed(futures, loop=client.loop):  # type: ignore[no-untyped-call]  # Dask is not typed
             yield from future.result()
 
 

@@ -64,6 +64,11 @@ class Recovery:
         #: When the last fault known so far is over, us of loop time: later with every restart.
         self.healed_us = healed_us(faults)
         self._simulation = simulation
+        self._for_good = {
+            one.target
+            for one in faults
+            if isinstance(one, Injection) and one.kind == "crash" and one.text("restart") == "no"
+        }
         self._starts: dict[int, int] = {}
         self._off: dict[str, int] = {}
         self._ends = {
@@ -83,9 +88,10 @@ class Recovery:
             self._at(self.healed_us, self._look_at_digests)
 
     def mirrors_agree(self) -> bool:
-        """Whether all machines of the site run, none is halted, and all mirrors have one digest."""
+        """Whether all machines run that are not dead for good, none is halted, and all mirrors have one digest."""
         running = self._simulation.controllers.values()
-        if len(running) < len(self._simulation.site.machines) or any(one.holon.halted for one in running):
+        names = {machine.name for machine in self._simulation.site.machines.values()} - self._for_good
+        if names - {one.holon.machine.name for one in running} or any(one.holon.halted for one in running):
             return False
         return len({one.holon.mirror.digest() for one in running}) == 1
 
