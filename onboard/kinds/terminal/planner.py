@@ -21,8 +21,8 @@ from onboard.kinds.terminal.traffic import Owned
 
 #: A violated plan that cannot be bettered is looked at again after this, us. Ours.
 AGAIN_US = 10_000_000
-#: A task that was won and is in no plan yet is spoken of again after this, us. Ours.
-SAY_US = 20_000_000
+#: How far the plan has come, and what was won and is not planned yet, is said again so often, us (dbc/terminal.dbc).
+SAY_US = 5_000_000
 #: Plans are adopted in turns of bus time, one vehicle so long after the other, us: each sees what the one before has
 #: told, so that no two plans are made at once around the same gaps. Ours.
 TURN_US = 50_000
@@ -74,7 +74,7 @@ class Planner:
 
     def next_wake(self) -> int | None:
         """My next turn in which there is something to plan, or when a task is to be spoken of again."""
-        said_us = self._said_at_us if self.queue else None
+        said_us = self._said_at_us if self.queue or self.owned is not None else None
         return min((time for time in (said_us, self._turn_at_us) if time is not None), default=None)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
@@ -95,12 +95,18 @@ class Planner:
         self.generation.has_queue = bool(self.queue)
 
     def speak(self, now_us: int) -> list[Effect]:
-        """Say of a task that waits to be planned that it is not lost."""
-        if not self.queue or (self._said_at_us is not None and self._said_at_us > now_us):
+        """Say again how far the plan has come, and of a task that waits to be planned that it is not lost."""
+        owned = self.owned
+        effects: list[Effect] = []
+        if self._said_at_us is None or self._said_at_us > now_us:
+            self._said_at_us = self._said_at_us or now_us + SAY_US
             return []
         self._said_at_us = now_us + SAY_US
-        job = self.queue[0]
-        return [Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.AWARDED, job.target, Reason.NONE))]
+        if owned is not None and owned.current:
+            effects.append(Send(self.report(owned, owned.current - 1, owned.began)))
+        node = self.fleet.node_id
+        waiting = [TaskReport(node, job.task, TaskPhase.AWARDED, job.target, Reason.NONE) for job in self.queue]
+        return effects + [Send(report) for report in waiting]
 
     def over(self, now_us: int) -> list[Effect]:
         """The plan is over; under a version of its own, so that whoever missed the report asks."""
