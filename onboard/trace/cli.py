@@ -13,6 +13,7 @@ from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, Verdict, check_records
+from onboard.trace.check.systems import checks_for
 from onboard.wire.codec import Codec
 from onboard.wire.dbc_file import read_layouts
 
@@ -64,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         site = load_site(args.site) if args.site is not None else None
         codec = _read_codec(args.dbc) if args.dbc is not None else None
-        verdict = _check(args.log, Checks(site, disturbed=args.faults, fleet=codec))
+        verdict = _check(args.log, checks_for(site, disturbed=args.faults, fleet=codec))
         if args.json is not None:
             _write_json(args.json, verdict)
     except (ConfigError, TraceError) as error:

@@ -7,6 +7,7 @@ on an entity in the order of its list; a new plan says after whom it comes, so a
 
 from collections import deque
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 from onboard.kinds.terminal.plan import Load, Plan, VisitKey
@@ -106,6 +107,7 @@ class Traffic:
                 row.insert(kept[1], visit)
             else:
                 row.insert(self._place(row, visit, plan), visit)
+        self._straighten()
         return True
 
     def withdraw(self, owner: int) -> None:
@@ -125,6 +127,7 @@ class Traffic:
             self._take_out(owner)
         else:
             self._come_in(owner, owned.current)
+            self._straighten()
         return True
 
     def _come_in(self, owner: int, step: int) -> None:
@@ -181,6 +184,42 @@ class Traffic:
         """Whether a stay has begun, by the reports heard."""
         owned = self.plans.get(visit.owner)
         return owned is not None and visit.first <= owned.current <= visit.last
+
+    def _straighten(self) -> None:
+        """Who is ahead on a lane, or passes a crossing for one first, comes first where both go next.
+
+        That is so on the ground, whatever a mirror that lacks a frame believes of the order.
+        """
+        for _ in range(len(self.plans)):
+            moved = [entity for entity in list(self.lists) if self._straighten_behind(entity)]
+            if not moved:
+                return
+
+    def _straighten_behind(self, entity: int) -> bool:
+        place = self.site.entities[entity]
+        if place.kind is not EntityKind.LANE and (place.kind is not EntityKind.CROSSING or place.capacity != 1):
+            return False
+        moved = False
+        for ahead, behind in pairwise(self.lists[entity]):
+            first, second = self._next_visit(ahead), self._next_visit(behind)
+            if first is None or second is None or first[0] != second[0] or self.is_inside(first[1]):
+                continue
+            row = self.lists[first[0]]
+            if row.index(second[1]) < row.index(first[1]) and not self.is_inside(second[1]):
+                row.remove(first[1])
+                row.insert(row.index(second[1]), first[1])
+                moved = True
+        return moved
+
+    def _next_visit(self, visit: Visit) -> tuple[int, Visit] | None:
+        """Where a machine goes from a stay, and its stay there."""
+        steps = self.plans[visit.owner].plan.steps
+        if visit.last + 1 >= len(steps):
+            return None
+        entity = steps[visit.last + 1].entity
+        following = (one for one in self.lists.get(entity, ()) if one.owner == visit.owner)
+        found = next((one for one in following if one.first == visit.last + 1), None)
+        return None if found is None else (entity, found)
 
     # --- dates -------------------------------------------------------------------------------------------------
 
