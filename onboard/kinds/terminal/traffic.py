@@ -103,8 +103,9 @@ class Traffic:
             entity = plan.steps[first].entity
             visit = Visit(plan.owner, first, last)
             row = self.lists.setdefault(entity, [])
-            if number == 0 and kept is not None and kept[0] == entity:
-                row.insert(kept[1], visit)
+            if number == 0:
+                known_place = kept[1] if kept is not None and kept[0] == entity else None
+                row.insert(self._place_in_row(row, plan.steps[0].after, known_place), visit)
             else:
                 row.insert(self._place(row, visit, plan), visit)
         self._straighten()
@@ -175,6 +176,15 @@ class Traffic:
             return inside
         owned_at = [self._told_begin(other) for other in row]
         return max(inside, sum(1 for told in owned_at if told <= begin))
+
+    def _place_in_row(self, row: list[Visit], after: VisitKey, known: int | None) -> int:
+        """Whoever is there already says whom it is behind: that is so on the ground. Nobody: in front."""
+        owners = [visit.owner for visit in row]
+        if not after.owner:
+            return 0
+        if after.owner in owners:
+            return owners.index(after.owner) + 1
+        return known if known is not None else sum(1 for visit in row if self.is_inside(visit))
 
     def _told_begin(self, visit: Visit) -> int:
         plan = self.plans[visit.owner].plan
