@@ -8,6 +8,7 @@ from pathlib import Path
 
 from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
+from bus_sim.certify.command import add_certify, run_certify
 from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
@@ -76,6 +77,7 @@ def build_parser() -> argparse.ArgumentParser:
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     add_compare(commands)
     add_campaign(commands)
+    add_certify(commands)
     return parser
 
 
@@ -243,6 +245,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "dbc": _dbc,
     "compare": run_compare,
     "campaign": run_campaign_command,
+    "certify": run_certify,
 }
 
 

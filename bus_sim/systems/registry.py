@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.faults.injection import AnyFault
+from bus_sim.systems.cell.run import run_cell
 from bus_sim.systems.terminal.show import run_terminal
 from onboard.core.site import Site
 
@@ -34,4 +35,5 @@ Runner = Callable[[Site, SystemOptions], int]
 #: By ``Site.system``.
 RUNNERS: dict[str, Runner] = {
     "terminal": run_terminal,
+    "cell": run_cell,
 }

@@ -14,7 +14,11 @@ from onboard.kinds.car_park.compartment import CompartmentFactory
 from onboard.kinds.car_park.lift import LiftFactory
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.car_park.site import CarPark
-from onboard.kinds.terminal.desk import DeskFactory
+from onboard.kinds.cell.desk import DeskFactory as GoalDeskFactory
+from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
+from onboard.kinds.cell.robot import ArmFactory
+from onboard.kinds.cell.site import Cell
+from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.vehicle import VehicleFactory
@@ -38,11 +42,24 @@ _SYSTEMS: dict[str, System] = {
         ),
         System(
             Terminal.system,
-            {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: DeskFactory()},
+            {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: MissionDeskFactory()},
             TERMINAL_MESSAGES,
         ),
+        System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: GoalDeskFactory()}, CELL_MESSAGES),
     )
 }
+
+
+def add_system(system: System) -> None:
+    """One more system in this process, such as one that is being tried. Raises ``ValueError`` for a name twice."""
+    if system.name in _SYSTEMS:
+        raise ValueError(f"system {system.name}: there is one of this name")
+    _SYSTEMS[system.name] = system
+
+
+def remove_system(name: str) -> None:
+    """Take out what ``add_system`` put in. Raises ``KeyError``."""
+    del _SYSTEMS[name]
 
 
 def system_of(site: Site) -> System:

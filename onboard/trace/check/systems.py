@@ -6,7 +6,7 @@ from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.trace.check.checks import RULES, Checks
 from onboard.trace.check.rule import Rule
 from onboard.trace.check.terminal import TERMINAL_RULES
-from onboard.wire.codec import Codec, codecs
+from onboard.wire.codec import codecs
 
 #: By ``Site.system``; every other system's logs are judged as a car park's.
 SYSTEMS: dict[str, tuple[tuple[type[Rule], ...], tuple[type[Message], ...]]] = {
@@ -14,11 +14,16 @@ SYSTEMS: dict[str, tuple[tuple[type[Rule], ...], tuple[type[Message], ...]]] = {
 }
 
 
-def checks_for(site: Site | None, *, disturbed: bool = False, fleet: Codec | None = None) -> Checks:
-    """The checks of a site's own system; ``fleet`` replaces the built-in contract of the fleet bus."""
+def rules_of(site: Site | None) -> tuple[type[Rule], ...]:
+    """The rules of a site's own system; without a site those of a car park."""
+    known = SYSTEMS.get(site.system) if site is not None else None
+    return RULES if known is None else known[0]
+
+
+def checks_for(site: Site | None, *, disturbed: bool = False) -> Checks:
+    """The checks of a site's own system, with its contracts."""
     known = SYSTEMS.get(site.system) if site is not None else None
     if site is None or known is None:
-        return Checks(site, disturbed=disturbed, fleet=fleet, rules=RULES)
-    rules, messages = known
-    both = codecs(site.system, messages)
-    return Checks(site, disturbed=disturbed, fleet=fleet or both.fleet, device=both.device, rules=rules)
+        return Checks(site, disturbed=disturbed)
+    both = codecs(site.system, known[1])
+    return Checks(site, disturbed=disturbed, fleet=both.fleet, device=both.device, rules=known[0])
