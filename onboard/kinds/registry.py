@@ -59,6 +59,18 @@ _SYSTEMS: dict[str, System] = {
 }
 
 
+def add_system(system: System) -> None:
+    """One more system in this process, such as one that is being tried. Raises ``ValueError`` for a name twice."""
+    if system.name in _SYSTEMS:
+        raise ValueError(f"system {system.name}: there is one of this name")
+    _SYSTEMS[system.name] = system
+
+
+def remove_system(name: str) -> None:
+    """Take out what ``add_system`` put in. Raises ``KeyError``."""
+    del _SYSTEMS[name]
+
+
 def system_of(site: Site) -> System:
     """The system of a site. Raises ``KeyError`` for one that this image does not know."""
     return _SYSTEMS[site.system]

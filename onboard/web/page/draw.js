@@ -154,7 +154,7 @@ export class Stage {
     } else {
       return;
     }
-    if (car && cell > 17 && !bay) this.text(pen, car, box, css("--card"));
+    if (car && cell > 17 && !bay) this.text(pen, car.split(".")[1], box, css("--card"));
     this.hits.push({ ...box, what: bay ? "machine" : "place", id: bay ? bay.node : number, car });
   }
 
@@ -176,7 +176,7 @@ export class Stage {
       pen.arc(box.x + box.w + 4, outside, 3, 0, 7);
       pen.fill();
     }
-    if (this.cell > 17) this.text(pen, car || "I/O", box, car ? css("--card") : css("--bay"));
+    if (this.cell > 17) this.text(pen, car ? car.split(".")[1] : "I/O", box, car ? css("--card") : css("--bay"));
   }
 
   drawDoor(pen, box, y, state) {
