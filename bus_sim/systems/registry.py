@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.faults.injection import AnyFault
+from bus_sim.systems.cell.run import run_cell
 from onboard.core.site import Site
 
 
@@ -31,4 +32,6 @@ class SystemOptions:
 Runner = Callable[[Site, SystemOptions], int]
 
 #: By ``Site.system``.
-RUNNERS: dict[str, Runner] = {}
+RUNNERS: dict[str, Runner] = {
+    "cell": run_cell,
+}

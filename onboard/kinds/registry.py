@@ -14,6 +14,10 @@ from onboard.kinds.car_park.compartment import CompartmentFactory
 from onboard.kinds.car_park.lift import LiftFactory
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.car_park.site import CarPark
+from onboard.kinds.cell.desk import DeskFactory
+from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
+from onboard.kinds.cell.robot import ArmFactory
+from onboard.kinds.cell.site import Cell
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +36,7 @@ _SYSTEMS: dict[str, System] = {
             CarPark.system,
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
         ),
+        System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: DeskFactory()}, CELL_MESSAGES),
     )
 }
 
