@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bus_sim.faults.injection import AnyFault
 from bus_sim.systems.cell.run import run_cell
+from bus_sim.systems.graph.run import run_graph
 from onboard.core.site import Site
 
 
@@ -34,4 +35,5 @@ Runner = Callable[[Site, SystemOptions], int]
 #: By ``Site.system``.
 RUNNERS: dict[str, Runner] = {
     "cell": run_cell,
+    "graph": run_graph,
 }

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from onboard.config.cell import read_cell
+from onboard.config.graph import read_graph
 from onboard.config.reader import Table
 from onboard.core.site import Site
 
@@ -22,4 +23,5 @@ class Common(NamedTuple):
 #: By the word after ``system =`` in the table ``[site]``.
 READERS: dict[str, Callable[[Table, Common], Site]] = {
     "cell": read_cell,
+    "graph": read_graph,
 }

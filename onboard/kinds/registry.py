@@ -18,6 +18,11 @@ from onboard.kinds.cell.desk import DeskFactory
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
+from onboard.kinds.graph.agents import HostFactory
+from onboard.kinds.graph.desk import DeskFactory as OrderDeskFactory
+from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
+from onboard.kinds.graph.robot import RobotFactory as GraphRobotFactory
+from onboard.kinds.graph.site import FactoryGraph
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +42,15 @@ _SYSTEMS: dict[str, System] = {
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
         ),
         System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: DeskFactory()}, CELL_MESSAGES),
+        System(
+            FactoryGraph.system,
+            {
+                KindCode.VEHICLE: GraphRobotFactory(),
+                KindCode.NODE: HostFactory(),
+                KindCode.DESK: OrderDeskFactory(),
+            },
+            GRAPH_MESSAGES,
+        ),
     )
 }
 

@@ -24,7 +24,7 @@ from onboard.kinds.graph.messages import (
     TurnSignal,
 )
 from onboard.kinds.graph.network import NOWHERE, Edge, edge
-from onboard.kinds.graph.rights import edge_token, ends_of, keeper, slot_token
+from onboard.kinds.graph.rights import edge_token, keeper, slot_token
 from onboard.kinds.graph.rules import Heading, Rules, are_head_on, kept_edge, may_enter, other_edges
 from onboard.kinds.graph.site import FactoryGraph
 
@@ -75,7 +75,7 @@ class _Waiting:
 
 @dataclass
 class NodeAgents:
-    """All agents of one host. ``waiting`` are robots before any node; ``promised`` edges and slots to whom until when."""
+    """All agents of one host. ``waiting`` are robots before any node; ``promised`` says what to whom until when."""
 
     fleet: Fleet
     site: FactoryGraph
@@ -86,7 +86,7 @@ class NodeAgents:
     kept_by_other: set[tuple[int, int]] = field(default_factory=set)
     _kept: dict[int, int | None] = field(default_factory=dict)
     _events: int = 0
-    _told_free: set[Edge] = field(default_factory=set)
+    _seen_taken: set[Edge] = field(default_factory=set)
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
@@ -210,9 +210,7 @@ class NodeAgents:
         """Free, and not kept by the agent at its other end (rows G17, G18, G21)."""
         return may_enter(self.site.graph, taken, node, after, Rules.PAPER) and (node, after) not in self.kept_by_other
 
-    def _promise(
-        self, robot: int, node: int, after: int, slot: int, verdict: NodeVerdict, now_us: int
-    ) -> list[Effect]:
+    def _promise(self, robot: int, node: int, after: int, slot: int, verdict: NodeVerdict, now_us: int) -> list[Effect]:
         """Reserve, tell the robot, and tell the agent at the other end (row G20)."""
         self.waiting[robot].told = verdict
         until_us = now_us + PROMISE_US
@@ -280,17 +278,18 @@ class NodeAgents:
 
     def _keep(self) -> list[Effect]:
         """Keep the last free edge of each node of mine, or let it go; the agent at its other end is told (G21, G22)."""
-        effects: list[Effect] = []
         tokens, me = self.fleet.tokens, self.fleet.node_id
         taken = {
             ends
             for ends in self.site.graph.lengths_mm
             if tokens.holder_of(edge_token(*ends)) not in (keeper(self.site, edge_token(*ends)), NOBODY)
         }
-        for ends in sorted(self._told_free ^ taken):
-            if keeper(self.site, edge_token(*ends)) == me and ends not in taken:
-                effects.append(Send(EdgeNotice(me, *ends, EdgeState.FREE, 0)))
-        self._told_free = taken
+        effects: list[Effect] = [
+            Send(EdgeNotice(me, *ends, EdgeState.FREE, 0))
+            for ends in sorted(self._seen_taken - taken)
+            if keeper(self.site, edge_token(*ends)) == me
+        ]
+        self._seen_taken = taken
         if self.site.rules is not Rules.KEEP:
             return effects
         for node in self.site.graph.nodes:
@@ -304,18 +303,12 @@ class NodeAgents:
                     for other, state in ((before, EdgeState.FREE), (kept, EdgeState.KEPT))
                     if other is not None
                 ]
-                effects += self._note_own(node, before, kept)
+                self._note_own(node, before, kept)
         return effects
 
-    def _note_own(self, node: int, before: int | None, kept: int | None) -> list[Effect]:
+    def _note_own(self, node: int, before: int | None, kept: int | None) -> None:
         """Agents of one host tell each other without the bus."""
         if before is not None:
             self.kept_by_other.discard((before, node))
         if kept is not None:
             self.kept_by_other.add((kept, node))
-        return []
-
-
-def edge_of(key: TokenKey) -> Edge | None:
-    """The edge of a token, None for a slot's."""
-    return ends_of(key)

@@ -1,13 +1,13 @@
 """Which token authorises what on a graph, and who keeps it while nobody needs it.
 
-An edge's token is that of segment (lower end, higher end); a slot's that of station (node, slot). Both are with the host
-of the (lower) node's agent at first, but for the slots in which robots stand.
+An edge's token is that of segment (lower end, higher end); a slot's that of station (node, slot). Both are with the
+host of the (lower) node's agent at first, but for the slots in which robots stand.
 """
 
 from onboard.core.authority import TokenKey, segment_token, station_token
-from onboard.core.codes import Side, TokenKind
+from onboard.core.codes import Side
 from onboard.core.site import Segment, Station
-from onboard.kinds.graph.network import Edge, edge
+from onboard.kinds.graph.network import edge
 from onboard.kinds.graph.site import FactoryGraph
 
 
@@ -24,11 +24,6 @@ def edge_token(one: int, other: int) -> TokenKey:
 def slot_token(node: int, slot: int) -> TokenKey:
     """Who holds it may stand in the slot; slots count from 1."""
     return station_token(Station(node, slot, Side.NEAR))
-
-
-def ends_of(key: TokenKey) -> Edge | None:
-    """The edge of a token, or None where it is none of an edge."""
-    return (key.number >> 8, key.number & 0xFF) if key.kind is TokenKind.SEGMENT else None
 
 
 def keeper(site: FactoryGraph, key: TokenKey) -> int:
