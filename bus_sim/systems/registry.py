@@ -7,6 +7,7 @@ from pathlib import Path
 from bus_sim.faults.injection import AnyFault
 from bus_sim.systems.cell.run import run_cell
 from bus_sim.systems.graph.run import run_graph
+from bus_sim.systems.terminal.show import run_terminal
 from onboard.core.site import Site
 
 
@@ -34,6 +35,7 @@ Runner = Callable[[Site, SystemOptions], int]
 
 #: By ``Site.system``.
 RUNNERS: dict[str, Runner] = {
+    "terminal": run_terminal,
     "cell": run_cell,
     "graph": run_graph,
 }

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from onboard.config.cell import read_cell
 from onboard.config.graph import read_graph
 from onboard.config.reader import Table
+from onboard.config.terminal import read_terminal
 from onboard.core.site import Site
 
 
@@ -22,6 +23,7 @@ class Common(NamedTuple):
 
 #: By the word after ``system =`` in the table ``[site]``.
 READERS: dict[str, Callable[[Table, Common], Site]] = {
+    "terminal": read_terminal,
     "cell": read_cell,
     "graph": read_graph,
 }

@@ -148,6 +148,7 @@ class Reason(IntEnum):
     BEATEN = 28
     IMPOSSIBLE = 29
     PERSON_INSIDE = 30
+    NODE_SILENT = 31
 
 
 class OperatorAction(IntEnum):

@@ -34,6 +34,7 @@ from onboard.core.messages import (
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
+from onboard.core.presence import Presence
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Machine, Segment, Site
 
@@ -76,6 +77,7 @@ class Holon:
         self.tokens.genesis_counts = self._has_past
         self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
+        self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
             machine.node_id,
@@ -137,8 +139,11 @@ class Holon:
         if message.sender == self.node_id:
             self.drops[Reason.DUPLICATE_NODE_ID] += 1
             return self._halt("another node sends under this node-ID")
+        self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects = handler(message, now_us) if handler is not None else []
+        if isinstance(message, Itinerary | Heartbeat):
+            self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
         return self._settle(effects, now_us)
 
@@ -384,6 +389,7 @@ class Holon:
         effects: list[Effect] = []
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+            self.presence.review(now_us)
             effects.append(Send(self._heartbeat()))
             effects += self._diagnostics()
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:

@@ -5,10 +5,11 @@ A wrong mirror costs time, never safety: what moves is guarded by tokens.
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import ANY_STATION, OUTSIDE, Grade, KindCode, MachineState
+from onboard.core.codes import ANY_STATION, MOBILE_KINDS, OUTSIDE, Grade, KindCode, MachineState, Reason
 from onboard.core.lift_uses import standing_after
 from onboard.core.lifts import lift_tracks
 from onboard.core.messages import CarAt, Heartbeat, Itinerary, Progress, Reference
+from onboard.core.obstacles import Obstacles
 from onboard.core.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.core.passing import Plan, next_plan
 from onboard.core.passing_order import PassingOrder
@@ -75,10 +76,12 @@ class Mirror:
     boots_before: dict[int, int] = field(default_factory=dict)
     reservations: Reservations = field(default_factory=Reservations)
     order: PassingOrder = field(init=False)
+    obstacles: Obstacles = field(init=False)
     _digest: int | None = None
 
     def __post_init__(self) -> None:
         self.order = PassingOrder(self.site)
+        self.obstacles = Obstacles(self.site, lambda: self.reservations)
 
     def on_heartbeat(self, beat: Heartbeat, now_us: int) -> bool:
         """Note a sign of life; True where the sender is new or was restarted, so that its statements are wanted."""
@@ -102,23 +105,35 @@ class Mirror:
         if known is not None and not is_newer(itinerary.version, known.version, 8):
             return False
         self.itineraries[itinerary.sender] = itinerary
-        plan = self._take_up(itinerary, now_us)
+        plans = self.plans
+        if known is not None and itinerary.sender in plans:
+            self.replaced[itinerary.sender] = plans[itinerary.sender]
+        plans[itinerary.sender] = next_plan(plans.get(itinerary.sender), itinerary, now_us)
+        if itinerary.sender not in self.obstacles.machines:
+            self._count_on(plans[itinerary.sender], now_us)
+        self._digest = None
+        return True
+
+    def _count_on(self, plan: Plan, now_us: int) -> None:
+        """Plan around a machine's plan, and keep its place in the order of passing."""
+        itinerary = plan.itinerary
+        self.order.on_plan(plan, now_us)
         self.reservations.release(itinerary.sender)
         self.reservations.reserve(
             itinerary.sender,
             itinerary_windows(self.site, itinerary, now_us, plan.first_begin_us),
             lift_uses(self.site, itinerary, now_us, plan.first_begin_us),
         )
-        self._digest = None
-        return True
 
-    def _take_up(self, itinerary: Itinerary, now_us: int) -> Plan:
-        known = self.plans.get(itinerary.sender)
-        if known is not None:
-            self.replaced[itinerary.sender] = known
-        plan = self.plans[itinerary.sender] = next_plan(known, itinerary, now_us)
-        self.order.on_plan(plan, now_us)
-        return plan
+    def set_aside(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> None:
+        """A machine does not follow its plan: it is an obstacle at ``slots`` and passes nothing."""
+        if self.obstacles.take_up(node, slots, reason, now_us):
+            self.order.drop(node)
+
+    def admit(self, node: int, now_us: int) -> None:
+        """A machine that was an obstacle takes part: its plan counts, if it has told one."""
+        if self.obstacles.let_go(node) and node in self.plans:
+            self._count_on(self.plans[node], now_us)
 
     def on_progress(self, progress: Progress) -> None:
         """Last known position of a machine, my own included."""
@@ -150,12 +165,16 @@ class Mirror:
             del self.cars[car]
 
     def others_standing(self) -> list[Segment]:
-        """Where the plans of all other machines end: there they will stand until they plan anew."""
+        """Where the plans of all other machines end: there they stand until they plan anew; obstacles stand now."""
         found = [
             final_position(self.site, itinerary)
             for node, itinerary in sorted(self.itineraries.items())
-            if node != self.node_id
+            if node != self.node_id and node not in self.obstacles.machines
         ]
+        for node in sorted(self.obstacles.machines):
+            seen, machine = self.progress.get(node), self.site.machines[node]
+            if machine.kind in MOBILE_KINDS:
+                found.append(machine.home if seen is None else Segment(seen.track, seen.index))
         return [position for position in found if position is not None]
 
     def lift_floors(self, now_us: int, at_us: int) -> dict[int, int]:

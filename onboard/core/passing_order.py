@@ -94,6 +94,12 @@ class PassingOrder:
             if other != node:
                 self._agree(node, other, keep=continued)
 
+    def drop(self, node: int) -> None:
+        """A machine is an obstacle: it passes nothing until it tells a plan, so nobody comes behind it."""
+        self._ways.pop(node, None)
+        for pair in [pair for pair in self._agreed if node in pair]:
+            del self._agreed[pair]
+
     def on_progress(self, progress: Progress) -> None:
         """Where a machine's body is; of another version than its plan's it tells nothing."""
         way = self._ways.get(progress.sender)

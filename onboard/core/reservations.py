@@ -49,6 +49,11 @@ class Reservations:
         self._windows: dict[Segment, list[tuple[int, int, int]]] = {}
         self._segments: dict[int, set[Segment]] = {}
         self._uses: dict[int, list[Use]] = {}
+        self._fixed: set[int] = set()
+
+    def fix(self, owner: int) -> None:
+        """``owner`` is an obstacle, which never gives way, until it is released."""
+        self._fixed.add(owner)
 
     def reserve(self, owner: int, windows: Iterable[Window], uses: Iterable[Use] = ()) -> None:
         """Add windows and lift uses of ``owner`` (a node-ID). Raises ``ValueError`` where one has no length."""
@@ -65,6 +70,7 @@ class Reservations:
 
     def release(self, owner: int) -> None:
         """Remove all windows and uses of ``owner``."""
+        self._fixed.discard(owner)
         for lift_track, uses in self._uses.items():
             self._uses[lift_track] = [use for use in uses if use.owner != owner]
         for segment in self._segments.pop(owner, ()):
@@ -93,8 +99,12 @@ class Reservations:
         found = Reservations()
         found._uses = {lift_track: list(uses) for lift_track, uses in self._uses.items()}
         found._segments = {owner: set(segments) for owner, segments in self._segments.items()}
+        found._fixed = set(self._fixed)
         for segment, windows in self._windows.items():
-            kept = [(start, min(end, after_us) if end >= FOREVER else end, owner) for start, end, owner in windows]
+            kept = [
+                (start, min(end, after_us) if end >= FOREVER and owner not in self._fixed else end, owner)
+                for start, end, owner in windows
+            ]
             found._windows[segment] = [window for window in kept if window[0] < window[1]]
         return found
 
@@ -129,6 +139,13 @@ class Reservations:
             for start_us, end_us, holder in self._windows.get(window.segment, ())
             if holder != owner and start_us < window.to_us and window.from_us < end_us
         ]
+
+    def hinders(self, owner: int, windows: Iterable[Window], now_us: int) -> bool:
+        """Whether one of ``windows`` of ``owner`` that is not over at ``now_us`` meets an obstacle."""
+        if not self._fixed - {owner}:
+            return False
+        ahead = [window for window in windows if window.to_us > now_us]
+        return any(holder in self._fixed for _, holder in self.conflicts(owner, ahead))
 
     def first_start(self, owner: int, segment: Segment, now_us: int) -> int | None:
         """Start of ``owner``'s first window on a segment that is not over at ``now_us``, or None."""

@@ -23,6 +23,7 @@ _INITIATOR_STEPS = {
     InitiatorEvent.REPEAT: "award_again()",
     InitiatorEvent.HEARD: "heard_acting()",
     InitiatorEvent.FORFEIT: "given_back()",
+    InitiatorEvent.ABANDON: "abandon()",
 }
 _WAITING = (State.WAITING_BOUND, State.WAITING_COST, State.ASKING)
 Call = tuple[int, int]

@@ -175,7 +175,7 @@ def test_p12_nobody_can_so_the_call_is_opened_again_then_refused_and_the_custome
         simulation.plant.shuttles[11].fault = ""
         holon = simulation.controllers[11].holon
         fail = getattr(holon.behaviour, "_fail")  # noqa: B009  # a failed actuator, as its sensor would tell it
-        simulation.loop.call_at(9.0, fail, Reason.ACTUATOR_FAULT)
+        simulation.loop.call_at(9.0, fail, Reason.ACTUATOR_FAULT, 9_000_000)
 
     scene = play(one_floor(), stays((0, None)), before=stop_the_robot)
     calls = [call for _, call in scene.all(CallForProposals)]

@@ -126,6 +126,14 @@ class Awarded:
 
 
 @dataclass(frozen=True, slots=True)
+class AwardedAgain:
+    """The award of a call that this machine has won is said again: its initiator has not heard it act."""
+
+    call_key: CallKey
+    call: CallForProposals
+
+
+@dataclass(frozen=True, slots=True)
 class Closed:
     """An own call is over: ``winner`` (0 for nobody), and after how many ``attempts``."""
 
@@ -136,5 +144,5 @@ class Closed:
     attempts: int
 
 
-NegotiationEvent = PreAssigned | Released | Awarded | Closed
-EVENT_TYPES = (PreAssigned, Released, Awarded, Closed)
+NegotiationEvent = PreAssigned | Released | Awarded | AwardedAgain | Closed
+EVENT_TYPES = (PreAssigned, Released, Awarded, AwardedAgain, Closed)

@@ -53,6 +53,7 @@ class Event(Enum):
     CONFIRM = "what the option hangs on was awarded"
     EXPIRE = "the option has ended undecided"
     FORFEIT = "the winner was heard giving the task back"
+    ABANDON = "the winner is lost, and the custodian of the object awards anew"
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +185,11 @@ class Initiator:
         """Close the call for nobody while it is open or an option; an award under way is not taken back."""
         return self._fire(Event.WITHDRAW, now_us)
 
+    def abandon(self, reason: Reason, now_us: int) -> Outcome:
+        """The winner was never heard and will not have the object: its custodian calls anew, under a raised version."""
+        self._lost_reason = reason
+        return self._fire(Event.ABANDON, now_us)
+
     def wake(self, now_us: int) -> Outcome:
         """Let the deadline pass, or say the award again."""
         if self.due_us is None or self.due_us > now_us:
@@ -269,7 +275,7 @@ class Initiator:
         return self._closed(NOBODY, CallResult.WITHDRAWN, Reason.LATE)
 
     def reject(self, now_us: int) -> Outcome:
-        """The winner gave the task back before it was heard taking it on."""
+        """The winner gave the task back, or was lost, before it was heard taking it on."""
         closing = self._closing(NOBODY, CallResult.REJECTED, self._lost_reason)
         return [Send(closing), *self._closed(NOBODY, CallResult.REJECTED, self._lost_reason)]
 
@@ -300,5 +306,6 @@ TABLE: dict[tuple[State, Event], tuple[State, Callable[[Initiator, int], Outcome
     (State.HELD, Event.EXPIRE): (State.CLOSED, Initiator.expire),
     (State.AWARDING, Event.REPEAT): (State.AWARDING, Initiator.award),
     (State.AWARDING, Event.FORFEIT): (State.CLOSED, Initiator.reject),
+    (State.AWARDING, Event.ABANDON): (State.CLOSED, Initiator.reject),
     (State.AWARDING, Event.HEARD): (State.CLOSED, Initiator.end),
 }

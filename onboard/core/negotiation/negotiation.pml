@@ -183,6 +183,12 @@ inline given_back() {
     atomic { stage == AWARDING && state[winner] == ASSIGNED; stage = CLOSED }
 }
 
+/* The winner is lost, or not heard: the custodian of the object closes the call and opens another under a raised version.
+ * That the old winner cannot have the object is the tokens' part (token.pml). */
+inline abandon() {
+    atomic { stage == AWARDING; stage = CLOSED }
+}
+
 /* A newer call for the same task, which comes after the end of this one. */
 inline superseded(i) {
     atomic { stage == CLOSED && state[i] != ASSIGNED; state[i] = LOST }

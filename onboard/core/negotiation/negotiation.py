@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field, replace
 
-from onboard.core.codes import KindCode
+from onboard.core.codes import KindCode, Reason
 from onboard.core.effects import Effect
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
+from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, Reference, TaskReport
 from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import Awarded, CallKey, CallTerms, Estimator, NegotiationEvent, PreAssigned
@@ -63,6 +63,15 @@ class Negotiation:
         for initiator in self.initiators:
             if initiator.terms == terms:
                 outcome += initiator.withdraw(now_us)
+        self._forget(now_us)
+        return outcome
+
+    def abandon(self, task: Reference, reason: Reason, now_us: int) -> Outcome:
+        """Give up own awards for a whole ``task`` whose winner was not heard; see ``Initiator.abandon``."""
+        outcome: Outcome = []
+        for initiator in self.initiators:
+            if initiator.terms.task == task and not initiator.terms.depth:
+                outcome += initiator.abandon(reason, now_us)
         self._forget(now_us)
         return outcome
 

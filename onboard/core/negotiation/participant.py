@@ -29,6 +29,7 @@ from onboard.core.negotiation.bidding import (
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import (
     Awarded,
+    AwardedAgain,
     CallKey,
     Estimator,
     Needs,
@@ -300,6 +301,10 @@ class Participant:
         confirmed, outcome = self.subs.confirm(self.proposal.parts, now_us)
         return [Awarded(self.key, self.call, self.proposal, self.award, confirmed), *outcome]
 
+    def answer(self, now_us: int) -> Outcome:
+        """The award is said again: my words were not heard. The machine tells what became of the task."""
+        return [AwardedAgain(self.key, self.call)]
+
     def hold_again(self, now_us: int) -> Outcome:
         """I took myself for beaten, and the initiator holds my bid: reserve anew."""
         assert self.proposal is not None
@@ -429,6 +434,7 @@ TABLE: dict[tuple[State, Event], tuple[State, Callable[[Participant, int], Outco
     (State.OPTION, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
     (State.OPTION, Event.AWARD_OTHER): (State.LOST, Participant.release_closed),
     (State.OPTION, Event.SUPERSEDED): (State.LOST, Participant.release_void),
+    (State.ASSIGNED, Event.AWARD_ME): (State.ASSIGNED, Participant.answer),
     (State.LAPSED, Event.AWARD_ME): (State.ASSIGNED, Participant.assign),
     (State.LAPSED, Event.AWARD_OTHER): (State.LOST, Participant.rest),
     (State.LAPSED, Event.SUPERSEDED): (State.LOST, Participant.rest),

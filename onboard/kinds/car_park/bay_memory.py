@@ -23,9 +23,10 @@ def car_record(statement: CarAt) -> Record:
     return Record(entry)
 
 
-def winner_record(car: Reference, winner: int) -> Record:
-    """Who may fetch a car."""
-    return Record({"record": "winner", "car_origin": car.origin, "car": car.number, "winner": winner})
+def winner_record(car: Reference, winner: int, task: Reference, version: int) -> Record:
+    """Who may fetch a car, for which task and under which version of it; 0 for nobody any more."""
+    entry: dict[str, str | int] = {"record": "winner", "car_origin": car.origin, "car": car.number, "winner": winner}
+    return Record(entry | {"task_origin": task.origin, "task": task.number, "version": version})
 
 
 def ticket_record(car: Reference) -> Record:
@@ -53,6 +54,8 @@ class BayMemory:
     bay: TokenKey | None = None
     cars: dict[Reference, CarAt] = field(default_factory=dict)
     winners: dict[Reference, int] = field(default_factory=dict)
+    #: For which task, and under which version of it, somebody may fetch a car, or might.
+    tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     tickets: deque[Reference] = field(default_factory=deque)
     #: Task, operation, car and wheelbase of the task in hand, or None.
     job: tuple[Reference, Operation, Reference, int] | None = None
@@ -72,7 +75,7 @@ class BayMemory:
                 self.cars[_car(entry)] = CarAt(self.node_id, _car(entry), *numbers)
                 self.winners.pop(_car(entry), None)
             case "winner":
-                self.winners[_car(entry)] = int(entry["winner"])
+                self._take_winner(entry)
             case "ticket":
                 self.tickets.append(_car(entry))
             case "job":
@@ -85,6 +88,16 @@ class BayMemory:
                 self.job = None
             case "token_given" if self.bay == (int(entry["kind"]), int(entry["number"])):
                 self.was_granted = True
+
+    def _take_winner(self, entry: Entry) -> None:
+        car, winner = _car(entry), int(entry["winner"])
+        if winner:
+            self.winners[car] = winner
+        else:
+            self.winners.pop(car, None)
+        if "version" in entry:
+            task = Reference(int(entry["task_origin"]), int(entry["task"]))
+            self.tasks[car] = task, int(entry["version"])
 
 
 def _car(entry: Entry) -> Reference:

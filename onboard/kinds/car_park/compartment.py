@@ -7,7 +7,6 @@ the input door is locked and the robot stands before it (docs/decisions.md, flag
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 
 from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
@@ -15,7 +14,6 @@ from onboard.core.codes import (
     ANY_STATION,
     OUTSIDE,
     CallResult,
-    Criterion,
     DeskInput,
     DeskText,
     DoorAction,
@@ -25,7 +23,6 @@ from onboard.core.codes import (
     LightColour,
     MachineState,
     Operation,
-    OperatorAction,
     Reason,
     TaskPhase,
     TokenKind,
@@ -43,9 +40,10 @@ from onboard.core.messages import (
     OperatorOrder,
     Reference,
     TaskReport,
+    TokenRequest,
 )
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Awarded, CallTerms, Closed, Estimator, NegotiationEvent
+from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site, Station
 from onboard.kinds.car_park.bay_generation import BayGeneration
@@ -55,43 +53,10 @@ from onboard.kinds.car_park.bay_memory import (
     job_over_record,
     job_record,
     ticket_record,
-    winner_record,
 )
+from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
 from onboard.kinds.car_park.site import car_park
 from onboard.kinds.car_park.stewardship import Stewardship
-
-#: A call that nobody could serve is made again after this, us. Ours.
-RETRY_US = 30_000_000
-#: After a restart the machines say again what they have in hand; a task that nobody names is called anew so much later.
-#: Ours.
-SETTLING_US = 2_000_000
-
-
-class BayPhase(Enum):
-    """What the compartment is doing."""
-
-    STARTING = "starting"
-    FREE = "free"
-    LOCKING = "locking"
-    AWAITING = "awaiting"
-    OPENING = "opening"
-    SERVING = "serving"
-    CLOSING = "closing"
-    HANDOVER = "handover"
-    RESERVING = "reserving"
-
-
-@dataclass
-class BayTask:
-    """The one task that uses the bay now."""
-
-    task: Reference
-    operation: Operation
-    car: Reference
-    wheelbase_mm: int
-    winner: int = 0
-    was_granted: bool = False
-    retry_at_us: int | None = None
 
 
 class CompartmentFactory:
@@ -188,43 +153,82 @@ class Compartment:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
         if isinstance(message, OperatorOrder) and message.compartment == self.fleet.node_id:
-            return self._at_desk(_DESK_INPUT[message.action], message.car, now_us)
-        if isinstance(message, TaskReport) and message.phase is TaskPhase.AWARDED and self._waits_for(message.task):
-            # I was restarted and asked all: its winner says that the task is in hand.
-            return self._won_by(message.sender)
+            return self._at_desk(DESK_INPUT[message.action], message.car, now_us)
+        if isinstance(message, TaskReport):
+            return self._on_report(message, now_us)
+        if isinstance(message, TokenRequest) and self.job is not None:
+            wanted = TokenKey(message.token_kind, message.token)
+            return self._remind(self.job, message.sender) if wanted == car_token(*self.job.car) else []
         return self.stewardship.hear(message)
 
-    def _waits_for(self, task: Reference) -> bool:
-        """Whether the task in hand has no known winner, and no call for it is open."""
-        return (
-            self.job is not None and self.job.task == task and not self.job.winner and self.job.retry_at_us is not None
-        )
+    def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
+        """What its winner, or who has won it once, says of a task of mine; or the custodian of its car."""
+        job, machine = self.job, self.fleet.site.machines.get(report.sender)
+        if job is not None and report.task == job.task and report.phase is TaskPhase.FORFEITED:
+            return self._on_forfeit(job, report.sender, now_us)
+        if machine is None or machine.kind is not KindCode.ROBOT or self.phase is BayPhase.STARTING:
+            return []
+        if job is None or report.task != job.task:
+            return withdrawal(self.fleet.node_id, report)
+        if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None:
+            # I was restarted and asked all: its winner says that the task is in hand.
+            return self._won_by(report.sender, job.call)
+        return self._remind(job, report.sender)
+
+    def _on_forfeit(self, job: BayTask, sender: int, now_us: int) -> list[Effect]:
+        """The winner gives the task back, or the custodian of the car has taken the right to it back."""
+        record = self.fleet.mirror.cars.get(job.car)
+        if job.winner and sender == job.winner:
+            return self._call_again(job, now_us)
+        if not job.winner or record is None or sender != record.custodian:
+            return []
+        heard = job.winner not in self.fleet.mirror.obstacles.machines
+        if heard and job.version != 1 and job.reminders < REMINDERS:
+            # It has not heard of the newest award yet.
+            job.reminders += 1
+            return [Send(job.award(self.fleet.node_id))]
+        return self._call_again(job, now_us)
+
+    def _remind(self, job: BayTask, node: int) -> list[Effect]:
+        """Who was lost and comes back believing that the task is its own still hears whose it is."""
+        is_clear = job.winner in (0, node) or not job.call or job.version == 1
+        return [] if is_clear else [Send(job.award(self.fleet.node_id))]
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
         if isinstance(event, Awarded):
             steps = Report("program: " + "; ".join(event.proposal.program))
-            accepted = TaskReport(
-                self.fleet.node_id, event.call.task, TaskPhase.AWARDED, self.station.number, Reason.NONE
-            )
-            return [steps, Send(accepted), *self._take_ticket(event.call.car)]
+            return [steps, self._accepts(event.call.task), *self._take_ticket(event.call.car)]
+        if isinstance(event, AwardedAgain):
+            return [self._accepts(event.call.task)]
         if not isinstance(event, Closed) or self.job is None or event.call.task != self.job.task:
             return []
         if event.result is CallResult.AWARDED:
-            return self._won_by(event.winner)
+            return self._won_by(event.winner, event.call.call)
         if event.result is CallResult.REJECTED:
             # The winner gave the task back before it began: it is called anew, by the custodian of the car.
             return self._call_again(self.job, now_us)
         return self._refused(self.job, event.reason, now_us)
 
-    def _won_by(self, winner: int) -> list[Effect]:
-        assert self.job is not None
-        self.job.winner = winner
-        self.job.retry_at_us = None
-        self.stewardship.winners[self.job.car] = winner
-        return [winner_record(self.job.car, winner)]
+    def _accepts(self, task: Reference) -> Effect:
+        return Send(TaskReport(self.fleet.node_id, task, TaskPhase.AWARDED, self.station.number, Reason.NONE))
+
+    def _won_by(self, winner: int, call: int) -> list[Effect]:
+        job = self.job
+        assert job is not None
+        job.winner, job.call, job.retry_at_us, job.reminders = winner, call, None, 0
+        return self.stewardship.won(job.car, winner, job.task, job.version)
 
     def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
+        """Its winner gave the task back, or is lost: it is called anew under a raised version."""
+        outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
+        effects: list[Effect] = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
+        job.winner, self._robot_waits = 0, False
+        job.version = successor(job.version, 16)
+        effects += self.stewardship.won(job.car, 0, job.task, job.version)
+        return effects + self._call_for(job, now_us)
+
+    def _call_for(self, job: BayTask, now_us: int) -> list[Effect]:
         if job.operation is Operation.PARK:
             job.retry_at_us = None
             return self._call(job, self.station.number, ANY_STATION, now_us)
@@ -248,13 +252,24 @@ class Compartment:
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the phase table, where its condition is met."""
+        effects = self._review(now_us)
         if self.doors is None or self.bay is None:
-            return []
-        return self._table[self.phase](now_us)
+            return effects
+        return effects + self._table[self.phase](now_us)
+
+    def _review(self, now_us: int) -> list[Effect]:
+        """As custodian: winners that are lost; for my own task I call anew at once."""
+        effects = self.stewardship.review(now_us)
+        job = self.job
+        if job is not None and job.winner and effects and self.stewardship.is_given_back(job.car):
+            effects += self._call_again(job, now_us)
+        return effects
 
     def next_wake(self) -> int | None:
-        """When a refused call is made again."""
-        return self.job.retry_at_us if self.job is not None and self.phase is BayPhase.AWAITING else None
+        """When a refused call is made again, or a winner counts as lost."""
+        retry_us = self.job.retry_at_us if self.job is not None and self.phase is BayPhase.AWAITING else None
+        due = [time for time in (retry_us, self.stewardship.next_wake()) if time is not None]
+        return min(due, default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""
@@ -297,7 +312,9 @@ class Compartment:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
         assert self.memory.job is not None
         task, operation, car, wheelbase_mm = self.memory.job
-        self.job = BayTask(task, operation, car, wheelbase_mm, self.stewardship.winners.get(car, 0))
+        of_task, version = self.stewardship.tasks.get(car, (task, 1))
+        winner = self.stewardship.winners.get(car, 0)
+        self.job = BayTask(task, operation, car, wheelbase_mm, winner, version if of_task == task else 1)
         self.job.was_granted = self.memory.was_granted
         if self.job.was_granted:
             self._go(BayPhase.SERVING)
@@ -398,7 +415,7 @@ class Compartment:
     def _when_awaiting(self, now_us: int) -> list[Effect]:
         assert self.job is not None
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
-            return self._call_again(self.job, now_us)
+            return self._call_for(self.job, now_us)
         if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         self._go(BayPhase.OPENING)
@@ -450,17 +467,7 @@ class Compartment:
         return effects + self._to_free()
 
     def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
-        terms = CallTerms(
-            task=job.task,
-            operation=job.operation,
-            kind=KindCode.ROBOT,
-            criterion=Criterion.FINISH_TIME,
-            from_station=source,
-            to_station=sink,
-            car=job.car,
-            wheelbase_mm=job.wheelbase_mm,
-        )
-        return list(self.fleet.negotiation.open(terms, now_us))
+        return list(self.fleet.negotiation.open(job.terms(source, sink), now_us))
 
     def _state_car(self, car: Reference, station: int, wheelbase_mm: int) -> list[Effect]:
         version = self.fleet.tokens.seen[car_token(*car)]
@@ -489,10 +496,3 @@ class Compartment:
         self.phase = phase
         self.generation.is_free = phase is BayPhase.FREE
         self.generation.queue = len(self.tickets)
-
-
-_DESK_INPUT = {
-    OperatorAction.PRESS_KEY: DeskInput.KEY,
-    OperatorAction.INSERT_TICKET: DeskInput.TICKET,
-    OperatorAction.CANCEL: DeskInput.CANCEL,
-}

@@ -148,7 +148,8 @@ class CarParkGeneration:
         taken.release(self.machine.node_id)
         taken.reserve(self.machine.node_id, windows, lift_uses(self.site, mine, now_us, solution.start_us))
         for node in standing:
-            place = final_position(self.site, self.mirror.itineraries[node])
+            itinerary = self.mirror.itineraries.get(node)
+            place = None if itinerary is None else final_position(self.site, itinerary)
             others = [one for one in self.mirror.others_standing() if one != place]
             if place is None or not self._finds_refuge(
                 node, place, taken, [*others, solution.steps[-1].destination], now_us

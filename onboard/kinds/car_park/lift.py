@@ -16,7 +16,7 @@ from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.lifts import gate, platform
 from onboard.core.messages import DriveOrder, DriveState, Itinerary, Leg, Message, PlatformState, Progress, TaskReport
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine, Site
 from onboard.kinds.car_park.bay_memory import BayMemory
@@ -154,6 +154,10 @@ class Lift:
                 self.generation.promises.pop(key, None)
                 taken = TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE)
                 return [Send(taken)]
+            case AwardedAgain(call=call):
+                return [
+                    Send(TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE))
+                ]
         return []
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
@@ -166,13 +170,15 @@ class Lift:
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the phase table."""
+        effects = self.stewardship.review(now_us)
         if self.drive is None or self.platform is None:
-            return []
-        return self._table[self.phase](now_us)
+            return effects
+        return effects + self._table[self.phase](now_us)
 
     def next_wake(self) -> int | None:
-        """When the drive's order is to be repeated."""
-        return self._refresh_at_us
+        """When the drive's order is to be repeated, or a winner counts as lost."""
+        due = [time for time in (self._refresh_at_us, self.stewardship.next_wake()) if time is not None]
+        return min(due, default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
         """Where the platform is, and the tokens that this node holds."""
@@ -215,11 +221,16 @@ class Lift:
         rides = [
             ride
             for node, itinerary in self.fleet.mirror.itineraries.items()
-            if self._ride_legs(itinerary)
+            if self._ride_legs(itinerary) and not self._is_absent(node)
             for ride in rides_of(self.track, node, itinerary, now_us)
         ]
         rides = [ride for ride in rides if self._made.get(ride.robot) != ride.begin_us]
         return min(rides, key=lambda ride: (ride.begin_us, ride.robot), default=None)
+
+    def _is_absent(self, robot: int) -> bool:
+        """Whether a robot is an obstacle that does not hold the platform: its planned rides count no more."""
+        holder = self.fleet.tokens.holder_of(segment_token(platform(self.track)))
+        return robot in self.fleet.mirror.obstacles.machines and robot != holder
 
     def _as_planned_now(self, ride: Ride, now_us: int) -> Ride:
         """The ride of whoever is aboard by its newest plan: a restarted robot may want to go elsewhere."""

@@ -18,13 +18,13 @@ from onboard.kinds.car_park.program import Handling, Step, Work
 Entry = Mapping[str, str | int]
 
 
-def award_record(call: CallForProposals, source: Station, sink: Station) -> Record:
-    """A task taken on: what is needed to go on with it, and where its car is taken and left."""
+def award_record(call: CallForProposals, source: Station, sink: Station, version: int) -> Record:
+    """A task taken on under ``version``: what is needed to go on with it, and where its car is taken and left."""
     entry: dict[str, str | int] = {"record": "award", "initiator": call.sender, "call": call.call}
     entry |= {"task_origin": call.task.origin, "task": call.task.number, "operation": int(call.operation)}
     entry |= {"car_origin": call.car.origin, "car": call.car.number, "wheelbase_mm": call.wheelbase_mm}
     entry |= {"from_station": call.from_station, "to_station": call.to_station, "deadline_ms": call.deadline_ms}
-    return Record(entry | {"source": source.number, "sink": sink.number})
+    return Record(entry | {"source": source.number, "sink": sink.number, "version": version})
 
 
 def handled_record(work: Work) -> Record:
@@ -55,6 +55,8 @@ class Recovery:
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
     is_restart: bool = False
+    #: Under which version each task was taken on, where it is not the first.
+    versions: dict[Reference, int] = field(default_factory=dict)
 
     @classmethod
     def read(cls, entries: Iterable[Entry]) -> "Recovery":
@@ -69,7 +71,11 @@ class Recovery:
             case "boot":
                 self.is_restart = True
             case "award" if "source" in entry:
+                self.forget(_task(entry))
                 self.works += _works(entry)
+                self.versions[_task(entry)] = int(entry.get("version", 1))
+            case "forfeited":
+                self.forget(_task(entry))
             case "step":
                 self.phase = Phase(str(entry["phase"]))
             case "handled":
@@ -80,10 +86,17 @@ class Recovery:
             case "floor":
                 self.floor, self.riding = int(entry["track"]), None
 
+    def forget(self, task: Reference) -> None:
+        """A task is another's, or was given back."""
+        self.works = [work for work in self.works if work.call.task != task]
+
+
+def _task(entry: Entry) -> Reference:
+    return Reference(int(entry["task_origin"]), int(entry["task"]))
+
 
 def _is(work: Work, entry: Entry) -> bool:
-    task = Reference(int(entry["task_origin"]), int(entry["task"]))
-    return work.call.task == task and work.handling.value == entry["handling"]
+    return work.call.task == _task(entry) and work.handling.value == entry["handling"]
 
 
 def _works(entry: Entry) -> list[Work]:

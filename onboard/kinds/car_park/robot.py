@@ -1,6 +1,7 @@
 """The mobile robot (MR): carrier and shuttle carry out the order program of every task that it won."""
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey, segment_token
@@ -16,7 +17,7 @@ from onboard.core.codes import (
     Reason,
     TaskPhase,
 )
-from onboard.core.effects import Effect, Halt, Report, Send
+from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.lift_uses import ride_us
 from onboard.core.lifts import platform_on, sill
 from onboard.core.messages import (
@@ -32,13 +33,14 @@ from onboard.core.messages import (
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
-from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.reservations import FOREVER, Window
-from onboard.core.serial import to_bus_ms
+from onboard.core.serial import is_newer, to_bus_ms
 from onboard.core.site import Machine, Segment, Site, TrackKind
 from onboard.kinds.car_park.asking import AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
+from onboard.kinds.car_park.going_around import GoingAround
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
 from onboard.kinds.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
@@ -86,6 +88,7 @@ class Robot:
     riding: Riding = field(init=False)
     giving_way: GivingWay = field(init=False)
     recovery: Recovery = field(init=False)
+    going_around: GoingAround = field(init=False)
     _recover_at_us: int | None = None
     #: The last tasks that were done: a late word about one of them is no news.
     _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
@@ -99,6 +102,7 @@ class Robot:
         self.riding = Riding(self.fleet)
         self.giving_way = GivingWay(self.fleet, self.program)
         self.recovery = Recovery.read(self.fleet.entries)
+        self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
         if self.recovery.floor is not None:
             self.carriage.track = self.recovery.floor
 
@@ -137,13 +141,14 @@ class Robot:
         if isinstance(message, ShuttleState):
             self.shuttle.sense(message)
             if self.shuttle.fault and self._fault is Reason.NONE:
-                return self._fail(Reason.ACTUATOR_FAULT)
+                return self._fail(Reason.ACTUATOR_FAULT, now_us)
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Another machine's plan may mean that mine has to come later, or to take another way."""
+        self.going_around.hear(message)
         if isinstance(message, Award):
-            return self._forfeit_unknown(message)
+            return self._forfeit_unknown(message) + self._yield_task(message, now_us)
         if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or self.program.standing is None:
             return []
         if self.fleet.mirror.itineraries.get(message.sender) is not message:
@@ -162,6 +167,41 @@ class Robot:
         if any(work.call.task == award.task for work in known) or award.task in self._done:
             return []
         return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
+
+    def _yield_task(self, award: Award, now_us: int) -> list[Effect]:
+        """A task of mine is another's by a newer version, or its call is void: I was lost for its initiator."""
+        for work in [*self.program.works(), *self.recovery.works]:
+            call = work.call
+            if (call.task, call.sender) != (award.task, award.sender):
+                continue
+            newer = is_newer(award.task_version, self.recovery.versions.get(call.task, 1), 16)
+            is_void = award.result is CallResult.WITHDRAWN or (
+                award.result is CallResult.REJECTED and award.call == call.call
+            )
+            others = award.result is CallResult.AWARDED and award.winner != self.fleet.node_id and newer
+            if (others or is_void) and (self._recover_at_us is not None or call.task in self.going_around.untouched()):
+                return self._lose(call.task, now_us)
+        return []
+
+    def _lose(self, task: Reference, now_us: int) -> list[Effect]:
+        self.recovery.forget(task)
+        gone: list[Effect] = [
+            Record({"record": "forfeited", "task_origin": task.origin, "task": task.number}),
+            Report(f"task {task.origin}.{task.number} is another's now"),
+        ]
+        return gone + (self.going_around.drop([task], now_us) if self._recover_at_us is None else [])
+
+    def _take_up(self, kept: int, steps: Sequence[Step], works: list[Work], now_us: int) -> list[Effect]:
+        """A program made anew for the same or fewer tasks, under the same stamp."""
+        rest = [*self.program.remaining[:kept], *steps]
+        if not kept:
+            self._begun = False
+        if not rest and self.carriage.standing_at is not None:
+            self.program.standing = self.carriage.standing_at
+        self.program.replace(rest, self.program.stamp)
+        effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
+        effects += self._publish(now_us)
+        return effects + (self._call_lifts(works[0].call, tuple(steps), now_us) if works else [])
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
         """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
@@ -188,11 +228,28 @@ class Robot:
             case Released(call_key=key):
                 self.generation.tentative.pop(key, None)
                 return []
-            case Awarded(call_key=key, call=call, proposal=proposal, parts=parts):
+            case Awarded(call_key=key, call=call, proposal=proposal, award=award, parts=parts):
                 self.generation.tentative.pop(key, None)
                 (solution,) = proposal.program
-                return self._take_on(call, solution, parts, now_us)
+                version = 1 if award is None else award.task_version
+                self.recovery.versions[call.task] = version
+                if self._fault is not Reason.NONE:
+                    return self.going_around.forfeit(call.task, self._fault, now_us)
+                again = call.task in self.going_around.untouched()
+                dropped = self.going_around.drop([call.task], now_us) if again else []
+                return dropped + self._take_on(call, solution, parts, version, now_us)
+            case AwardedAgain(call=call):
+                return [self._tell_again(call.task)]
         return []
+
+    def _tell_again(self, task: Reference) -> Effect:
+        """What became of a task whose award is said again."""
+        handlings = [work.handling for work in (*self.program.works(), *self.recovery.works) if work.call.task == task]
+        if Handling.TAKE in handlings or Handling.LEAVE in handlings:
+            return self._report(task, TaskPhase.AWARDED if Handling.TAKE in handlings else TaskPhase.LOADED, 0)
+        if task in self._done:
+            return self._report(task, TaskPhase.DONE, 0)
+        return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, Reason.CANCELLED))
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """A robot passes segments and stations back to their stewards by itself; until then it refuses."""
@@ -207,7 +264,7 @@ class Robot:
             return self.carriage.advance(now_us) if self.carriage.goal is not None else []
         if self._recover_at_us is not None and self._recover_at_us <= now_us:
             return self._recover(now_us)
-        effects: list[Effect] = []
+        effects = self.going_around.advance(now_us) if self._recover_at_us is None else []
         # A step can end without a word on any bus, and the next is to begin in the same moment.
         for _ in range(MAX_STEPS):
             step = self.program.step
@@ -226,6 +283,8 @@ class Robot:
     def next_wake(self) -> int | None:
         """The drive's next order, the end of a planned wait, or of a pause after a restart."""
         times = [self.carriage.next_wake(), self._recover_at_us]
+        if self._recover_at_us is None and self.program.standing is not None and self._fault is Reason.NONE:
+            times.append(self.going_around.next_wake())
         step = self.program.step
         if step is not None and self._begun:
             times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
@@ -262,7 +321,10 @@ class Robot:
         self.carriage.go(here)
         if self.recovery.is_restart:
             self._recover_at_us = now_us + SETTLING_US
-        return self._publish(now_us)
+        # Whoever has got one of them meanwhile, its initiator knows.
+        to_take = [work for work in self.recovery.works if work.handling is Handling.TAKE]
+        mine = [self._report(work.call.task, TaskPhase.AWARDED, work.station.number) for work in to_take]
+        return self._publish(now_us) + mine
 
     def _recover(self, now_us: int) -> list[Effect]:
         """Go on with what the journal says is mine, by a way planned anew (rows P14, P20)."""
@@ -316,7 +378,7 @@ class Robot:
         return there
 
     def _take_on(
-        self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], now_us: int
+        self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], version: int, now_us: int
     ) -> list[Effect]:
         """Second request of the task-generation function: the operating sequence that is really carried out."""
         solution = self.generation.renewed(call, promised, now_us)
@@ -325,7 +387,7 @@ class Robot:
             self._begun = False
         self.program.replace([*kept, *solution.steps], Stamp(call.deadline_ms, call.sender, call.call & 0xFF))
         effects: list[Effect] = [
-            award_record(call, *self.generation.ends(call, solution.place)),
+            award_record(call, *self.generation.ends(call, solution.place), version),
             Report("program: " + "; ".join(str(step) for step in solution.steps)),
         ]
         effects += self._publish(now_us)
@@ -383,7 +445,8 @@ class Robot:
         self.program.shift(by_us)
         first = self.program.steps[0]
         self.program.steps[0] = first._replace(begin_us=first.begin_us - by_us)
-        return self._publish(now_us)
+        # Whoever waits for rights in vain may have lost the task: its initiator answers then.
+        return self._publish(now_us) + ([] if step.work is None else self._announce_start(step.work))
 
     def _end(self, step: Step, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -415,12 +478,18 @@ class Robot:
     def _report(self, task: Reference, phase: TaskPhase, station: int) -> Effect:
         return Send(TaskReport(self.fleet.node_id, task, phase, station, Reason.NONE))
 
-    def _fail(self, reason: Reason) -> list[Effect]:
-        """An actuator failed: stand still as an obstacle and say so; what follows is a person's decision."""
+    def _fail(self, reason: Reason, now_us: int) -> list[Effect]:
+        """An actuator failed: stand still as an obstacle, give back what was not touched, and say so.
+
+        What follows is a person's decision: the controller is started anew once the machine is sound.
+        """
         self._fault = reason
         self.carriage.stopped = True
         effects: list[Effect] = [Report(f"stopped: {reason.name}")]
-        work = self.shuttle.work
-        if work is not None:
-            effects.append(Send(TaskReport(self.fleet.node_id, work.call.task, TaskPhase.FORFEITED, 0, reason)))
+        lost = self.going_around.untouched()
+        for task in lost:
+            effects += self.going_around.forfeit(task, reason, now_us)
+        self.program.steps = [
+            step for step in self.program.steps if step.work is None or step.work.call.task not in lost
+        ]
         return effects

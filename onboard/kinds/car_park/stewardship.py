@@ -1,18 +1,29 @@
-"""A fixed machine as steward of a track: grants segments in passing order, keeps stored cars and their places."""
+"""A fixed machine as steward of a track: grants segments in passing order, keeps stored cars and their places.
+
+As custodian of a car it alone may take the right to fetch it from a machine that won it and is lost: while it holds the
+car and its station, and the winner neither stands at that front nor holds its token (design, section 4). It forgets the
+winner, journals that, and then says FORFEITED; whoever wants the task done calls anew under a raised version.
+"""
 
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token
+from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import OUTSIDE, CallResult, Operation, Reason, TokenKind
+from onboard.core.codes import NOBODY, OUTSIDE, CallResult, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TokenGrant
+from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TaskReport, TokenGrant
 from onboard.core.petitions import UNORDERED
+from onboard.core.serial import is_newer
 from onboard.core.site import Segment
 from onboard.kinds.car_park.bay_memory import BayMemory, car_record, winner_record
 
 #: Calls remembered to know which car an award is about; older ones are long closed.
 MAX_CALLS = 64
+#: A winner that is an obstacle for so long is lost, us: a restart takes some seconds, and its task is in its journal.
+#: Ours.
+LOST_AFTER_US = 8_000_000
+#: FORFEITED is said again this often until the task is awarded anew, us. Ours.
+SAY_AGAIN_US = 2_000_000
 
 
 @dataclass
@@ -21,11 +32,15 @@ class Stewardship:
 
     fleet: Fleet
     winners: dict[Reference, int] = field(default_factory=dict)
+    #: The task that each car's winner has won and its version.
+    tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
+    _say_at_us: dict[Reference, int] = field(default_factory=dict)
 
     def replay(self, memory: BayMemory) -> None:
         """Take up what the journal tells of the cars that are in my custody still."""
         self.winners.update(memory.winners)
+        self.tasks.update(memory.tasks)
         for car, statement in memory.cars.items():
             if self.fleet.tokens.holds(car_token(*car)):
                 self.fleet.mirror.on_car(statement)
@@ -39,12 +54,75 @@ class Stewardship:
                     del self._cars_of_calls[next(iter(self._cars_of_calls))]
             case Award() if message.result is CallResult.AWARDED:
                 car = self._cars_of_calls.get((message.sender, message.call))
-                if car is not None and self.winners.get(car) != message.winner:
-                    self.winners[car] = message.winner
-                    return [winner_record(car, message.winner)]
+                if car is not None and self._is_news(car, message):
+                    return self.won(car, message.winner, message.task, message.task_version)
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._take_custody(Reference(message.token >> 16, message.token & 0xFFFF), message.version)
         return []
+
+    def won(self, car: Reference, winner: int, task: Reference, version: int) -> list[Effect]:
+        """``winner`` may fetch a car, or with 0 nobody may, for ``task`` under ``version``."""
+        if winner:
+            self.winners[car] = winner
+            self._say_at_us.pop(car, None)
+        else:
+            self.winners.pop(car, None)
+        self.tasks[car] = task, version
+        return [winner_record(car, winner, task, version)]
+
+    def _is_news(self, car: Reference, award: Award) -> bool:
+        """Whether an award says more than is known; an older version of the same task counts no more."""
+        task, version = self.tasks.get(car, (award.task, 0))
+        if task != award.task or is_newer(award.task_version, version, 16):
+            return True
+        return award.task_version == version and self.winners.get(car) not in (None, award.winner)
+
+    def review(self, now_us: int) -> list[Effect]:
+        """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
+        effects: list[Effect] = []
+        for car in [car for car, winner in self.winners.items() if self._is_lost(winner, now_us)]:
+            if car in self.tasks and self._is_untouched(car):
+                task, version = self.tasks[car]
+                effects += self.won(car, NOBODY, task, version)
+                self._say_at_us[car] = now_us
+        for car in [car for car, due_us in self._say_at_us.items() if due_us <= now_us]:
+            record = self.fleet.mirror.cars.get(car)
+            gone = record is None or record.station == OUTSIDE
+            if record is None or gone or not self.fleet.tokens.holds(car_token(*car)):
+                del self._say_at_us[car]
+                continue
+            self._say_at_us[car] = now_us + SAY_AGAIN_US
+            given_back = TaskReport(
+                self.fleet.node_id, self.tasks[car][0], TaskPhase.FORFEITED, record.station, Reason.NODE_SILENT
+            )
+            effects.append(Send(given_back))
+        return effects
+
+    def is_given_back(self, car: Reference) -> bool:
+        """Whether the right to fetch a car was taken from a winner that is lost, and not given anew."""
+        return car in self._say_at_us
+
+    def next_wake(self) -> int | None:
+        """When ``review`` has something to do, bus time in us; None where nobody is lost."""
+        obstacles = self.fleet.mirror.obstacles.machines
+        times = list(self._say_at_us.values())
+        for car, winner in self.winners.items():
+            if winner in obstacles and car in self.tasks and self._is_untouched(car):
+                times.append(obstacles[winner].since_us + LOST_AFTER_US)
+        return min(times, default=None)
+
+    def _is_lost(self, winner: int, now_us: int) -> bool:
+        obstacle = self.fleet.mirror.obstacles.machines.get(winner)
+        return obstacle is not None and now_us - obstacle.since_us >= LOST_AFTER_US
+
+    def _is_untouched(self, car: Reference) -> bool:
+        """Whether I hold the car and its station, and nobody has a right to the front as its winner."""
+        tokens, winner = self.fleet.tokens, self.winners.get(car)
+        station = self.fleet.mirror.car_station(car)
+        if station is None or not tokens.holds(car_token(*car)) or not tokens.holds(station_token(station)):
+            return False
+        obstacle = self.fleet.mirror.obstacles.machines.get(winner or NOBODY)
+        return obstacle is None or station.segment not in obstacle.slots
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """NONE where the token may go to ``requester`` now."""
@@ -68,6 +146,7 @@ class Stewardship:
         if record is None or not self.fleet.tokens.holds(car_token(*car)):
             return []
         self.winners.pop(car, None)
+        self.tasks.pop(car, None)
         statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
         return [car_record(statement), Send(statement)] if self.fleet.mirror.on_car(statement) else []
 

@@ -1,0 +1,78 @@
+"""The one task that uses a compartment's bay, and what is said about it: its call and its award."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from onboard.core.codes import CallResult, Criterion, DeskInput, KindCode, Operation, OperatorAction, Reason, TaskPhase
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Award, Reference, TaskReport
+from onboard.core.negotiation import CallTerms
+
+#: A call that nobody could serve is made again after this, us. Ours.
+RETRY_US = 30_000_000
+#: After a restart the machines say again what they have in hand; a task that nobody names is called anew so much later.
+#: Ours.
+SETTLING_US = 2_000_000
+#: What an operator's order stands for at the desk.
+DESK_INPUT = {
+    OperatorAction.PRESS_KEY: DeskInput.KEY,
+    OperatorAction.INSERT_TICKET: DeskInput.TICKET,
+    OperatorAction.CANCEL: DeskInput.CANCEL,
+}
+#: The custodian's word that the winner is lost is answered so often with the newest award, before it counts. Ours.
+REMINDERS = 3
+
+
+class BayPhase(Enum):
+    """What the compartment is doing."""
+
+    STARTING = "starting"
+    FREE = "free"
+    LOCKING = "locking"
+    AWAITING = "awaiting"
+    OPENING = "opening"
+    SERVING = "serving"
+    CLOSING = "closing"
+    HANDOVER = "handover"
+    RESERVING = "reserving"
+
+
+@dataclass
+class BayTask:
+    """The task. ``version`` (16 bits) is raised each time that it is called anew; ``call`` is the one last awarded."""
+
+    task: Reference
+    operation: Operation
+    car: Reference
+    wheelbase_mm: int
+    winner: int = 0
+    version: int = 1
+    call: int = 0
+    was_granted: bool = False
+    retry_at_us: int | None = None
+    reminders: int = 0
+
+    def terms(self, source: int, sink: int) -> CallTerms:
+        """The call for it, between two stations by number."""
+        return CallTerms(
+            task=self.task,
+            operation=self.operation,
+            kind=KindCode.ROBOT,
+            criterion=Criterion.FINISH_TIME,
+            from_station=source,
+            to_station=sink,
+            car=self.car,
+            wheelbase_mm=self.wheelbase_mm,
+            task_version=self.version,
+        )
+
+    def award(self, sender: int) -> Award:
+        """The newest award, to be said again."""
+        return Award(sender, self.call, self.winner, self.task, self.version, CallResult.AWARDED, Reason.NONE)
+
+
+def withdrawal(node: int, report: TaskReport) -> list[Effect]:
+    """The answer of ``node`` to who takes one of its tasks in hand that is another's, or over: it was away for long."""
+    if report.task.origin != node or report.phase not in (TaskPhase.AWARDED, TaskPhase.STARTED):
+        return []
+    return [Send(Award(node, 0, 0, report.task, 0, CallResult.WITHDRAWN, Reason.CANCELLED))]

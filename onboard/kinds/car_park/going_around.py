@@ -1,0 +1,195 @@
+"""Going around obstacles, and giving back what cannot be done (design, section 4 and 5; issue 4, point 3).
+
+A plan that leads through an obstacle is made anew from where the carrier can turn; all others stay as they are. Where
+there is no way for a while, tasks whose car was not touched are forfeited with a reason, the last one first, and called
+for anew by their initiators. A task whose car is aboard is never given back: it waits until there is a way.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from onboard.core.authority import car_token, segment_token, station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import Grade, LegAction, Reason, TaskPhase
+from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.lifts import gate, lift_at
+from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
+from onboard.core.occupancy import itinerary_windows
+from onboard.core.site import Segment
+from onboard.kinds.car_park.generation import CarParkGeneration
+from onboard.kinds.car_park.handling import Phase, ShuttleWork
+from onboard.kinds.car_park.program import Handling, Program, Step, Work, to_itinerary
+from onboard.kinds.car_park.travel import Carriage
+
+#: A plan that finds no way is tried again after this, us. Ours.
+RETRY_US = 3_000_000
+#: A run that has not come to a stand is looked at again after this, us. Ours.
+LOOK_US = 500_000
+#: Tasks are kept so long without a way, us: a machine that is only restarted is back by then. Ours.
+KEEP_US = 12_000_000
+#: FORFEITED is said again so often and so many times, until the task is called or awarded anew. Ours.
+SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
+
+
+@dataclass
+class GoingAround:
+    """One robot's way around obstacles. ``take_up(kept, steps, works, now)`` makes a new program the robot's own."""
+
+    fleet: Fleet
+    generation: CarParkGeneration
+    carriage: Carriage
+    shuttle: ShuttleWork
+    take_up: Callable[[int, Sequence[Step], list[Work], int], list[Effect]]
+    #: Tasks given back, with why, how often to say so still, and when next.
+    given_back: dict[Reference, tuple[Reason, int, int]] = field(default_factory=dict)
+    _seen: int = 0
+    _since_us: int | None = None
+    _retry_at_us: int | None = None
+
+    @property
+    def program(self) -> Program:
+        """The order program in hand."""
+        return self.generation.program
+
+    def next_wake(self) -> int | None:
+        """When to try again, or to say again what was given back."""
+        times = [due_us for _, _, due_us in self.given_back.values()]
+        if self._retry_at_us is not None:
+            times.append(self._retry_at_us)
+        return min(times, default=None)
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Look whether the plan leads through an obstacle, where anything about them has changed."""
+        effects = self._say_again(now_us)
+        changes = self.fleet.mirror.obstacles.changes
+        if changes != self._seen:
+            self._seen = changes
+            if self._since_us is not None or self._is_hindered(self.program.remaining, now_us):
+                self._since_us = now_us if self._since_us is None else self._since_us
+                self._retry_at_us = now_us
+        if self._retry_at_us is not None and self._retry_at_us <= now_us:
+            effects += self._try(now_us)
+        return effects
+
+    def turn_later(self, now_us: int) -> None:
+        """The program does not end where a machine may stand for ever: make it anew as soon as that is possible."""
+        self._since_us = now_us if self._since_us is None else self._since_us
+        self._retry_at_us = now_us + RETRY_US
+
+    def hear(self, message: Message) -> None:
+        """What was given back is called or awarded anew: enough was said of it."""
+        if isinstance(message, CallForProposals) and message.task in self.given_back and not message.depth:
+            del self.given_back[message.task]
+
+    def forfeit(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
+        """Give an untouched task back; its steps are the caller's business."""
+        self.given_back[task] = reason, SAY_AGAIN, now_us + SAY_AGAIN_US
+        entry: dict[str, str | int] = {"record": "forfeited", "task_origin": task.origin, "task": task.number}
+        return [Record(entry), Send(self._report(task, reason))]
+
+    def untouched(self) -> list[Reference]:
+        """Tasks in the program whose car was not touched and is in others' custody, in order."""
+        tokens = self.fleet.tokens
+        found = []
+        for work in self.program.works():
+            begun = self.shuttle.work == work and self.shuttle.phase not in (Phase.ACQUIRE, Phase.DONE)
+            has_right = tokens.holds(car_token(*work.car)) or tokens.holds(station_token(work.station))
+            if work.handling is Handling.TAKE and not begun and not has_right:
+                found.append(work.call.task)
+        return found
+
+    def drop(self, tasks: Sequence[Reference], now_us: int) -> list[Effect]:
+        """Take untouched tasks out of the program and plan the rest anew."""
+        works = [work for work in self.program.works() if work.call.task not in tasks]
+        shuttle = self.shuttle
+        if shuttle.work is not None and shuttle.work.call.task in tasks:
+            for key in (station_token(shuttle.work.station), car_token(*shuttle.work.car)):
+                self.fleet.tokens.forget(key)
+            shuttle.work, shuttle.phase = None, Phase.DONE
+        kept, origin, start_us = self._turning(tasks, now_us)
+        steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
+        if steps is None or self._is_trapped(now_us):
+            self.turn_later(now_us)
+            steps = ()
+            if not works and self._is_trapped(now_us):
+                # Who waits aboard for its lift plans no further than off it: more would stand in the way of others.
+                self._cut_behind_ride()
+        return self.take_up(kept, steps, works, now_us)
+
+    def _cut_behind_ride(self) -> None:
+        steps = self.program.remaining[:2]
+        if len(steps) == 2 and steps[1].action is LegAction.TRAVEL:
+            off = steps[1]
+            step = 1 if off.to_index > off.from_index else -1
+            self.program.steps[self.program.current + 1] = off._replace(to_index=off.from_index + step)
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _try(self, now_us: int) -> list[Effect]:
+        """Plan anew from where the carrier can turn; forfeit what finds no way for too long."""
+        self._retry_at_us = now_us + RETRY_US
+        remaining = self.program.remaining
+        step = remaining[0] if remaining else None
+        is_driving = self.carriage.standing_at is None or self.carriage.target is not None
+        if step is not None and step.action is LegAction.TRAVEL and is_driving and self._is_hindered([step], now_us):
+            # It comes to a stand by itself where its rights end.
+            self._retry_at_us = now_us + LOOK_US
+            return []
+        works = self.program.works()
+        kept, origin, start_us = self._turning((), now_us)
+        steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
+        if steps is not None and not self._is_trapped(now_us):
+            self._since_us = self._retry_at_us = None
+            return self.take_up(kept, steps, works, now_us)
+        assert self._since_us is not None
+        lost = self.untouched()
+        if now_us - self._since_us < KEEP_US or not lost:
+            return []
+        task = lost[-1]
+        effects: list[Effect] = [Report(f"gives task {task.origin}.{task.number} back: no way")]
+        return effects + self.drop([task], now_us) + self.forfeit(task, Reason.IMPOSSIBLE, now_us)
+
+    def _is_trapped(self, now_us: int) -> bool:
+        """Whether the ride in hand is with a lift that is an obstacle."""
+        remaining = self.program.remaining
+        return bool(remaining) and remaining[0].action is LegAction.RIDE and self._is_hindered(remaining[:1], now_us)
+
+    def _turning(self, tasks: Sequence[Reference], now_us: int) -> tuple[int, Segment, int]:
+        """As ``Program.turning``, but a run that stands at a mark before an obstacle, or work dropped, ends there."""
+        remaining, here = self.program.remaining, self.carriage.standing_at
+        if remaining and here is not None and lift_at(self.fleet.site, here) is None and self.carriage.target is None:
+            step = remaining[0]
+            if step.action is LegAction.TRAVEL or (step.work is not None and step.work.call.task in tasks):
+                return 0, here, now_us
+        return self.program.turning(now_us)
+
+    def _ahead(self, works: list[Work], kept: int) -> list[Work]:
+        """Works that are not in the steps that are kept."""
+        done = [step.work for step in self.program.remaining[:kept] if step.work is not None]
+        return [work for work in works if work not in done]
+
+    def _is_hindered(self, steps: Sequence[Step], now_us: int) -> bool:
+        """Whether steps lead through an obstacle, but for slots whose tokens I hold myself."""
+        if not steps:
+            return False
+        obstacles, tokens = self.fleet.mirror.obstacles, self.fleet.tokens
+        told = to_itinerary(self.fleet.node_id, 1, Grade.FIRM, self.program.stamp, list(steps))
+        windows = itinerary_windows(self.fleet.site, told, now_us, steps[0].begin_us)
+        slots = {window.segment for window in windows}
+        slots |= {gate(step.track) for step in steps if step.action is LegAction.RIDE}
+        return any(obstacles.is_at(slot) and not tokens.holds(segment_token(slot)) for slot in slots)
+
+    def _say_again(self, now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        for task, (reason, left, due_us) in list(self.given_back.items()):
+            if due_us > now_us:
+                continue
+            effects.append(Send(self._report(task, reason)))
+            if left > 1:
+                self.given_back[task] = reason, left - 1, now_us + SAY_AGAIN_US
+            else:
+                del self.given_back[task]
+        return effects
+
+    def _report(self, task: Reference, reason: Reason) -> TaskReport:
+        return TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, reason)
