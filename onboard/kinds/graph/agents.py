@@ -10,7 +10,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import CallForProposals, Message, TokenGrant
+from onboard.core.messages import CallForProposals, Heartbeat, Message, TokenGrant
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent, Proposal
 from onboard.core.site import Machine, Site
@@ -84,6 +84,8 @@ class NodeAgents:
     promised: dict[TokenKey, tuple[int, int]] = field(default_factory=dict)
     #: By a node of mine and its neighbour: the neighbour keeps their edge.
     kept_by_other: set[tuple[int, int]] = field(default_factory=set)
+    #: Robots whose heartbeat tells another site: their map is wrong or old (row G27).
+    strangers: set[int] = field(default_factory=set)
     _kept: dict[int, int | None] = field(default_factory=dict)
     _events: int = 0
     _seen_taken: set[Edge] = field(default_factory=set)
@@ -119,6 +121,8 @@ class NodeAgents:
                 self._on_notice(message, now_us)
             case TokenGrant():
                 self._on_grant(message)
+            case Heartbeat():
+                (self.strangers.discard, self.strangers.add)[message.site_digest != self.site.digest](message.sender)
         return []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
@@ -158,7 +162,7 @@ class NodeAgents:
 
     def _on_signal(self, signal: TurnSignal, now_us: int) -> list[Effect]:
         graph = self.site.graph
-        if signal.after not in graph.neighbours.get(signal.node, ()):
+        if signal.sender in self.strangers or signal.after not in graph.neighbours.get(signal.node, ()):
             return []
         behind = NOWHERE if signal.behind == NO_NODE else signal.behind
         self.waiting[signal.sender] = _Waiting(Heading(behind, signal.node, signal.after), now_us)
@@ -227,7 +231,9 @@ class NodeAgents:
         """Whether another robot wants the same way in the opposite direction (row G19)."""
         mine = self.waiting[robot].heading
         assert mine.wants is not None
-        others = [one.heading for other, one in self.waiting.items() if other != robot]
+        # Who was let go is no rival any more, though it still has to move.
+        let_go = (NodeVerdict.GO, NodeVerdict.ANOTHER)
+        others = [one.heading for other, one in self.waiting.items() if other != robot and one.told not in let_go]
         if self.site.rules is Rules.EDGE_AND_NODE:
             return slot is None and any(one.end == mine.wants and one.wants == mine.end for one in others)
         return edge(mine.end, mine.wants) in taken and any(are_head_on(mine, one) for one in others)

@@ -10,7 +10,7 @@ from onboard.core.authority import MotionState, TokenKey, authorised
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
+from onboard.core.messages import Award, CallForProposals, Heartbeat, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor
@@ -81,6 +81,8 @@ class GraphRobot:
     body: BodyState | None = None
     mode: RobotMode = RobotMode.FREE
     over: set[Reference] = field(default_factory=set)
+    #: Whether a host of node agents tells another site: then my map is wrong or old, and I stay where I am (row G27).
+    has_other_map: bool = False
     #: Waits at nodes that ended in STOP, for the indicators.
     stops_told: int = 0
     sent_elsewhere: int = 0
@@ -115,6 +117,8 @@ class GraphRobot:
         """Heartbeat state."""
         if self.body is None:
             return MachineState.STARTING
+        if self.has_other_map:
+            return MachineState.OBSTACLE
         if self._answer is NodeVerdict.STOP:
             return MachineState.WAITING
         return MachineState.WORKING if self.planning.errands else MachineState.IDLE
@@ -150,6 +154,8 @@ class GraphRobot:
         match message:
             case NodeAnswer() if message.robot == self.fleet.node_id:
                 self._on_answer(message, now_us)
+            case Heartbeat(kind=KindCode.NODE):
+                self.has_other_map = message.site_digest != self.fleet.site.digest
             case RobotAt():
                 self.planning.others[message.sender] = message
             case VisitList() if message.robot == self.fleet.node_id:
@@ -197,13 +203,16 @@ class GraphRobot:
         """Tasks in hand and done, where it is, and rights."""
         self._told = None
         reports: list[Effect] = [self._report(task) for task in (*self.planning.errands, *sorted(self.over)[-8:])]
-        return reports + self._tell(now_us) + self.fleet.tokens.statements()
+        where = self._tell(now_us) if self.body is not None else []
+        return reports + where + self.fleet.tokens.statements()
 
     # --- tasks -------------------------------------------------------------------------------------------------
 
     def _take_on(self, task: Reference, stops: tuple[int, ...]) -> list[Effect]:
         if task in self.planning.errands or task in self.over:
             return [self._report(task)]
+        if self.has_other_map:
+            return [Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.OTHER_SITE))]
         if not stops or any(stop not in self.site.graph.neighbours for stop in stops):
             return [Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.IMPOSSIBLE))]
         errand = Errand(task, stops)
@@ -278,7 +287,7 @@ class GraphRobot:
 
     def _ask(self, now_us: int) -> list[Effect]:
         """Near a node, tell by which edge it will be left (row G14); again while nobody answers."""
-        if self._grant is not None or not self._sensed:
+        if self._grant is not None or not self._sensed or self.has_other_map:
             self._signal_at_us = None
             return []
         wants = self._wants()

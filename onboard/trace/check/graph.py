@@ -1,4 +1,4 @@
-"""Rules of the factory graph, from the frames alone: one robot an edge, no turning back, agents speak for their nodes."""
+"""Rules of the factory graph, from the frames alone: one robot an edge, no turning back, agents of their nodes."""
 
 from collections.abc import Callable
 
