@@ -28,7 +28,7 @@ def test_g15_the_dbc_is_complete_and_has_the_three_answers() -> None:
     for layouts, types in zip(system_layouts("graph"), TYPES, strict=True):
         found = [layout.frame_id >> 16 & 0xFF for layout in layouts]
         assert len(set(found)) == len(found) and set(found) <= set(types)
-    answers = judge_of(text).get_message_by_name("NodeAnswer").get_signal_by_name("node_answer").choices
+    answers = judge_of(text).get_message_by_name("NodeAnswer").get_signal_by_name("node_verdict").choices
     assert answers is not None
     assert {value: str(name) for value, name in answers.items()} == {one.value: one.name for one in NodeVerdict}
 

@@ -151,7 +151,7 @@ def test_g05_g06_agents_answer_for_their_own_nodes(shipped: Scene) -> None:
 
 def test_g08_g15_g18_a_crowd_stops_and_goes_and_nobody_meets(crowd: Scene) -> None:
     crowd.assert_sound()
-    answers = [one.node_answer for one in crowd.said(NodeAnswer)]
+    answers = [one.node_verdict for one in crowd.said(NodeAnswer)]
     assert answers.count(NodeVerdict.GO) > 30
     assert answers.count(NodeVerdict.STOP) > 3
 
@@ -166,7 +166,7 @@ def test_g17_g22_what_lies_behind_is_given_back_and_who_waits_goes(crowd: Scene)
     waiting: set[int] = set()
     gone = 0
     for message in (message for _, message in crowd.played.messages):
-        if isinstance(message, NodeAnswer) and message.node_answer is NodeVerdict.STOP:
+        if isinstance(message, NodeAnswer) and message.node_verdict is NodeVerdict.STOP:
             waiting.add(message.robot)
         elif isinstance(message, TurnSignal):
             waiting.discard(message.sender)
@@ -180,7 +180,7 @@ def test_g16_g19_two_that_meet_head_on_and_one_takes_another_edge() -> None:
     orders = [(0, "R1", (5,)), (0, "R2", (3,))]
     scene = Scene(made(hall(), (3, 5), orders, Rules.PAPER))
     scene.assert_sound()
-    sent = [one for one in scene.said(NodeAnswer) if one.node_answer is NodeVerdict.ANOTHER]
+    sent = [one for one in scene.said(NodeAnswer) if one.node_verdict is NodeVerdict.ANOTHER]
     assert len(sent) == 1 and sent[0].node == 4
     robot, goal = sent[0].robot, {21: 5, 22: 3}[sent[0].robot]
     way = list(scene.moves(robot))
@@ -197,7 +197,7 @@ def test_g19_who_is_sent_where_is_drawn_alike_in_every_run() -> None:
 
 
 def test_g20_the_node_at_the_other_end_is_told_of_a_grant(crowd: Scene) -> None:
-    granted = [(one.node, one.after, one.robot) for one in crowd.said(NodeAnswer) if one.node_answer is NodeVerdict.GO]
+    granted = [(one.node, one.after, one.robot) for one in crowd.said(NodeAnswer) if one.node_verdict is NodeVerdict.GO]
     notices = crowd.said(EdgeNotice)
     told = [(one.node, one.other, one.robot) for one in notices if one.edge_state is EdgeState.RESERVED]
     assert granted and granted == told
@@ -230,7 +230,7 @@ def test_g25_no_central_unit_and_any_size() -> None:
 def test_g26_little_is_said(shipped: Scene) -> None:
     # A signal, an answer and a notice for each edge driven; calls only for orders that name nobody.
     signals = len(shipped.said(TurnSignal))
-    gos = [one for one in shipped.said(NodeAnswer) if one.node_answer is NodeVerdict.GO]
+    gos = [one for one in shipped.said(NodeAnswer) if one.node_verdict is NodeVerdict.GO]
     assert len(gos) <= signals <= len(gos) + 5
     assert len(shipped.said(CallForProposals)) == sum(entry.order.robot == 0 for entry in shipped.plant.entries)
 

@@ -49,7 +49,7 @@ def figures(played: Played) -> dict[str, object]:
     ends = [entry.ended_us for entry in done if entry.ended_us is not None]
     begins = [entry.begun_us for entry in plant.entries]
     said = [message for _, message in played.messages]
-    answers = [one.node_answer for one in said if isinstance(one, NodeAnswer)]
+    answers = [one.node_verdict for one in said if isinstance(one, NodeAnswer)]
     return {
         "orders": len(plant.entries),
         "done": len(done),

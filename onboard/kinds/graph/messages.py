@@ -66,7 +66,7 @@ class NodeAnswer(Message):
 
     robot: int
     node: int
-    node_answer: NodeVerdict
+    node_verdict: NodeVerdict
     after: int
     slot: int
 

@@ -308,15 +308,15 @@ class GraphRobot:
             return
         if self._grant is not None:
             return
-        if answer.node_answer is NodeVerdict.STOP:
+        if answer.node_verdict is NodeVerdict.STOP:
             self.stops_told += self._answer is not NodeVerdict.STOP
             self._answer = NodeVerdict.STOP
             return
         if answer.after not in self.site.graph.neighbours[here.node] or answer.after == here.behind:
             return
         # Sent elsewhere, the robot plans anew from the node to which the edge leads (row G16).
-        self.sent_elsewhere += answer.node_answer is NodeVerdict.ANOTHER
-        self._answer = answer.node_answer
+        self.sent_elsewhere += answer.node_verdict is NodeVerdict.ANOTHER
+        self._answer = answer.node_verdict
         self._grant = _Grant(here.node, answer.after, answer.slot, now_us + REDEEM_US)
 
     # --- rights ------------------------------------------------------------------------------------------------

@@ -122,7 +122,7 @@ class GrantsAreTold(Rule):
         signal = self._signals.get(word.robot)
         if signal is None or signal.node != word.node:
             self.find(event, (word.sender, word.robot), f"node {word.node} answers a robot that did not ask it")
-        if word.node_answer is not NodeVerdict.STOP:
+        if word.node_verdict is not NodeVerdict.STOP:
             self._untold[word.node, word.after, word.robot] = event.time_us
         elif word.after == NO_NODE:
             self.find(event, (word.sender,), "a stop for no edge")
