@@ -19,7 +19,7 @@ from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
 from onboard.kinds.graph.agents import HostFactory
-from onboard.kinds.graph.desk import DeskFactory as OrderDeskFactory
+from onboard.kinds.graph.desk import DeskFactory as VisitDeskFactory
 from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
 from onboard.kinds.graph.robot import RobotFactory as GraphRobotFactory
 from onboard.kinds.graph.site import FactoryGraph
@@ -54,7 +54,7 @@ _SYSTEMS: dict[str, System] = {
             {
                 KindCode.VEHICLE: GraphRobotFactory(),
                 KindCode.NODE: HostFactory(),
-                KindCode.DESK: OrderDeskFactory(),
+                KindCode.DESK: VisitDeskFactory(),
             },
             GRAPH_MESSAGES,
         ),
