@@ -6,6 +6,7 @@ from pathlib import Path
 
 from bus_sim.faults.injection import AnyFault
 from bus_sim.systems.cell.run import run_cell
+from bus_sim.systems.mapd.run import run_mapd
 from bus_sim.systems.terminal.show import run_terminal
 from onboard.core.site import Site
 
@@ -36,4 +37,5 @@ Runner = Callable[[Site, SystemOptions], int]
 RUNNERS: dict[str, Runner] = {
     "terminal": run_terminal,
     "cell": run_cell,
+    "mapd": run_mapd,
 }

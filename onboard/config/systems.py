@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from onboard.config.cell import read_cell
+from onboard.config.mapd import read_mapd
 from onboard.config.reader import Table
 from onboard.config.terminal import read_terminal
 from onboard.core.site import Site
@@ -24,4 +25,5 @@ class Common(NamedTuple):
 READERS: dict[str, Callable[[Table, Common], Site]] = {
     "terminal": read_terminal,
     "cell": read_cell,
+    "mapd": read_mapd,
 }
