@@ -8,6 +8,7 @@ from pathlib import Path
 
 from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
+from bus_sim.certify.command import add_certify, run_certify
 from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
@@ -78,6 +79,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_compare(commands)
     add_campaign(commands)
     add_import(commands)
+    add_certify(commands)
     return parser
 
 
@@ -246,6 +248,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "compare": run_compare,
     "campaign": run_campaign_command,
     "import": run_import,
+    "certify": run_certify,
 }
 
 

@@ -8,6 +8,7 @@ from bus_sim.faults.injection import AnyFault
 from bus_sim.systems.cell.run import run_cell
 from bus_sim.systems.mapd.run import run_mapd
 from bus_sim.systems.terminal.show import run_terminal
+from bus_sim.systems.turning.run import run_turning
 from onboard.core.site import Site
 
 
@@ -38,4 +39,5 @@ RUNNERS: dict[str, Runner] = {
     "terminal": run_terminal,
     "cell": run_cell,
     "mapd": run_mapd,
+    "turning": run_turning,
 }

@@ -8,9 +8,7 @@ from onboard.config.problems import nearest
 from onboard.config.reader import Table
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
-from onboard.kinds.mapd.auction import Task
-from onboard.kinds.mapd.floor import FAR, FREE, Floor, Line, grid_floor, lasting_rests, network_floor
-from onboard.kinds.mapd.site import Mapd
+from onboard.kinds.mapd.site import FAR, FREE, Floor, Line, Mapd, Task, grid_floor, lasting_rests, network_floor
 
 if TYPE_CHECKING:
     from onboard.config.systems import Common

@@ -11,6 +11,7 @@ from onboard.config.cell import read_cell
 from onboard.config.mapd import read_mapd
 from onboard.config.reader import Table
 from onboard.config.terminal import read_terminal
+from onboard.config.turning import read_turning
 from onboard.core.site import Site
 
 
@@ -26,4 +27,5 @@ READERS: dict[str, Callable[[Table, Common], Site]] = {
     "terminal": read_terminal,
     "cell": read_cell,
     "mapd": read_mapd,
+    "turning": read_turning,
 }

@@ -22,6 +22,7 @@ from onboard.core.messages import (
     DoorState,
     Message,
     Progress,
+    Reference,
     ShuttleState,
     TokenGrant,
     TokenHeld,
@@ -158,7 +159,7 @@ class LivePicture:
         return {
             "now_us": view.now_us,
             "machines": {node: self._machine(node) for node in self.site.machines},
-            "cars": {station: str(car.number) for station, car in view.places_taken().items()},
+            "cars": {station: _car(car) for station, car in view.places_taken().items()},
             "calls": [self._call(record) for record in list(view.calls.values())[-CALLS_SHOWN:]],
             "tasks": self._open_tasks(),
             "events": [[time_us, text] for time_us, text in list(view.events)[-EVENTS_SHOWN:]],
@@ -183,7 +184,7 @@ class LivePicture:
             "speed_mm_s": speed_mm_s,
             "since_us": since_us,
             "state": state.name.lower() if state is not None else "silent",
-            "car": str(aboard.number) if aboard is not None else None,
+            "car": _car(aboard) if aboard is not None else None,
             "plan": self._plan(node),
             "holds": self._held(node),
         }
@@ -226,7 +227,7 @@ class LivePicture:
             "by": view.name(call.sender),
             "what": call.operation.name.lower().replace("_", " "),
             "task": f"{call.task.origin}.{call.task.number}",
-            "car": str(call.car.number) if call.car.number else None,
+            "car": _car(call.car) if call.car.number else None,
             "from": self._place(call.from_station),
             "to": self._place(call.to_station),
             "opened_us": record.opened_us,
@@ -280,3 +281,8 @@ class LivePicture:
         """The time of the log nearest to now at which bus time reads ``bus_ms``."""
         assert self._offset_us is not None
         return from_bus_ms(bus_ms, self.view.now_us - self._offset_us) + self._offset_us
+
+
+def _car(car: Reference) -> str:
+    """A car as its ticket names it: who named it, and the number there."""
+    return f"{car.origin}.{car.number}"

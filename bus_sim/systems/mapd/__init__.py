@@ -1,1 +1,1 @@
-"""Pick-up and delivery on a grid: the same decisions without a bus, the plant and the picture."""
+"""Pick-up and delivery: the robots' own decisions step by step, without a bus, and how a run of that is shown."""

@@ -78,7 +78,7 @@ export class Stage {
     if (track.kind === "spur") {
       const [alley, index] = track.joins[0];
       const spot = this.at(alley, index);
-      return { x: spot.x, y: spot.y - this.floor * 0.3 };
+      return { x: spot.x, y: spot.y - this.floor * 0.3 * Math.max(0, Math.min(1, position)) };
     }
     const spot = this.at(track.number, Math.min(position, track.length + 1));
     const lift = this.liftAt(track, machine.index);
@@ -154,7 +154,7 @@ export class Stage {
     } else {
       return;
     }
-    if (car && cell > 17 && !bay) this.text(pen, car, box, css("--card"));
+    if (car && cell > 17 && !bay) this.text(pen, car.split(".")[1], box, css("--card"));
     this.hits.push({ ...box, what: bay ? "machine" : "place", id: bay ? bay.node : number, car });
   }
 
@@ -176,7 +176,7 @@ export class Stage {
       pen.arc(box.x + box.w + 4, outside, 3, 0, 7);
       pen.fill();
     }
-    if (this.cell > 17) this.text(pen, car || "I/O", box, car ? css("--card") : css("--bay"));
+    if (this.cell > 17) this.text(pen, car ? car.split(".")[1] : "I/O", box, car ? css("--card") : css("--bay"));
   }
 
   drawDoor(pen, box, y, state) {
