@@ -22,6 +22,10 @@ from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.vehicle import VehicleFactory
+from onboard.kinds.turning.desk import DeskFactory as OrderDeskFactory
+from onboard.kinds.turning.machine import LatheFactory
+from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
+from onboard.kinds.turning.site import Turning
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,11 @@ _SYSTEMS: dict[str, System] = {
             TERMINAL_MESSAGES,
         ),
         System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: GoalDeskFactory()}, CELL_MESSAGES),
+        System(
+            Turning.system,
+            {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
+            TURNING_MESSAGES,
+        ),
     )
 }
 
