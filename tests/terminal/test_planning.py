@@ -17,7 +17,7 @@ from onboard.kinds.terminal.search import Job, Search
 from onboard.kinds.terminal.site import StationKind
 from onboard.kinds.terminal.traffic import Traffic
 from onboard.kinds.terminal.vehicle import terminal
-from tests.terminal.fig3 import A1, S1, S2, fig3, plan_of
+from tests.terminal.fig3 import A1, PRINTED, S1, S2, fig3, plan_of
 
 SITE = terminal(find_site("terminal"))
 BY_NAME = {name: entity.number for name, entity in SITE.by_name.items()}
@@ -82,12 +82,8 @@ def test_m09_the_search_makes_the_printed_plan() -> None:
     search = Search(site, Traffic(site), 11, 10)
     found = search.best(A1, 10, Job(3, Reference(1, 1), S2, S1), version=1)
     assert found is not None and not found.pushes
-    assert [(step.action, step.entity, step.end) for step in found.plan.steps] == [
-        (step.action, step.entity, end)
-        for step, end in zip(
-            plan_of(site, 11).steps, [40, 50, 55, 67, 77, 79, 81, 83, 93, 113, 119, 125, 127, 129, 131], strict=True
-        )
-    ]
+    steps = [(step.action, step.entity, step.end) for step in found.plan.steps]
+    assert steps == [(action, entity, end) for action, entity, _, end in PRINTED]
 
 
 def test_m21_m25_of_several_routes_the_one_that_ends_first_is_taken() -> None:
