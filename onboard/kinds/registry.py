@@ -18,6 +18,7 @@ from onboard.kinds.cell.desk import DeskFactory as GoalDeskFactory
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
+from onboard.kinds.mapd.site import Mapd
 from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.terminal.site import Terminal
@@ -55,6 +56,8 @@ _SYSTEMS: dict[str, System] = {
             {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
             TURNING_MESSAGES,
         ),
+        # Played without a bus so far (docs/import.md): no machine of it has a controller yet.
+        System(Mapd.system, {}),
     )
 }
 

@@ -7,6 +7,7 @@ import pytest
 
 import bus_sim
 from bus_sim.cli import main
+from onboard.cli import main as onboard_main
 from onboard.config.site import load_site
 from onboard.kinds.mapd.site import Mapd
 
@@ -164,6 +165,14 @@ home = "2,0"
 endpoints = ["0,0", "0,2", "2,2"]
 tasks = [[0, "0,0", "2,2"]]
 """
+MACHINE = """
+[machine]
+name = "R1"
+site = "s.toml"
+[fleet_bus]
+interface = "socketcan"
+channel = "can0"
+"""
 SITE_MISTAKES = {
     ('home = "2,0"', 'home = "1,1"'): 'robots[0].home = "1,1": no free cell of the floor',
     ('"r.e"]', '"r.e."]'): 'map.rows[2] = "r.e.": 4 cells; write 3',
@@ -189,3 +198,32 @@ def test_a_mistake_in_a_site_file_gets_a_line(
     capsys.readouterr()
     assert main(["run", str(path)]) == 2
     assert SITE_MISTAKES[change] in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["run", "SITE", "--fault", "crash:target=R1,at_s=3"], "--fault: s is played without a bus"),
+        (["campaign", "SITE"], "a mapd, and campaigns bring cars; name a car park"),
+        (["compare", "SITE"], "a mapd, and only car parks are compared; name a car park"),
+    ],
+)
+def test_what_such_a_site_cannot_do_is_said_in_one_line(
+    arguments: list[str], wanted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(SITE)
+    assert main([str(path) if word == "SITE" else word for word in arguments]) == 2
+    said = capsys.readouterr().err
+    assert wanted in said
+    assert said.count("\n") == 1
+
+
+def test_a_machine_of_such_a_site_says_that_it_has_no_controller(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "s.toml").write_text(SITE)
+    machine = tmp_path / "machine.toml"
+    machine.write_text(MACHINE)
+    assert onboard_main(["--machine", str(machine)]) == 2
+    assert "R1: a VEHICLE of a mapd has no controller yet" in capsys.readouterr().err
