@@ -104,6 +104,11 @@ MISTAKES = {
         "<vehicle name='V' length='1' maxVelocity='1'/></model>",
         ':2: path destinationPoint = "B": names nothing in the model; ',
     ),
+    "arrow.xml": (
+        "<model><point name='A>'/><path name='P' sourcePoint='A>' destinationPoint='A>' length='1'/>\n"
+        "<vehicle name='V' length='1' maxVelocity='1'/></model>",
+        ':1: point name = "A>": has a >, which joins names here; name it without >',
+    ),
     "alias.yaml": ("a: &x 1\nb: *x\n", ":2: an alias (*); write the value itself"),
     "cut.yaml": ("levels: [", ":1: not usable YAML: "),
     "none.yaml": ("levels: {}\n", ":1: levels: no levels; give a .building.yaml of the traffic editor"),
@@ -127,6 +132,26 @@ def test_a_mistake_in_a_file_gets_a_line_and_leaves_no_site(
         assert any(line.startswith(f"{tmp_path / name}{wanted}") for line in lines), lines
     assert all(line.startswith(str(tmp_path / name)) and "; " in line for line in lines), lines
     assert sorted(one.name for one in tmp_path.iterdir()) == [name]
+
+
+def test_a_mistake_leaves_a_site_file_of_before_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "bad.map").write_text("...\n..\n")
+    (tmp_path / "site.toml").write_text("mine")
+    assert main(["import", str(tmp_path / "bad.map"), "-o", str(tmp_path / "site.toml")]) == 2
+    assert (tmp_path / "site.toml").read_text() == "mine"
+
+
+def test_where_the_site_cannot_be_written_nothing_is_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "site.toml").mkdir()
+    assert main(["import", str(RANDOM), "-o", str(tmp_path / "site.toml")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    assert [one.name for one in tmp_path.iterdir()] == ["site.toml"]
+
+
+def test_a_file_name_that_no_site_may_have_is_made_fit(tmp_path: Path) -> None:
+    strange = tmp_path / f"my map (1) {'x' * 40}.map"
+    strange.write_text(RANDOM.read_text())
+    assert imported(tmp_path, strange).name == f"my_map_1_{'x' * 23}"
 
 
 @pytest.mark.parametrize(
