@@ -63,6 +63,11 @@ def machine_name(name: str, taken: Sequence[str]) -> str:
     return found
 
 
+def site_name(name: str) -> str:
+    """A name that a site may have: letters, digits, dots, - and _, at most 32, the first a letter or digit."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name).lstrip("_.-")[:32] or "site"
+
+
 def draw_tasks(endpoints: Sequence[str], count: int, every: int, seed: int) -> list[TaskLine]:
     """Tasks between two different endpoints drawn evenly, one released every ``every`` steps."""
     rng = random.Random(seed)
@@ -77,7 +82,7 @@ def site_text(draft: Draft) -> str:
     """The site file."""
     lines = [f"# Imported from {', '.join(draft.sources)}.", *(f"# {one}" for one in draft.meanings)]
     lines += [f"# Not carried over: {element}: {why}" for element, why in draft.losses]
-    lines += ["", "[site]", f"name = {quoted(draft.name)}", 'system = "mapd"', ""]
+    lines += ["", "[site]", f"name = {quoted(site_name(draft.name))}", 'system = "mapd"', ""]
     lines += ["[steps]", f"step_ms = {draft.step_ms}", "", *_floor(draft)]
     lines += ["", "[[desks]]", 'name = "Desk"', "node = 1"]
     for node, (name, home) in enumerate(draft.robots, start=11):

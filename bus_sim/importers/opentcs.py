@@ -27,6 +27,9 @@ class Model:
         self.locations = self._named(root, "location")
         self.types = self._named(root, "locationType")
         self.blocks = self._named(root, "block")
+        for name, point in self.points.items():
+            if ">" in name:
+                problems.add(point.line, "point name", name, "has a >, which joins names here", "name it without >")
         for path in self.paths.values():
             for end in ("sourcePoint", "destinationPoint"):
                 self.refer(path, end, self.points)

@@ -7,6 +7,7 @@ import pytest
 
 import bus_sim
 from bus_sim.cli import main
+from onboard.cli import main as onboard_main
 from onboard.config.site import load_site
 from onboard.kinds.mapd.site import Mapd
 
@@ -103,6 +104,11 @@ MISTAKES = {
         "<vehicle name='V' length='1' maxVelocity='1'/></model>",
         ':2: path destinationPoint = "B": names nothing in the model; ',
     ),
+    "arrow.xml": (
+        "<model><point name='A>'/><path name='P' sourcePoint='A>' destinationPoint='A>' length='1'/>\n"
+        "<vehicle name='V' length='1' maxVelocity='1'/></model>",
+        ':1: point name = "A>": has a >, which joins names here; name it without >',
+    ),
     "alias.yaml": ("a: &x 1\nb: *x\n", ":2: an alias (*); write the value itself"),
     "cut.yaml": ("levels: [", ":1: not usable YAML: "),
     "none.yaml": ("levels: {}\n", ":1: levels: no levels; give a .building.yaml of the traffic editor"),
@@ -126,6 +132,26 @@ def test_a_mistake_in_a_file_gets_a_line_and_leaves_no_site(
         assert any(line.startswith(f"{tmp_path / name}{wanted}") for line in lines), lines
     assert all(line.startswith(str(tmp_path / name)) and "; " in line for line in lines), lines
     assert sorted(one.name for one in tmp_path.iterdir()) == [name]
+
+
+def test_a_mistake_leaves_a_site_file_of_before_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "bad.map").write_text("...\n..\n")
+    (tmp_path / "site.toml").write_text("mine")
+    assert main(["import", str(tmp_path / "bad.map"), "-o", str(tmp_path / "site.toml")]) == 2
+    assert (tmp_path / "site.toml").read_text() == "mine"
+
+
+def test_where_the_site_cannot_be_written_nothing_is_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "site.toml").mkdir()
+    assert main(["import", str(RANDOM), "-o", str(tmp_path / "site.toml")]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    assert [one.name for one in tmp_path.iterdir()] == ["site.toml"]
+
+
+def test_a_file_name_that_no_site_may_have_is_made_fit(tmp_path: Path) -> None:
+    strange = tmp_path / f"my map (1) {'x' * 40}.map"
+    strange.write_text(RANDOM.read_text())
+    assert imported(tmp_path, strange).name == f"my_map_1_{'x' * 23}"
 
 
 @pytest.mark.parametrize(
@@ -164,6 +190,14 @@ home = "2,0"
 endpoints = ["0,0", "0,2", "2,2"]
 tasks = [[0, "0,0", "2,2"]]
 """
+MACHINE = """
+[machine]
+name = "R1"
+site = "s.toml"
+[fleet_bus]
+interface = "socketcan"
+channel = "can0"
+"""
 SITE_MISTAKES = {
     ('home = "2,0"', 'home = "1,1"'): 'robots[0].home = "1,1": no free cell of the floor',
     ('"r.e"]', '"r.e."]'): 'map.rows[2] = "r.e.": 4 cells; write 3',
@@ -189,3 +223,32 @@ def test_a_mistake_in_a_site_file_gets_a_line(
     capsys.readouterr()
     assert main(["run", str(path)]) == 2
     assert SITE_MISTAKES[change] in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "wanted"),
+    [
+        (["run", "SITE", "--fault", "crash:target=R1,at_s=3"], "--fault: s is played without a bus"),
+        (["campaign", "SITE"], "a mapd, and campaigns bring cars; name a car park"),
+        (["compare", "SITE"], "a mapd, and only car parks are compared; name a car park"),
+    ],
+)
+def test_what_such_a_site_cannot_do_is_said_in_one_line(
+    arguments: list[str], wanted: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(SITE)
+    assert main([str(path) if word == "SITE" else word for word in arguments]) == 2
+    said = capsys.readouterr().err
+    assert wanted in said
+    assert said.count("\n") == 1
+
+
+def test_a_machine_of_such_a_site_says_that_it_has_no_controller(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "s.toml").write_text(SITE)
+    machine = tmp_path / "machine.toml"
+    machine.write_text(MACHINE)
+    assert onboard_main(["--machine", str(machine)]) == 2
+    assert "R1: a VEHICLE of a mapd has no controller yet" in capsys.readouterr().err

@@ -4,6 +4,7 @@ import json
 import sys
 from typing import TYPE_CHECKING
 
+from bus_sim.demand import DemandError
 from bus_sim.systems.mapd.steps import Day
 from onboard.core.site import Site
 from onboard.kinds.mapd.site import Mapd
@@ -16,8 +17,13 @@ MOST_STEPS = 200_000
 
 
 def run_mapd(site: Site, options: "SystemOptions") -> int:
-    """Play the site's tasks; 1 where one was not served. The judge raises where robots met."""
+    """Play the site's tasks; 1 where one was not served. The judge raises where robots met.
+
+    Raises ``DemandError`` for a fault asked for.
+    """
     assert isinstance(site, Mapd)
+    if options.faults:
+        raise DemandError(f"--fault: {site.name} is played without a bus, so nothing can fail on it; leave it out")
     limit = MOST_STEPS if options.limit_s is None else round(options.limit_s * 1000 / site.step_ms)
     day = Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run(limit)
     figures: dict[str, object] = {
