@@ -101,7 +101,7 @@ LAYERS: dict[str, Layer] = {
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
         ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
-        ("numpy", "ortools", "rich"),
+        ("distributed", "numpy", "ortools", "rich"),
         not_stdlib=frozenset({"threading"}),
     ),
     "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
@@ -112,6 +112,7 @@ EXCLUSIVE: dict[str, str] = {
     "aiomqtt": "onboard/io/mqtt.py",
     "can": "onboard/io/pycan.py",
     "cantools": "onboard/wire/dbc_file.py",
+    "distributed": "bus_sim/campaign/engine.py",
     "ortools": "bus_sim/compare/optimum.py",
 }
 
