@@ -16,9 +16,11 @@ from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
     Award,
     Bid,
+    Blocked,
     BusTime,
     CallForProposals,
     CarAt,
+    Clear,
     Diagnostic,
     EmergencyStop,
     Heartbeat,
@@ -77,6 +79,11 @@ class Holon:
         self.tokens.genesis_counts = self._has_past
         self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
+        for entry in entries:
+            if entry.get("record") in ("blocked", "clear"):
+                word = Blocked if entry["record"] == "blocked" else Clear
+                told = word(machine.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
+                self.mirror.on_word(told, 0)
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
@@ -112,6 +119,8 @@ class Holon:
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self._on_emergency_stop,
+            Blocked: self._on_word,
+            Clear: self._on_word,
         }
 
     # --- events in ---------------------------------------------------------------------------------------------
@@ -339,7 +348,7 @@ class Holon:
                 f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
                 "a person must regenerate its tokens"
             )
-        effects = self.behaviour.statements(now_us)
+        effects = self.behaviour.statements(now_us) + self._blocked_again()
         known = self.mirror.peers.get(request.sender)
         if (
             request.whom == NOBODY
@@ -359,6 +368,18 @@ class Holon:
         if before == 0 or request.sender not in self.site.machines:
             return False
         return not self._has_past or is_newer(before, self.boot, 8)
+
+    def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
+        """A segment is blocked, or clear again; what I am steward of is in my journal."""
+        is_mine = self.site.stewards.get(word.track) == self.node_id
+        if not self.mirror.on_word(word, now_us) or not is_mine:
+            return []
+        record = "blocked" if isinstance(word, Blocked) else "clear"
+        return [Record({"record": record, "track": word.track, "index": word.index, "reason": int(word.reason)})]
+
+    def _blocked_again(self) -> list[Effect]:
+        tracks = [track for track, steward in self.site.stewards.items() if steward == self.node_id]
+        return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")

@@ -177,6 +177,8 @@ class GoingAround:
         windows = itinerary_windows(self.fleet.site, told, now_us, steps[0].begin_us)
         slots = {window.segment for window in windows}
         slots |= {gate(step.track) for step in steps if step.action is LegAction.RIDE}
+        if any(slot in obstacles.blocked for slot in slots.difference(self.carriage.occupied())):
+            return True
         return any(obstacles.is_at(slot) and not tokens.holds(segment_token(slot)) for slot in slots)
 
     def _say_again(self, now_us: int) -> list[Effect]:

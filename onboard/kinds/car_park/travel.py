@@ -246,7 +246,11 @@ class Carriage:
                 return None, reason
         reach = None
         reason = Reason.NONE
+        blocked = self.fleet.mirror.obstacles.blocked
         for index, slots in zip(ahead, self.axis.rights(ahead), strict=True):
+            if reach is not None and any(slot in blocked for slot in slots):
+                reason = Reason.IMPOSSIBLE
+                break
             verdicts = [authorised(state, slot) for slot in slots]
             reason = next((why for allowed, why in verdicts if not allowed), Reason.NONE)
             if reason is not Reason.NONE:
