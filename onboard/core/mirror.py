@@ -210,7 +210,7 @@ class Mirror:
         return {node for node, peer in self.peers.items() if peer.heard_at_us >= limit_us}
 
     def digest(self) -> int:
-        """16 bits over firm itineraries (node, version), cars (number, station) and blocked segments: equal where all agree."""
+        """16 bits over firm itineraries (node, version), cars (number, station) and blocked segments."""
         if self._digest is None:
             words = [node << 8 | it.version for node, it in sorted(self.itineraries.items())]
             for car, record in sorted(self.cars.items()):

@@ -43,6 +43,7 @@ class GoingAround:
     #: Tasks given back, with why, how often to say so still, and when next.
     given_back: dict[Reference, tuple[Reason, int, int]] = field(default_factory=dict)
     _seen: int = 0
+    _admissions: int = 0
     _since_us: int | None = None
     _retry_at_us: int | None = None
 
@@ -61,6 +62,9 @@ class GoingAround:
     def advance(self, now_us: int) -> list[Effect]:
         """Look whether the plan leads through an obstacle, where anything about them has changed."""
         effects = self._say_again(now_us)
+        if self.fleet.admissions != self._admissions:
+            self._admissions = self.fleet.admissions
+            self._since_us = self._retry_at_us = now_us
         changes = self.fleet.mirror.obstacles.changes
         if changes != self._seen:
             self._seen = changes
