@@ -11,10 +11,20 @@ from enum import Enum
 
 from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
+from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.lifts import gate, platform
-from onboard.core.messages import DriveOrder, DriveState, Itinerary, Leg, Message, PlatformState, Progress, TaskReport
+from onboard.core.messages import (
+    Award,
+    DriveOrder,
+    DriveState,
+    Itinerary,
+    Leg,
+    Message,
+    PlatformState,
+    Progress,
+    TaskReport,
+)
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
@@ -136,7 +146,14 @@ class Lift:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """As steward of alleys: awards tell who may fetch a stored car, and a car given to me is stated anew."""
-        return self.stewardship.hear(message)
+        effects = self.stewardship.hear(message)
+        if not isinstance(message, Award) or message.result is not CallResult.AWARDED:
+            return effects
+        known = self.fleet.negotiation.knows(message.sender, message.call)
+        if message.winner == self.fleet.node_id and not known:
+            # Of a life before, or of before a sleep: the ride stands in its robot's itinerary, a word ends the repeats.
+            effects.append(Send(TaskReport(self.fleet.node_id, message.task, TaskPhase.AWARDED, 0, Reason.NONE)))
+        return effects
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An option is kept while it stands, and never driven for: only the robots' firm itineraries move the lift.
