@@ -60,12 +60,12 @@ clean: ## remove the environment and everything generated
 # A stamp is newer than the pyproject.toml that it was installed from.
 $(VENV)/.run: pyproject.toml | $(VENV)/.made
 	@echo "installing into $(VENV): the program and what make run needs"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim,web]'
 	@touch $@
 
 $(VENV)/.test: pyproject.toml | $(VENV)/.made
 	@echo "installing into $(VENV): the program and what make test needs"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim,mqtt,test]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim,web,mqtt,test]'
 	@touch $@ $(VENV)/.run
 
 $(VENV)/.made:

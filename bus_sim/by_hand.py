@@ -22,31 +22,62 @@ KEYS = "keys: i a car comes in, o the car that came first is wanted out, q ends 
 _ASKED = frozenset({State.AT_DESK, State.AWAITING_DOOR, State.DRIVING_OUT, State.GONE})
 
 
+class Hand:
+    """What a person does to the street: lets a car come, and has one asked for."""
+
+    def __init__(self, street: Street, seed: int) -> None:
+        self._street = street
+        self._seed = seed
+        self._came = 0
+
+    def car_in(self) -> str:
+        """A car comes now; its name."""
+        self._came += 1
+        now_us = round(asyncio.get_running_loop().time() * 1_000_000)
+        car = random_car(f"by hand {self._came}", self._seed)
+        self._street.add(Stay(now_us, None, car))
+        return car.name
+
+    def car_out(self) -> str | None:
+        """The owner of the car that came first, of those not asked for yet, comes back: now, or once it is parked."""
+        wanted = next((one for one in self._street.customers if one.state not in _ASKED and not one.is_leaving), None)
+        if wanted is None:
+            return None
+        wanted.leave_now()
+        return wanted.stay.car.name
+
+
 class ByHand:
     """Turns keys into customers."""
 
-    def __init__(self, street: Street, seed: int, console: Console, descriptor: int | None = None) -> None:
+    def __init__(self, street: Street, seed: int, console: Console, *, ends_with_pipe: bool = True) -> None:
+        """Without ``ends_with_pipe`` only q ends the run: cars may come by other ways than by keys."""
+        self._ends_with_pipe = ends_with_pipe
         self._is_quit = False
         self._is_closed = False
         self._street = street
-        self._seed = seed
+        self._hand = Hand(street, seed)
         self._console = console
-        self._in = sys.stdin.fileno() if descriptor is None else descriptor
+        self._in = sys.stdin.fileno()
         self._terminal: list[Any] | None = None
-        self._came = 0
         self._acts = {"i": self._car_in, "o": self._car_out, "q": self._quit}
 
     @property
     def is_over(self) -> bool:
         """Whether somebody pressed q, or the pipe has ended and all that it asked for is done."""
-        return self._is_quit or (self._is_closed and self._street.is_over)
+        return self._is_quit or (self._is_closed and self._ends_with_pipe and self._street.is_over)
 
     def __enter__(self) -> Self:
         if os.isatty(self._in):
             self._terminal = termios.tcgetattr(self._in)
             tty.setcbreak(self._in)
         self._console.print(KEYS, highlight=False, soft_wrap=True)
-        asyncio.get_running_loop().add_reader(self._in, self._read)
+        try:
+            asyncio.get_running_loop().add_reader(self._in, self._read)
+        except PermissionError:
+            # A file, or nothing at all: there is no waiting for it, all of it is there.
+            while not self._is_closed:
+                self._read()
         return self
 
     def __exit__(
@@ -67,17 +98,11 @@ class ByHand:
                 act()
 
     def _car_in(self) -> None:
-        self._came += 1
-        now_us = round(asyncio.get_running_loop().time() * 1_000_000)
-        self._street.add(Stay(now_us, None, random_car(f"by hand {self._came}", self._seed)))
+        self._hand.car_in()
 
     def _car_out(self) -> None:
-        """The owner of the car that came first, of those not asked for yet, comes back: now, or once it is parked."""
-        wanted = next((one for one in self._street.customers if one.state not in _ASKED and not one.is_leaving), None)
-        if wanted is None:
+        if self._hand.car_out() is None:
             self._console.print("no car is inside that nobody has asked for", highlight=False)
-        else:
-            wanted.leave_now()
 
     def _quit(self) -> None:
         self._is_quit = True

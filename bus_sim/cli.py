@@ -8,6 +8,7 @@ from pathlib import Path
 
 from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
+from bus_sim.certify.command import add_certify, run_certify
 from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
@@ -25,6 +26,8 @@ from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError
+from onboard.web.address import WebError
+from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.site_dbc import site_dbc
 
 HELP = """\
@@ -74,6 +77,7 @@ def build_parser() -> argparse.ArgumentParser:
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     add_compare(commands)
     add_campaign(commands)
+    add_certify(commands)
     return parser
 
 
@@ -147,6 +151,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     how.add_argument("--plant-bug", metavar="NAME", help=argparse.SUPPRESS)
     out = run.add_argument_group("what comes out")
     out.add_argument(
+        "--web",
+        nargs="?",
+        const="127.0.0.1:8080",
+        metavar="[HOST:]PORT",
+        help="serve a live picture of the site (default: 127.0.0.1:8080); other hosts need the token that is printed",
+    )
+    out.add_argument("--no-web", action="store_true", help="without a site: do not serve the picture")
+    out.add_argument(
         "--trace",
         type=Path,
         default=Path("trace.log"),
@@ -189,6 +201,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return COMMANDS[args.command](args)
     except (
         ConfigError,
+        WebError,
         DemandError,
         SiteNotFoundError,
         BusOpenError,
@@ -232,6 +245,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "dbc": _dbc,
     "compare": run_compare,
     "campaign": run_campaign_command,
+    "certify": run_certify,
 }
 
 
@@ -337,7 +351,9 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
             f"--without {args.without[0]}: a window's warm-up is hurried, and a controller in another process lives at "
             "the clock's pace; leave out --hour and --window"
         )
-    if args.speed is None:
+    if args.speed is None and args.web is not None and window is None and not live:
+        speed = HAND_SPEED
+    elif args.speed is None:
         speed = 1.0 if live else WINDOW_SPEED if window is not None else HAND_SPEED if args.by_hand else None
     return DayOptions(
         sessions=args.sessions,
@@ -359,7 +375,18 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
         serve=args.serve or (ANY_PORT if processes is not None else None),
         buses=tuple(args.bus),
         processes=processes,
+        web=_web(args),
     )
+
+
+def _web(args: argparse.Namespace) -> str | None:
+    """Where the picture is served: as asked for, and on any port where nothing at all was asked for."""
+    if args.web is not None:
+        if not is_web_installed():
+            raise OptionError("--web: its libraries are missing; pip install 'onboard-fleet[web]'")
+        return str(args.web)
+    plain = args.site is None and not args.no_web and not args.processes and args.speed is None
+    return "127.0.0.1:0" if plain and is_web_installed() else None
 
 
 if __name__ == "__main__":

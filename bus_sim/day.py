@@ -1,8 +1,9 @@
 """A day on a site, or a window of it: the demand is chosen, the run is made and shown, and its summary told."""
 
 import asyncio
+import signal
 import time
-from contextlib import AsyncExitStack
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -65,6 +66,8 @@ class DayOptions:
     processes: ProcessPlan | None = None
     #: Cars come and go by keys of the terminal, and nobody comes otherwise.
     by_hand: bool = False
+    #: Where the page is served, PORT or HOST:PORT; None for no page.
+    web: str | None = None
     quiet: bool = False
 
 
@@ -153,6 +156,7 @@ class _Day:
         self._indicators = Indicators(site)
         self._simulation = self._build(site)
         self._hand: ByHand | None = None
+        self._is_interrupted = False
         plan = options.processes
         self._processes = (
             ProcessFleet(self._simulation, plan, options.without, self._console) if plan is not None else None
@@ -192,12 +196,20 @@ class _Day:
         show = TerminalShow(simulation.site, simulation.view, clock, lambda: _figures(simulation), console)
         async with AsyncExitStack() as stack:
             stack.callback(simulation.close)
+            if self._processes is None:
+                # Ctrl-C ends a run as its end does: with its figures, and a log that is whole.
+                self._loop.add_signal_handler(signal.SIGINT, self._interrupt)
+                stack.callback(self._loop.remove_signal_handler, signal.SIGINT)
+            if options.web is not None:
+                await stack.enter_async_context(self._page(options.web))
             if self._window is None:
                 await stack.enter_async_context(outside)
                 simulation.start()
                 stack.enter_context(show)
                 if options.by_hand:
-                    self._hand = stack.enter_context(ByHand(simulation.plant.street, options.seed, console))
+                    by_pipe = options.web is None
+                    hand = ByHand(simulation.plant.street, options.seed, console, ends_with_pipe=by_pipe)
+                    self._hand = stack.enter_context(hand)
                 if self._processes is not None:
                     assert outside.served is not None, "the options with processes name an address"
                     stack.push_async_callback(self._processes.stop)
@@ -216,6 +228,11 @@ class _Day:
             console.print(line, highlight=False, soft_wrap=True)
         return summary
 
+    def _page(self, where: str) -> AbstractAsyncContextManager[object]:
+        from bus_sim.web import Page, SimulatedSource  # noqa: PLC0415  # its libraries are an extra
+
+        return Page(SimulatedSource(self._simulation, self._zero), where, self._console)
+
     async def _until(self, limit_us: int, show: TerminalShow, *, or_over: bool = False) -> None:
         street = self._simulation.plant.street
         await run_until(
@@ -226,10 +243,14 @@ class _Day:
             lambda: show.update(self._loop.now_us()),
         )
 
+    def _interrupt(self) -> None:
+        self._is_interrupted = True
+        self._loop.resume()
+
     def _is_ended(self) -> bool:
         """Whether a person, or a process that died, has ended the run."""
         ended = [one.is_over for one in (self._hand, self._processes) if one is not None]
-        return any(ended)
+        return self._is_interrupted or any(ended)
 
     async def _to_the_end(self, show: TerminalShow) -> None:
         if self._options.limit_s is not None:

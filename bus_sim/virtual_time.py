@@ -86,6 +86,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         self._cancelled_timers = 0
         self._jobs_outside = 0
         self._stop_asked = False
+        self._paused = False
         selector = _Selector()
         super().__init__(selector)
         # asyncio's own queue of ready handles: there is no public way to ask whether something is ready.
@@ -117,6 +118,16 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         self._anchor = (time.monotonic(), self._now_us)
         # What is due is looked at again under the new pace.
         self._stop_asked = True
+
+    def pause(self) -> None:
+        """Stand still until ``resume``: no timer fires, sockets are served. The moment is that of the next turn."""
+        self._paused = True
+        self._stop_asked = True
+
+    def resume(self) -> None:
+        """Go on from where the clock stands, at the pace that was set."""
+        self._paused = False
+        self._anchor = (time.monotonic(), self._now_us)
 
     def at_us(self, when_us: int, callback: Callable[[int], None]) -> None:
         """See ``Clock``; about twice as fast as ``call_at``."""
@@ -194,6 +205,8 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         while timers and (head := timers[0][2]) is not None and head.cancelled():
             heapq.heappop(timers)
             self._cancelled_timers -= 1
+        if self._paused:
+            return selector.poll(None)
         if self.pace is not None:
             return self._turn_paced(selector, self.pace)
         events = self._look_outside(selector)

@@ -17,6 +17,7 @@ from onboard.io.journal import FileJournal
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.io.watchdog import SystemdWatchdog
 from onboard.kinds.registry import factory_for, system_of
+from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.codec import codecs
 
 EXIT_STATUS = """\
@@ -34,6 +35,8 @@ examples:
       join a site served by: bus-sim run level1 --serve --without MR1
   onboard trace check trace.log --site site.toml
       judge a recorded log; see onboard trace --help
+  onboard web -i socketcan -c can0 --site site.toml
+      a live picture on a page of this computer; see onboard web --help
 """
 
 
@@ -63,6 +66,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         from onboard.trace.cli import main as trace  # noqa: PLC0415  # a controller must not carry it
 
         return trace(words[1:])
+    if words[:1] == ["web"]:
+        return _web(words[1:])
     args = build_parser().parse_args(argv)
     try:
         config = load_machine(args.machine)
@@ -82,6 +87,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f"onboard: journal {args.journal or config.journal}: {error.strerror or error}", file=sys.stderr)
         return 2
+
+
+def _web(words: list[str]) -> int:
+    if not is_web_installed():
+        print("onboard: web: its libraries are missing; pip install 'onboard-fleet[web]'", file=sys.stderr)
+        return 2
+    from onboard.web.cli import main as web  # noqa: PLC0415  # a controller must not carry it
+
+    return web(words)
 
 
 async def run(config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path) -> int:

@@ -54,10 +54,14 @@ class Delivery:
         #: Nodes that take part (attached, not off the bus), in order of attachment; kept by the medium.
         self.listeners: list[SimulatedBus] = []
         self._clock = clock
-        self._injectors = tuple(i for i in injectors if i.fault.kind is not FaultKind.CORRUPTION)
+        self._injectors = [i for i in injectors if i.fault.kind is not FaultKind.CORRUPTION]
         self._routed: list[Route] = []
         self._senders: list[SimulatedBus] = []
         self._under_way: Route | None = None
+
+    def add(self, injector: FaultInjector) -> None:
+        """One more fault at work from now on; not a corruption, which strikes on the wire."""
+        self._injectors.append(injector)
 
     def forget_routes(self) -> None:
         """Something that routes depend on has changed."""

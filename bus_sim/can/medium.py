@@ -62,7 +62,7 @@ class Medium:
         self.bit_rate = bit_rate
         self.name = name
         #: The faults at work, with what each has done so far.
-        self.injectors = tuple(FaultInjector(fault) for fault in faults)
+        self.injectors = [FaultInjector(fault) for fault in faults]
         self.delivery = Delivery(clock, self.injectors)
         self.recovery = Recovery(self)
         self._corrupters = tuple(i for i in self.injectors if i.fault.kind is FaultKind.CORRUPTION)
@@ -107,6 +107,14 @@ class Medium:
             self._joining.append(node)
         self._members_changed()
         return node
+
+    def add_fault(self, fault: Fault) -> None:
+        """One more fault, while the bus is at work. Raises ``ValueError`` for a corruption, which is set beforehand."""
+        if fault.kind is FaultKind.CORRUPTION:
+            raise ValueError(f"fault {fault}: a corruption is set before the bus is at work")
+        injector = FaultInjector(fault)
+        self.injectors.append(injector)
+        self.delivery.add(injector)
 
     def tap(self, callback: Tap) -> None:
         """See every frame and error frame once, in wire order, without being on the bus: no ACK, no error flags."""

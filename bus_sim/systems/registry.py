@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.faults.injection import AnyFault
+from bus_sim.systems.cell.run import run_cell
+from bus_sim.systems.terminal.show import run_terminal
 from onboard.core.site import Site
 
 
@@ -31,4 +33,7 @@ class SystemOptions:
 Runner = Callable[[Site, SystemOptions], int]
 
 #: By ``Site.system``.
-RUNNERS: dict[str, Runner] = {}
+RUNNERS: dict[str, Runner] = {
+    "terminal": run_terminal,
+    "cell": run_cell,
+}

@@ -63,6 +63,20 @@ class Table:
             return stand_in
         return int(value)
 
+    def number(self, name: str, low: float, high: float, default: float | None = None) -> float:
+        """A number in ``[low, high]``, whole or with decimals; ``default`` None makes the key required."""
+        words = f"a number from {low:g} to {high:g}"
+        if type(self.values.get(name)) is int:
+            self.values[name] = float(self.values[name])
+        value = self._get(name, float, words, required=default is None)
+        stand_in = low if default is None else default
+        if value is None:
+            return stand_in
+        if not low <= value <= high:  # not a number is in no range
+            self.bad(name, value, "out of range", f"write {words}")
+            return stand_in
+        return float(value)
+
     def text(self, name: str, default: str | None = None) -> str:
         """A text that is not empty; the stand-in without a default is the empty text."""
         value = self._get(name, str, "a text in quotes", required=default is None)

@@ -13,7 +13,11 @@ _KINDS = (
 
 
 def site_report(site: Site) -> list[str]:
-    """One line each on floors, places, machines and refuges, then one on each lift."""
+    """One line each on floors, places, machines and refuges, then one on each lift; else the machines by kind."""
+    if not site.tracks:
+        kinds = sorted({machine.kind for machine in site.machines.values()})
+        words = (f"{kind.name.lower()}: {', '.join(_named(site, kind))}" for kind in kinds)
+        return [f"system: {site.system}", *words]
     lifts = [machine for machine in site.machines.values() if machine.kind is KindCode.LIFT]
     return [
         _floors_line(site),

@@ -7,7 +7,9 @@ it made of the rest, with digest 0: the caller raises, refuses unknown keys and 
 from collections.abc import Callable
 from typing import NamedTuple
 
+from onboard.config.cell import read_cell
 from onboard.config.reader import Table
+from onboard.config.terminal import read_terminal
 from onboard.core.site import Site
 
 
@@ -19,4 +21,7 @@ class Common(NamedTuple):
 
 
 #: By the word after ``system =`` in the table ``[site]``.
-READERS: dict[str, Callable[[Table, Common], Site]] = {}
+READERS: dict[str, Callable[[Table, Common], Site]] = {
+    "terminal": read_terminal,
+    "cell": read_cell,
+}

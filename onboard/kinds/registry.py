@@ -14,6 +14,14 @@ from onboard.kinds.car_park.compartment import CompartmentFactory
 from onboard.kinds.car_park.lift import LiftFactory
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.car_park.site import CarPark
+from onboard.kinds.cell.desk import DeskFactory as GoalDeskFactory
+from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
+from onboard.kinds.cell.robot import ArmFactory
+from onboard.kinds.cell.site import Cell
+from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
+from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
+from onboard.kinds.terminal.site import Terminal
+from onboard.kinds.terminal.vehicle import VehicleFactory
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +40,12 @@ _SYSTEMS: dict[str, System] = {
             CarPark.system,
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
         ),
+        System(
+            Terminal.system,
+            {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: MissionDeskFactory()},
+            TERMINAL_MESSAGES,
+        ),
+        System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: GoalDeskFactory()}, CELL_MESSAGES),
     )
 }
 

@@ -10,6 +10,7 @@ from onboard.core.refuges import open_refuges
 from onboard.core.reservations import FOREVER, Reservations, Window
 from onboard.core.sipp import NoRoute, Visit, plan_route
 from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.kinds.car_park.site import CarPark
 
 SECOND = 1_000_000
 #: Floors, positions, places, then compartments, lifts, robots and spurs.
@@ -26,7 +27,7 @@ def of_kind(site: Site, kind: KindCode) -> list[Machine]:
 
 
 def test_p30_every_shipped_site_has_the_size_that_it_is_known_for() -> None:
-    assert site_names() == sorted(SIZES)
+    assert [name for name in site_names() if find_site(name).system == CarPark.system] == sorted(SIZES)
     for name, size in SIZES.items():
         site = find_site(name)
         tracks = list(site.tracks.values())

@@ -87,12 +87,18 @@ LAYERS: dict[str, Layer] = {
     ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
     "onboard.trace.cli": Layer((*CORE_TYPES, *SYSTEM_TYPES, "onboard.config", "onboard.trace", "onboard.wire")),
+    # The page shows what the trace knows; only its own command line opens files and buses.
+    "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
+    "onboard.web.cli": Layer(
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
+    ),
     "onboard": Layer(
-        (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli"), not_stdlib=frozenset({"random", "threading", "time"})
+        (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+        not_stdlib=frozenset({"random", "threading", "time"}),
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
-        ("onboard", "onboard.trace", *ALL_OF_ONBOARD, "dbc"),
+        ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
         ("numpy", "ortools", "rich"),
         not_stdlib=frozenset({"threading"}),
     ),

@@ -117,7 +117,9 @@ def test_a_persons_mistake_gets_one_clear_line_and_status_2(
 
 def test_sites_are_listed_and_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert bus_sim(["sites"]) == 0
-    assert capsys.readouterr().out.split() == ["large", "level1", "small", "standard"]
+    assert {"large", "level1", "small", "standard", "terminal"} <= set(capsys.readouterr().out.split())
+    assert bus_sim(["sites", "terminal"]) == 0
+    assert "vehicle: R1, R2, R3, R4" in capsys.readouterr().out
     assert bus_sim(["sites", "standard"]) == 0
     shown = capsys.readouterr().out
     assert "places: 191" in shown and "without ER1" in shown

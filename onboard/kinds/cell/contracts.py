@@ -7,7 +7,7 @@ from onboard.core.messages import Reference
 from onboard.kinds.cell.geometry import Area, Point, shortest_way, way_length_m
 from onboard.kinds.cell.offers import OFFERS, OfferRule, via_points
 
-#: Slack in the paper's ordering by deadlines: a goal without a time limit comes last.
+#: A goal without a time limit.
 NO_LIMIT = 0
 
 
@@ -45,6 +45,11 @@ class Goal:
     def level(self) -> int:
         """Depth in the tree of contracts, 0 for the goal manager's own."""
         return len(self.path)
+
+    @property
+    def urgency(self) -> tuple[int, Reference]:
+        """Order among goals (row C15): the earlier time limit first, none last; then by name, alike on every robot."""
+        return (self.time_limit_ms or 1 << 32, self.part)
 
     def part_of(self, robot: int, number: int, via: Point) -> "Goal":
         """The sub-goal that ``robot`` makes of it when it puts the part down at ``via``."""

@@ -1,0 +1,127 @@
+"""All interleavings of robots under the node agents' rules: what can happen next in a state (SYSTEMS, section 2.4).
+
+A robot goes from its start to its goal by the shortest way without reversing; one robot an edge. Under the paper's
+rules a node holds any number of robots, and a robot that is told to stop waits on its edge. Under ``EDGE_AND_NODE`` it
+waits in a node, and a node has ``capacity`` slots, robots that have come to their goal included.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from onboard.kinds.graph.network import NOWHERE, Edge, Graph, edge
+from onboard.kinds.graph.rules import Heading, Rules, are_head_on, may_enter, other_edges
+
+#: Instead of the node behind: this robot has come to its goal.
+ARRIVED = -2
+#: Robots that stand in a node, having come from node ``n``: ``_STANDS - n``. They still do not go back.
+_STANDS = -10
+
+
+class Robot(NamedTuple):
+    """``start`` is the node behind it while it is on an edge, ``NOWHERE``, ``ARRIVED``, or in a node."""
+
+    start: int
+    node: int
+    goal: int
+
+    @property
+    def came_from(self) -> int:
+        """The node to which it may not go back."""
+        return _STANDS - self.start if self.start <= _STANDS else self.start
+
+
+#: One robot each. Where names do not matter the robots are sorted.
+State = tuple[Robot, ...]
+
+
+class Move(NamedTuple):
+    """One thing that can happen: robot number ``robot`` goes on to ``node``; ``word`` says how."""
+
+    robot: int
+    word: str
+    node: int
+
+
+@dataclass(frozen=True)
+class Model:
+    """The rules on one graph. ``capacity`` of every node, for ``EDGE_AND_NODE`` only."""
+
+    graph: Graph
+    rules: Rules
+    capacity: int = 1
+
+    def start(self, starts: tuple[int, ...], goals: tuple[int, ...]) -> State:
+        """All robots in their first nodes."""
+        return tuple(Robot(NOWHERE, *ends) for ends in zip(starts, goals, strict=True))
+
+    def is_over(self, state: State) -> bool:
+        """Whether all have come to their goals."""
+        return all(robot.start == ARRIVED for robot in state)
+
+    def moves(self, state: State) -> list[tuple[Move, State]]:
+        """Everything that can happen next, each with the state after it; no robot changes its place in the tuple."""
+        on_edges = {edge(robot.start, robot.node): robot for robot in state if robot.start >= 0}
+        found: list[tuple[Move, State]] = []
+        for number, robot in enumerate(state):
+            if robot.start != ARRIVED:
+                step = self._of_edge_and_node if self.rules is Rules.EDGE_AND_NODE else self._of_paper
+                for move, after in step(number, robot, state, on_edges):
+                    found.append((move, (*state[:number], after, *state[number + 1 :])))
+        return found
+
+    # --- robots that wait on edges -----------------------------------------------------------------------------
+
+    def _of_paper(
+        self, number: int, robot: Robot, state: State, on_edges: dict[Edge, Robot]
+    ) -> list[tuple[Move, Robot]]:
+        start, node, goal = robot
+        if node == goal:
+            return [(Move(number, "arrives at", goal), Robot(ARRIVED, goal, goal))]
+        wants = self.graph.next_node(start, node, goal)
+        if wants is None:
+            return []
+        if may_enter(self.graph, on_edges, node, wants, self.rules):
+            return [(Move(number, "goes to", wants), Robot(node, wants, goal))]
+        other = on_edges.get(edge(node, wants))
+        if other is None or start < 0 or not are_head_on(Heading(start, node, wants), self._heading(other)):
+            return []
+        return [
+            (Move(number, "is sent to", after), Robot(node, after, goal))
+            for after in other_edges(self.graph, on_edges, node, start, self.rules)
+        ]
+
+    def _heading(self, robot: Robot) -> Heading:
+        return Heading(robot.start, robot.node, self.graph.next_node(*robot))
+
+    # --- robots that wait in nodes -----------------------------------------------------------------------------
+
+    def _of_edge_and_node(
+        self, number: int, robot: Robot, state: State, on_edges: dict[Edge, Robot]
+    ) -> list[tuple[Move, Robot]]:
+        start, node, goal = robot
+        if start >= 0:
+            if node == goal:
+                return [(Move(number, "arrives at", goal), Robot(ARRIVED, goal, goal))]
+            return [(Move(number, "enters", node), Robot(_STANDS - start, node, goal))]
+        came_from = robot.came_from
+        wants = self.graph.next_node(came_from, node, goal)
+        if wants is None:
+            return []
+        if self._has_room(state, wants) and edge(node, wants) not in on_edges:
+            return [(Move(number, "goes to", wants), Robot(node, wants, goal))]
+        if self._has_room(state, wants) or not any(self._wants_back(one, wants, node) for one in state):
+            return []
+        return [
+            (Move(number, "is sent to", after), Robot(node, after, goal))
+            for after in other_edges(self.graph, on_edges, node, came_from, self.rules)
+            if self._has_room(state, after)
+        ]
+
+    def _has_room(self, state: State, node: int) -> bool:
+        return sum(one.node == node for one in state) < self.capacity
+
+    def _wants_back(self, robot: Robot, node: int, other: int) -> bool:
+        """Whether a robot in ``node`` wants to go to ``other``."""
+        if robot.node != node or robot.start in (ARRIVED, NOWHERE) or robot.start >= 0:
+            return robot.node == node and robot.start == NOWHERE and self.graph.next_node(*robot) == other
+        return self.graph.next_node(robot.came_from, node, robot.goal) == other

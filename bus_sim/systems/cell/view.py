@@ -1,0 +1,113 @@
+"""What the fleet bus tells of a cell: goals, contracts, moves; the paper's printed answer is made of nothing else."""
+
+from dataclasses import dataclass, field
+
+from bus_sim.systems.cell.text import printed
+from onboard.core.codes import CallResult, TaskPhase
+from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
+from onboard.kinds.cell.geometry import Point
+from onboard.kinds.cell.messages import (
+    ArmProgress,
+    GoalEnd,
+    GoalStart,
+    MoveCostHigh,
+    MoveCostLow,
+    MoveFrom,
+    MoveTo,
+    OfferHigh,
+    OfferLow,
+    from_halves,
+)
+from onboard.kinds.cell.site import Cell
+
+_ORIGIN = Point(0, 0)
+
+
+@dataclass
+class Told:
+    """What was said of one goal or sub-goal."""
+
+    start: Point = _ORIGIN
+    end: Point = _ORIGIN
+    contractor: int = 0
+    position: Point = _ORIGIN
+    via: Point = _ORIGIN
+    own_high: int = 0
+    own_cost: float = 0.0
+    cost: float = 0.0
+    phase: TaskPhase = TaskPhase.OPEN
+
+
+@dataclass
+class CellView:
+    """Feed it every message of the fleet bus; ``goal_messages`` counts calls for goals and sub-goals (row C13)."""
+
+    site: Cell
+    goals: dict[Reference, Told] = field(default_factory=dict)
+    positions: dict[int, ArmProgress] = field(default_factory=dict)
+    goal_messages: int = 0
+    deepest: int = 0
+    _highs: dict[tuple[int, Reference], int] = field(default_factory=dict)
+    _offers: dict[tuple[int, Reference], float] = field(default_factory=dict)
+
+    def feed(self, message: Message) -> None:
+        """Take up one message."""
+        match message:
+            case GoalStart():
+                self._goal(message.sender, message.goal).start = Point(message.x_mm, message.y_mm)
+            case GoalEnd():
+                self._goal(message.sender, message.goal).end = Point(message.x_mm, message.y_mm)
+            case CallForProposals():
+                self.goal_messages += 1
+                self.deepest = max(self.deepest, message.depth)
+            case OfferHigh():
+                self._highs[message.sender, Reference(message.manager, message.goal)] = message.bits
+            case OfferLow():
+                key = (message.sender, Reference(message.manager, message.goal))
+                self._offers[key] = from_halves(self._highs.get(key, 0), message.bits)
+            case Award() if message.result is CallResult.AWARDED:
+                told = self.goals.setdefault(message.task, Told())
+                told.contractor = message.winner
+                told.cost = self._offers.get((message.winner, message.task), 0.0)
+            case TaskReport():
+                self.goals.setdefault(message.task, Told()).phase = message.phase
+            case ArmProgress():
+                self.positions[message.sender] = message
+            case MoveFrom() | MoveTo() | MoveCostHigh() | MoveCostLow():
+                self._move(message)
+
+    def chain(self, task: Reference) -> list[Told]:
+        """A goal and its sub-goals as they were awarded, in the order of carrying; empty where nobody has it."""
+        found: list[Told] = []
+        told = self.goals.get(task)
+        while told is not None and told.contractor and told not in found:
+            found.append(told)
+            if told.via == told.end:
+                break
+            contractor, via = told.contractor, told.via
+            below = (one for name, one in self.goals.items() if name.origin == contractor and one.start == via)
+            told = next((one for one in below if one.contractor), None)
+        return found
+
+    def text(self, task: Reference) -> str:
+        """The paper's printed answer for one goal (row C21)."""
+        chain = self.chain(task)
+        steps = [
+            (self.site.machines[one.contractor].name, one.position, one.start, one.via, one.own_cost) for one in chain
+        ]
+        return printed(steps, chain[0].cost if chain else 0.0)
+
+    def _goal(self, manager: int, number: int) -> Told:
+        return self.goals.setdefault(Reference(manager, number), Told())
+
+    def _move(self, message: MoveFrom | MoveTo | MoveCostHigh | MoveCostLow) -> None:
+        told = self._goal(message.manager, message.goal)
+        match message:
+            case MoveFrom():
+                told.position = Point(message.x_mm, message.y_mm)
+            case MoveTo():
+                told.via = Point(message.x_mm, message.y_mm)
+            case MoveCostHigh():
+                told.own_high = message.bits
+            case MoveCostLow():
+                told.own_cost = from_halves(told.own_high, message.bits)

@@ -1,0 +1,257 @@
+"""The plant of a terminal: drives and handlers of vehicles, the desks' keyboards and cameras, on their device buses."""
+
+import asyncio
+import random
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from bus_sim.plant.link import BusDeviceLink
+from bus_sim.plant.timers import LoopTimers
+from bus_sim.systems.terminal.world import VehicleBody, World
+from onboard.core.messages import Message
+from onboard.kinds.registry import system_of
+from onboard.kinds.terminal.messages import (
+    Action,
+    HandlerMode,
+    HandlerOrder,
+    HandlerState,
+    LaneSensor,
+    MissionKey,
+    MoveMode,
+    MoveOrder,
+    MoveState,
+    Verb,
+)
+from onboard.kinds.terminal.missions import types_of
+from onboard.kinds.terminal.site import Blockage, EntityKind, Mission, Terminal
+from onboard.ports.bus import Bus
+from onboard.wire.codec import codecs
+from onboard.wire.decoder import Decoder
+
+#: A body passes from one slot into the next in so long, us. Ours.
+HOP_US = 300_000
+#: Devices and cameras say again how things stand, us (dbc/terminal.dbc).
+SLOW_US = 10_000_000
+#: Real durations are up to so much longer than planned: the paper's robots' speed is of course not constant. Ours.
+NOISE = 0.1
+
+
+class VehicleDevices:
+    """Drive and handler of one vehicle."""
+
+    def __init__(self, plant: "TerminalPlant", body: VehicleBody, link: BusDeviceLink, seed: int) -> None:
+        self.plant, self.body, self.link = plant, body, link
+        self.chance = random.Random(f"{seed}:{body.node_id}")
+        self.sequence = self.handler_sequence = 0
+        self.mode = MoveMode.STANDING
+        self.at_end = True
+        self.handler_mode = HandlerMode.FREE
+        self._pending: MoveOrder | None = None
+        self._run = 0
+        link.subscribe(self._on_message)
+
+    def start(self) -> None:
+        """Say how things stand, now and slowly ever after."""
+        self._tell_move()
+        self._tell_handler()
+        self.plant.after(SLOW_US, self.start)
+
+    def _on_message(self, message: Message, _: int) -> None:
+        match message:
+            case MoveOrder():
+                self._ordered(message)
+            case HandlerOrder():
+                self._handle(message)
+
+    # --- drive -------------------------------------------------------------------------------------------------
+
+    def _ordered(self, order: MoveOrder) -> None:
+        if order.sequence == self.sequence:
+            self._tell_move()
+            return
+        if self._pending is not None or self.body.target is not None:
+            return
+        if (order.entity, order.slot) == (self.body.entity, self.body.slot):
+            self.sequence = order.sequence
+            self._cross(order.towards)
+            return
+        if not self.at_end or self.body.docked or not self.plant.world.leads(self.body, order.entity, order.slot):
+            return
+        self._pending = order
+        self._hop()
+
+    def _hop(self) -> None:
+        """Begin to move, unless an obstacle lies before the lane's end."""
+        order = self._pending
+        if order is None:
+            return
+        if order.entity != self.body.entity and self.body.entity in self.plant.world.blocked:
+            if self.mode is not MoveMode.BLOCKED:
+                self.mode = MoveMode.BLOCKED
+                self._tell_move()
+            return
+        self.mode, self.at_end = MoveMode.MOVING, False
+        self.plant.world.enter(self.body, order.entity, order.slot, self.plant.now_us())
+        self._tell_move()
+        self.plant.after(HOP_US, self._arrived)
+
+    def obstacle_gone(self) -> None:
+        """The lane's end is free again."""
+        if self.mode is MoveMode.BLOCKED:
+            self._hop()
+
+    def _arrived(self) -> None:
+        order = self._pending
+        assert order is not None
+        self.plant.world.arrive(self.body, self.plant.now_us())
+        self._pending = None
+        self.sequence = order.sequence
+        self._cross(order.towards)
+
+    def _cross(self, towards: int) -> None:
+        """Through the slot in hand: a lane's share of its length, a crossing or an area whole; a station at once."""
+        entity = self.plant.site.entities[self.body.entity]
+        self._run += 1
+        if entity.kind is EntityKind.STATION or (entity.kind is EntityKind.AREA and not towards):
+            duration_us = 0
+        else:
+            slots = entity.capacity if entity.kind is EntityKind.LANE else 1
+            duration_us = entity.crossing_us(self.body.came_from, towards) // slots - HOP_US
+        if duration_us <= 0:
+            self._crossed(self._run)
+            return
+        self.mode, self.at_end = MoveMode.MOVING, False
+        self._tell_move()
+        self.plant.after(self._really(duration_us), partial(self._crossed, self._run))
+
+    def _crossed(self, run: int) -> None:
+        if run == self._run:
+            self.mode, self.at_end = MoveMode.STANDING, True
+            self._tell_move()
+
+    def _tell_move(self) -> None:
+        body = self.body
+        self.link.send(MoveState(body.node_id, self.sequence, body.entity, body.slot, self.mode, self.at_end))
+
+    # --- handler -----------------------------------------------------------------------------------------------
+
+    def _handle(self, order: HandlerOrder) -> None:
+        if order.sequence == self.handler_sequence or self.handler_mode is HandlerMode.WORKING:
+            self._tell_handler()
+            return
+        self.handler_sequence = order.sequence
+        self.handler_mode = HandlerMode.WORKING
+        self._tell_handler()
+        site = self.plant.site
+        durations = {Action.DOCK: site.dock_us, Action.UNDOCK: site.undock_us - HOP_US}
+        duration_us = self._really(max(1, durations.get(order.action, site.handle_us)))
+        self.plant.after(duration_us, lambda: self._handled(order))
+
+    def _handled(self, order: HandlerOrder) -> None:
+        body, world, now_us = self.body, self.plant.world, self.plant.now_us()
+        good = self.plant.site.entities[body.entity].kind is EntityKind.STATION
+        if order.action is Action.DOCK and good:
+            body.docked = True
+        elif order.action is Action.UNDOCK:
+            body.docked = False
+        elif order.action is Action.PICK_UP:
+            good = body.docked and world.pick_up(body, order.box, now_us)
+        elif order.action is Action.PUT_DOWN:
+            good = body.docked and world.put_down(body, now_us)
+        world.count_boxes(now_us)
+        rest = HandlerMode.DOCKED if body.docked else HandlerMode.FREE
+        self.handler_mode = rest if good or order.action is Action.UNDOCK else HandlerMode.FAILED
+        self._tell_handler()
+
+    def _tell_handler(self) -> None:
+        self.link.send(HandlerState(self.body.node_id, self.handler_sequence, self.handler_mode, self.body.box))
+
+    def _really(self, duration_us: int) -> int:
+        return round(duration_us * (1 + self.chance.uniform(0, self.plant.noise)))
+
+
+class TerminalPlant:
+    """Everything that is not a controller. ``buses`` has one connection to each machine's device bus, by node-ID."""
+
+    def __init__(
+        self,
+        site: Terminal,
+        loop: asyncio.AbstractEventLoop,
+        buses: Mapping[int, Bus],
+        seed: int,
+        *,
+        noise: float = NOISE,
+    ) -> None:
+        self.site, self.noise = site, noise
+        self.timers = LoopTimers(loop)
+        self.world = World(site)
+        self.links: dict[int, BusDeviceLink] = {}
+        self.vehicles: dict[int, VehicleDevices] = {}
+        system = system_of(site)
+        codec = codecs(system.name, system.messages).device
+        for node in site.machines:
+            self.links[node] = BusDeviceLink(buses[node], codec, Decoder(codec), node)
+            if node in self.world.bodies:
+                self.vehicles[node] = VehicleDevices(self, self.world.bodies[node], self.links[node], seed)
+
+    def start(self) -> None:
+        """Power on, and the operator's day begins."""
+        for devices in self.vehicles.values():
+            devices.start()
+        for number, mission in enumerate(self.site.missions, start=1):
+            self.timers.call_at(mission.at_us, _call(self._type, number, mission))
+        for blockage in self.site.blockages:
+            self.timers.call_at(blockage.at_us, _call(self.block, blockage))
+            self.timers.call_at(blockage.until_us, _call(self.free, blockage.lane))
+        self._look()
+
+    def now_us(self) -> int:
+        """Loop time."""
+        return self.timers.now_us()
+
+    def after(self, duration_us: int, callback: Callable[[], None]) -> None:
+        """Call later."""
+        self.timers.call_at(self.now_us() + duration_us, callback)
+
+    def block(self, blockage: Blockage) -> None:
+        """An obstacle falls before the end of a lane."""
+        self.world.blocked.add(blockage.lane)
+        self._camera(blockage.lane)
+
+    def free(self, lane: int) -> None:
+        """It is taken away."""
+        self.world.blocked.discard(lane)
+        self._camera(lane)
+        for devices in self.vehicles.values():
+            if devices.body.entity == lane:
+                devices.obstacle_gone()
+
+    def _look(self) -> None:
+        """Cameras say again what they see."""
+        for blockage in self.site.blockages:
+            if blockage.at_us <= self.now_us():
+                self._camera(blockage.lane)
+        self.after(SLOW_US, self._look)
+
+    def _camera(self, lane: int) -> None:
+        desk = self.site.stewards[lane]
+        self.links[desk].send(LaneSensor(desk, lane, lane in self.world.blocked))
+
+    def _type(self, number: int, mission: Mission) -> None:
+        """The operator types a mission at its desk."""
+        before_s = -(-mission.before_us // 1_000_000)
+        desk, link = mission.desk, self.links[mission.desk]
+
+        def key(verb: Verb, what: int, count: int, source: int) -> MissionKey:
+            return MissionKey(desk, number, verb, what, count, source, mission.target, before_s, mission.urgent)
+
+        for box in mission.boxes:
+            link.send(key(Verb.TRANSHIP, box, 0, 0))
+        if mission.boxes:
+            link.send(key(Verb.END, 0, 0, 0))
+        else:
+            link.send(key(Verb.LOAD, types_of(self.site).index(mission.type), mission.count, mission.source))
+
+
+def _call(function: Callable[..., None], *arguments: object) -> Callable[[], None]:
+    return lambda: function(*arguments)

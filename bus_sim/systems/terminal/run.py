@@ -1,0 +1,176 @@
+"""One run of a terminal: built, run to the end of its missions, and its indicators."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from bus_sim.run import BusRun, RunOptions, buses_of, run_until
+from bus_sim.systems.terminal.plant import NOISE, TerminalPlant
+from bus_sim.systems.terminal.world import Handling
+from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.core.messages import CarAt, Message
+from onboard.core.mirror import Mirror
+from onboard.kinds.terminal.desk import Desk
+from onboard.kinds.terminal.mirror import TerminalMirror
+from onboard.kinds.terminal.site import Mission, Terminal
+from onboard.kinds.terminal.vehicle import Vehicle
+
+#: Looks whether it is over, us.
+STEP_US = 1_000_000
+#: A run that does not end by itself ends here, us.
+LIMIT_US = 3_600_000_000
+
+
+@dataclass
+class TerminalRun(BusRun):
+    """A terminal that can be run. ``spectator`` is what somebody who only listens to the fleet bus knows."""
+
+    plant: TerminalPlant
+    spectator: TerminalMirror = field(init=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        site, listener = self.plant.site, min(self.site.machines)
+        self.spectator = TerminalMirror(site, listener, Mirror(site, listener))
+        self.observers.append(self._listen)
+
+    def _listen(self, message: Message, time_us: int) -> None:
+        if isinstance(message, CarAt):
+            self.spectator.fleet.on_car(message)
+        self.spectator.hear(message, time_us)
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """One box of a mission: times in us since it was ordered."""
+
+    mission: int
+    box: int
+    waited_us: int
+    finished_us: int
+    late_us: int
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run came to. ``touched`` counts plans that their owners made anew; ``events`` disturbances."""
+
+    deliveries: tuple[Delivery, ...]
+    ordered: int
+    ended_us: int
+    touched: int
+    disturbances: int
+    frames: int
+    busy: float
+    violations: tuple[str, ...]
+    halted: tuple[str, ...]
+    interrupted: int = 0
+
+    @property
+    def is_good(self) -> bool:
+        """Whether all was delivered and nothing broke."""
+        return not self.violations and not self.halted and len(self.deliveries) == self.ordered
+
+    def mean_s(self, what: Callable[[Delivery], int]) -> float:
+        """Mean over all deliveries, s."""
+        return sum(map(what, self.deliveries)) / max(1, len(self.deliveries)) / 1e6
+
+
+def build(site: Terminal, options: RunOptions, loop: VirtualTimeLoop, *, noise: float = NOISE) -> TerminalRun:
+    """All parts of a run, connected but not switched on."""
+    fleet, devices = buses_of(site, options, loop)
+    buses = {node: medium.attach("plant", node) for node, medium in devices.items()}
+    plant = TerminalPlant(site, loop, buses, options.seed, noise=noise)
+    return TerminalRun(site, options, loop, fleet, devices, plant)
+
+
+def deliveries(site: Terminal, handled: list[Handling]) -> list[Delivery]:
+    """Which mission each putting down served: the first that wants this box at this station and lacks it."""
+    lacking = {number: max(mission.count, len(mission.boxes)) for number, mission in enumerate(site.missions, 1)}
+    up: dict[int, int] = {}
+    found = []
+    for one in handled:
+        if one.is_up:
+            up[one.box] = one.time_us
+            continue
+        for number, mission in enumerate(site.missions, 1):
+            if lacking[number] and mission.target == one.station and _wants(site, mission, one.box):
+                lacking[number] -= 1
+                late_us = max(0, one.time_us - mission.before_us) if mission.before_us else 0
+                waited_us = up[one.box] - mission.at_us
+                found.append(Delivery(number, one.box, waited_us, one.time_us - mission.at_us, late_us))
+                break
+    return found
+
+
+def _wants(site: Terminal, mission: Mission, box: int) -> bool:
+    return box in mission.boxes or (not mission.boxes and site.boxes[box - 1].type == mission.type)
+
+
+def outcome(run: TerminalRun) -> Outcome:
+    """The indicators of a run so far."""
+    site = run.plant.site
+    vehicles = [one.holon.behaviour for one in run.controllers.values() if isinstance(one.holon.behaviour, Vehicle)]
+    desks = [one.holon.behaviour for one in run.controllers.values() if isinstance(one.holon.behaviour, Desk)]
+    ordered = sum(max(mission.count, len(mission.boxes)) for mission in site.missions)
+    halted = tuple(
+        f"{one.holon.machine.name}: {one.holon.halted}" for one in run.controllers.values() if one.holon.halted
+    )
+    statistics = run.fleet.statistics()
+    return Outcome(
+        tuple(deliveries(site, run.plant.world.handled)),
+        ordered,
+        max((one.time_us for one in run.plant.world.handled), default=0),
+        sum(vehicle.planner.touched for vehicle in vehicles),
+        len(site.blockages),
+        statistics.frames,
+        statistics.mean_load,
+        tuple(run.plant.world.violations),
+        halted,
+        sum(desk.interrupted for desk in desks),
+    )
+
+
+def is_over(run: TerminalRun) -> bool:
+    """All missions are done, or something must never have happened."""
+    ordered = sum(max(mission.count, len(mission.boxes)) for mission in run.plant.site.missions)
+    return bool(run.plant.world.violations) or len(deliveries(run.plant.site, run.plant.world.handled)) >= ordered
+
+
+def play(
+    site: Terminal,
+    options: RunOptions,
+    *,
+    limit_us: int = LIMIT_US,
+    noise: float = NOISE,
+    prepare: Callable[[TerminalRun], None] | None = None,
+    show: Callable[[TerminalRun], None] | None = None,
+) -> Outcome:
+    """Run a site on a loop of its own. ``prepare`` gets the run before it is switched on, ``show`` after each step."""
+    loop = VirtualTimeLoop(pace=options.pace)
+    try:
+        asyncio.set_event_loop(loop)
+        return loop.run_until_complete(_play(site, options, loop, limit_us, noise, prepare, show))
+    finally:
+        asyncio.set_event_loop(None)
+        loop.close()
+
+
+async def _play(
+    site: Terminal,
+    options: RunOptions,
+    loop: VirtualTimeLoop,
+    limit_us: int,
+    noise: float,
+    prepare: Callable[[TerminalRun], None] | None,
+    show: Callable[[TerminalRun], None] | None,
+) -> Outcome:
+    run = build(site, options, loop, noise=noise)
+    if prepare is not None:
+        prepare(run)
+    run.start()
+    picture = (lambda: show(run)) if show is not None else None
+    await run_until(run, lambda: is_over(run), limit_us, STEP_US, picture)
+    found = outcome(run)
+    run.close()
+    return found

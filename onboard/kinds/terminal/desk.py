@@ -1,0 +1,330 @@
+"""The mission desk: one more holon (row M39). It turns missions into calls, has boxes in its books and keeps rights.
+
+It plans for nobody. As steward it grants the right to a slot in the order in which the plans pass there, and a box to
+whoever plans to carry it.
+"""
+
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import CallResult, Criterion, KindCode, MachineState, Operation, Reason, TaskPhase, TokenKind
+from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.messages import CallForProposals, CarAt, Message, Reference, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent, Proposal
+from onboard.core.serial import to_bus_ms
+from onboard.core.site import Machine, Site
+from onboard.kinds.terminal.messages import LaneSensor, LaneState, MissionKey, PlanHead, TaskTerms
+from onboard.kinds.terminal.mirror import TerminalMirror
+from onboard.kinds.terminal.missions import Orders, Transport
+from onboard.kinds.terminal.site import EntityKind, Terminal
+from onboard.kinds.terminal.vehicle import NO_WHEELBASE_MM, terminal
+
+#: After a refusal, and while no robot is about to be free, the desk looks again after this, us. Ours.
+LOOK_US = 5_000_000
+#: A lane that is blocked is told again so often, us (dbc/terminal.dbc).
+LANE_REPEAT_US = 5_000_000
+#: A task that was won and is in no plan for so long is called anew, us: its winner gave it up or lost it. Ours.
+LOST_US = 120_000_000
+
+
+class DeskGeneration:
+    """A desk does no transports; it holds the picture of the terminal."""
+
+    def __init__(self, mirror: TerminalMirror) -> None:
+        self.mirror = mirror
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """Nothing that a desk could bid for."""
+        return 0
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """It cannot."""
+        return None
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        """It cannot."""
+        return None
+
+
+class DeskFactory:
+    """Makes desks."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> DeskGeneration:
+        """The desk's picture."""
+        return DeskGeneration(TerminalMirror(terminal(site), machine.node_id, mirror))
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Desk":
+        """The desk's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, DeskGeneration):
+            raise TypeError("a desk needs its own picture")
+        return Desk(fleet, estimator)
+
+
+@dataclass
+class Desk:
+    """One desk. ``calls`` are the terms of its open calls by task; ``taken`` boxes that another desk calls for."""
+
+    fleet: Fleet
+    generation: DeskGeneration
+    kind: KindCode = KindCode.DESK
+    orders: Orders = field(init=False)
+    calls: dict[Reference, CallTerms] = field(default_factory=dict)
+    taken: dict[int, int] = field(default_factory=dict)
+    interrupted: int = 0
+    _look_at_us: int | None = None
+    _repeat_at_us: int | None = None
+    _won_at_us: dict[Reference, int] = field(default_factory=dict)
+    _lanes: dict[int, LaneState] = field(default_factory=dict)
+    _is_new: bool = False
+
+    def __post_init__(self) -> None:
+        self.orders = Orders(self.site, self.fleet.node_id)
+        self.orders.replay(self.fleet.entries)
+
+    @property
+    def site(self) -> Terminal:
+        """The site."""
+        return self.mirror.site
+
+    @property
+    def mirror(self) -> TerminalMirror:
+        """The desk's picture of the terminal."""
+        return self.generation.mirror
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        return MachineState.WORKING if self.orders.open or self.orders.missions else MachineState.IDLE
+
+    @property
+    def itinerary_version(self) -> int:
+        """A desk goes nowhere."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Tasks that were called for and not won are called for again; those that were won go on."""
+        for task in [one for one in self.orders.open if one not in self.orders.won]:
+            self.orders.give_back(task)
+        self._won_at_us = dict.fromkeys(self.orders.won, now_us)
+        self._look_at_us = now_us + LOOK_US
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Keyboard and cameras."""
+        match message:
+            case MissionKey():
+                return self._typed(message, now_us)
+            case LaneSensor():
+                return self._seen(message, now_us)
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Plans, reports, boxes; what another desk calls for; what became of my tasks."""
+        self.mirror.hear(message, now_us)
+        match message:
+            case CallForProposals(operation=Operation.TRANSPORT):
+                self.taken[message.car.number] = now_us + self.site.timing.call_window_us + LOOK_US
+            case TaskReport():
+                return self._reported(message, now_us)
+            case PlanHead():
+                self._is_new = True
+        return []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """An own call is over."""
+        if not isinstance(event, Closed):
+            return []
+        task = event.call.task
+        self.calls.pop(task, None)
+        if event.result is CallResult.AWARDED:
+            return self._won(task, event.winner, now_us)
+        self.orders.give_back(task)
+        self._look_at_us = now_us + (LOOK_US if event.result is CallResult.REFUSED else 1)
+        return [Record(self.orders.record())]
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Slots in the plans' order; a box to the machine whose plan carries it."""
+        if key.kind is TokenKind.SEGMENT:
+            return self._may_enter(key.number >> 8, key.number & 0xFF, requester)
+        if key.kind is TokenKind.CAR:
+            carries = self.mirror.in_plans(key.number & 0xFFFF) == requester
+            return Reason.NONE if carries else Reason.MIRROR_BEHIND
+        return Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Open the next call where a robot is about to be free; tell blocked lanes again; look after won tasks."""
+        effects: list[Effect] = []
+        if self._repeat_at_us is not None and self._repeat_at_us <= now_us:
+            self._repeat_at_us = now_us + LANE_REPEAT_US
+            effects += self._lanes_told()
+        if self._is_new or (self._look_at_us is not None and self._look_at_us <= now_us):
+            self._is_new = False
+            self._look_at_us = now_us + LOOK_US if self.orders.missions or self.orders.won else None
+            effects += self._look_after(now_us) + self._call_next(now_us)
+        return effects
+
+    def next_wake(self) -> int | None:
+        """The next look."""
+        return min((one for one in (self._look_at_us, self._repeat_at_us) if one is not None), default=None)
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Lanes, the boxes that are not where they were at first, and the rights that I hold."""
+        boxes: list[Effect] = []
+        if self.fleet.node_id == self.site.desk:
+            boxes = [
+                Send(CarAt(self.fleet.node_id, car, record.station, record.version, NO_WHEELBASE_MM))
+                for car, record in self.fleet.mirror.cars.items()
+                if record.custodian == self.fleet.node_id
+            ]
+        return self._lanes_told() + boxes + self.fleet.tokens.statements()
+
+    # --- missions ----------------------------------------------------------------------------------------------
+
+    def _typed(self, key: MissionKey, now_us: int) -> list[Effect]:
+        """A mission; an urgent one interrupts: what was called for and not awarded waits (row M29)."""
+        order = self.orders.key(key)
+        if order is None:
+            return []
+        effects: list[Effect] = [Record(self.orders.record())]
+        if order.urgent:
+            for task, terms in list(self.calls.items()):
+                transport = self.orders.open.get(task)
+                if transport is not None and not transport.urgent:
+                    effects += self._withdraw(terms, now_us)
+        return effects + self._call_next(now_us)
+
+    def _withdraw(self, terms: CallTerms, now_us: int) -> list[Effect]:
+        self.interrupted += 1
+        effects: list[Effect] = []
+        for item in self.fleet.negotiation.withdraw(terms, now_us):
+            if isinstance(item, EVENT_TYPES):
+                effects += self.negotiated(item, now_us)
+            elif not isinstance(item, Halt):
+                effects.append(item)
+        return effects
+
+    def candidates(self, now_us: int) -> list[int]:
+        """Robots that have no plan, or one that ends before T + delta T (M24), and are alive."""
+        alive = self.fleet.mirror.alive(now_us)
+        busy = set(self.orders.won.values()) - set(self.mirror.traffic.plans)
+        limit_us = now_us + self.site.horizon_us
+        ends = {node: self.mirror.traffic.end_of(node, now_us) for node in self.site.vehicles}
+        return [node for node, end in ends.items() if end <= limit_us and node in alive and node not in busy]
+
+    def _call_next(self, now_us: int) -> list[Effect]:
+        """As many calls as robots are about to be free: never all boxes at once (M27)."""
+        effects: list[Effect] = []
+        free = len(self.candidates(now_us))
+        taken = {box for box, until_us in self.taken.items() if until_us > now_us}
+        taken |= {transport.box for transport in self.orders.open.values()}
+        while len(self.calls) < free:
+            transport = self.orders.next(self.mirror, taken)
+            if transport is None:
+                break
+            taken.add(transport.box)
+            effects += [Record(self.orders.record()), *self.call(transport, now_us)]
+        if self.orders.missions or self.orders.won:
+            self._look_at_us = self._look_at_us or now_us + LOOK_US
+        return effects
+
+    def call(self, transport: Transport, now_us: int) -> list[Effect]:
+        """Call all robots for one transport."""
+        date = TaskTerms(self.fleet.node_id, transport.task, to_bus_ms(transport.before_us))
+        self.mirror.hear(date, now_us)
+        terms = CallTerms(
+            task=transport.task,
+            operation=Operation.TRANSPORT,
+            kind=KindCode.VEHICLE,
+            criterion=Criterion.FINISH_TIME,
+            from_station=self.mirror.station_of(transport.box),
+            to_station=transport.target,
+            car=self.site.box(transport.box),
+            wheelbase_mm=0,
+            detail=(date,),
+        )
+        self.calls[transport.task] = terms
+        return list(self.fleet.negotiation.open(terms, now_us))
+
+    def _won(self, task: Reference, winner: int, now_us: int) -> list[Effect]:
+        if task not in self.orders.open:
+            return []
+        self.orders.won[task] = winner
+        self._won_at_us[task] = now_us
+        self._look_at_us = now_us + 1
+        return [Record(self.orders.record())]
+
+    def _reported(self, report: TaskReport, now_us: int) -> list[Effect]:
+        if report.task not in self.orders.open:
+            return []
+        if report.phase is TaskPhase.DONE and self.orders.finish(report.task):
+            self._won_at_us.pop(report.task, None)
+            self._look_at_us = now_us
+            return [Record(self.orders.record()), Report(f"task {report.task.number} is done")]
+        if report.phase is TaskPhase.FORFEITED and self.orders.won.get(report.task) == report.sender:
+            self.orders.give_back(report.task)
+            self._look_at_us = now_us + LOOK_US
+            return [Record(self.orders.record())]
+        if report.phase is TaskPhase.AWARDED:
+            self._won_at_us[report.task] = now_us
+        return []
+
+    def _look_after(self, now_us: int) -> list[Effect]:
+        """A won task whose box is at its target is done, though nobody was heard saying so; one in no plan is lost."""
+        effects: list[Effect] = []
+        for task, winner in list(self.orders.won.items()):
+            transport = self.orders.open.get(task)
+            if transport is None:
+                del self.orders.won[task]
+                continue
+            if self.mirror.station_of(transport.box) == transport.target:
+                self.orders.finish(task)
+                effects.append(Record(self.orders.record()))
+            elif self.mirror.in_plans(transport.box) is not None:
+                self._won_at_us[task] = now_us
+            elif now_us - self._won_at_us.get(task, now_us) >= LOST_US and self.mirror.station_of(transport.box):
+                self._won_at_us.pop(task, None)
+                self.orders.give_back(task)
+                effects += [Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
+        return effects
+
+    # --- lanes and rights --------------------------------------------------------------------------------------
+
+    def _seen(self, sensor: LaneSensor, now_us: int) -> list[Effect]:
+        """A change on a lane is told to all robots (row M36)."""
+        known = self._lanes.get(sensor.lane)
+        entity = self.site.entities.get(sensor.lane)
+        if entity is None or entity.kind is not EntityKind.LANE or (known is None and not sensor.blocked):
+            return []
+        if known is not None and known.blocked == sensor.blocked:
+            return []
+        state = LaneState(self.fleet.node_id, sensor.lane, sensor.blocked, to_bus_ms(now_us))
+        self._lanes[sensor.lane] = state
+        self.mirror.on_lane(state, now_us)
+        self._repeat_at_us = now_us + LANE_REPEAT_US
+        return [Send(state)]
+
+    def _lanes_told(self) -> list[Effect]:
+        return [Send(state) for state in self._lanes.values()]
+
+    def _may_enter(self, entity: int, slot: int, requester: int) -> Reason:
+        """The first in the entity's list that is not there yet, unless the slot is one further on along a lane."""
+        place = self.site.entities.get(entity)
+        if place is None or requester not in self.site.vehicles:
+            return Reason.NOT_AUTHORISED
+        if place.kind is EntityKind.LANE and slot > 1:
+            return Reason.NONE
+        traffic = self.mirror.traffic
+        row = traffic.lists.get(entity, [])
+        mine = next((n for n, one in enumerate(row) if one.owner == requester and not traffic.is_inside(one)), None)
+        if mine is None:
+            return Reason.MIRROR_BEHIND
+        before = row[:mine]
+        waiting = [one for one in before if not traffic.is_inside(one)]
+        if place.kind is EntityKind.CROSSING and place.capacity > 1:
+            same = [one for one in before if self.mirror.entry_slot(entity, one.owner) == slot]
+            return Reason.TOKEN_NOT_GRANTABLE_YET if same or len(before) >= place.capacity else Reason.NONE
+        return Reason.TOKEN_NOT_GRANTABLE_YET if waiting else Reason.NONE

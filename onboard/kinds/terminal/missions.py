@@ -1,0 +1,180 @@
+"""Missions at a desk: orders become transports, one box each (rows M04 to M06, M23); kept in the journal."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from onboard.core.messages import Reference
+from onboard.kinds.terminal.messages import MissionKey, Verb
+from onboard.kinds.terminal.mirror import TerminalMirror
+from onboard.kinds.terminal.site import Terminal
+
+
+@dataclass
+class Order:
+    """One mission: ``left`` boxes of ``type`` from ``source``, or those ``named``; ``before_us`` 0 for no date."""
+
+    number: int
+    target: int
+    left: int = 0
+    type: str = ""
+    source: int = 0
+    named: list[int] = field(default_factory=list)
+    before_us: int = 0
+    urgent: bool = False
+
+    @property
+    def rank(self) -> tuple[bool, int, int]:
+        """Urgent ones first, then by their dates, then as they came."""
+        return not self.urgent, self.before_us or 1 << 62, self.number
+
+
+@dataclass(frozen=True, slots=True)
+class Transport:
+    """One box of a mission under a task's name."""
+
+    task: Reference
+    mission: int
+    box: int
+    target: int
+    before_us: int
+    urgent: bool
+
+
+@dataclass
+class Orders:
+    """A desk's missions. What a mission still lacks is not called for before a robot is about to be free (M27)."""
+
+    site: Terminal
+    node_id: int
+    missions: dict[int, Order] = field(default_factory=dict)
+    open: dict[Reference, Transport] = field(default_factory=dict)
+    won: dict[Reference, int] = field(default_factory=dict)
+    done: int = 0
+    last_task: int = 0
+    _typed: dict[int, Order] = field(default_factory=dict)
+
+    def key(self, key: MissionKey) -> Order | None:
+        """What an operator types; the mission that it completes, or None. Unknown types and boxes are passed over."""
+        order = self._typed.setdefault(
+            key.mission,
+            Order(key.mission, key.target, before_us=key.before_s * 1_000_000, urgent=key.urgent),
+        )
+        if key.verb is Verb.TRANSHIP:
+            if 1 <= key.what <= len(self.site.boxes) and key.what not in order.named:
+                order.named.append(key.what)
+            return None
+        del self._typed[key.mission]
+        if key.verb is Verb.LOAD:
+            types = types_of(self.site)
+            if key.what >= len(types) or key.source not in self.site.entities:
+                return None
+            order.left, order.type, order.source = key.count, types[key.what], key.source
+        if key.mission in self.missions or key.target not in self.site.entities:
+            return None
+        self.missions[key.mission] = order
+        return order
+
+    def next(self, mirror: TerminalMirror, taken: set[int]) -> Transport | None:
+        """The transport to be called for next: the best mission with an available box (nothing above, M23)."""
+        for order in sorted(self.missions.values(), key=lambda one: one.rank):
+            box = self._available(order, mirror, taken)
+            if box is None:
+                continue
+            if order.named:
+                order.named.remove(box)
+            else:
+                order.left -= 1
+            if not order.named and not order.left:
+                del self.missions[order.number]
+            self.last_task += 1
+            task = Reference(self.node_id, self.last_task)
+            transport = Transport(task, order.number, box, order.target, order.before_us, order.urgent)
+            self.open[task] = transport
+            return transport
+        return None
+
+    def _available(self, order: Order, mirror: TerminalMirror, taken: set[int]) -> int | None:
+        """A box with nothing above but what robots already plan to take away."""
+        if order.named:
+            boxes = list(order.named)
+        else:
+            stations = self.site.stations_in(order.source)
+            boxes = [
+                box
+                for station in stations
+                for box in reversed(mirror.standing.get(station, ()))
+                if self.site.boxes[box - 1].type == order.type and station != order.target
+            ]
+        for box in boxes:
+            station = mirror.station_of(box)
+            if not station or station == order.target or box in taken or mirror.in_plans(box) is not None:
+                continue
+            if all(mirror.in_plans(upper) is not None for upper in mirror.above(box)):
+                return box
+        return None
+
+    def give_back(self, task: Reference) -> None:
+        """Nobody does it: its box is a mission of its own again."""
+        transport = self.open.pop(task, None)
+        self.won.pop(task, None)
+        if transport is None:
+            return
+        order = self.missions.setdefault(
+            transport.mission,
+            Order(transport.mission, transport.target, before_us=transport.before_us, urgent=transport.urgent),
+        )
+        if order.type:
+            order.left += 1
+        else:
+            order.named.append(transport.box)
+
+    def finish(self, task: Reference) -> bool:
+        """A transport is over; True where it was open."""
+        self.won.pop(task, None)
+        if self.open.pop(task, None) is None:
+            return False
+        self.done += 1
+        return True
+
+    # --- journal -----------------------------------------------------------------------------------------------
+
+    def record(self) -> dict[str, str | int]:
+        """All that is not over, as one entry: the newest counts."""
+        missions = ";".join(
+            f"{one.number},{one.target},{one.left},{one.type},{one.source},{one.before_us},{int(one.urgent)},"
+            + "+".join(str(box) for box in one.named)
+            for one in self.missions.values()
+        )
+        tasks = ";".join(
+            f"{one.task.number},{one.mission},{one.box},{one.target},{one.before_us},{int(one.urgent)},"
+            f"{self.won.get(one.task, 0)}"
+            for one in self.open.values()
+        )
+        return {"record": "orders", "missions": missions, "tasks": tasks, "last": self.last_task, "done": self.done}
+
+    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+        """What the newest entry says."""
+        newest = next((one for one in reversed(list(entries)) if one.get("record") == "orders"), None)
+        if newest is None:
+            return
+        self.last_task, self.done = int(newest["last"]), int(newest["done"])
+        for row in str(newest["missions"]).split(";"):
+            if row:
+                number, target, left, kind, source, before, is_urgent, named = row.split(",")
+                boxes = [int(box) for box in named.split("+") if box]
+                self.missions[int(number)] = Order(
+                    int(number), int(target), int(left), kind, int(source), boxes, int(before), is_urgent == "1"
+                )
+        for row in str(newest["tasks"]).split(";"):
+            if row:
+                numbers = [int(one) for one in row.split(",")]
+                task = Reference(self.node_id, numbers[0])
+                _, mission, box, to, before_us, urgent, winner = numbers
+                self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent))
+                if winner:
+                    self.won[task] = winner
+
+
+def types_of(site: Terminal) -> list[str]:
+    """The site's types of boxes, as a desk's keyboard numbers them."""
+    return list(dict.fromkeys(box.type for box in site.boxes))

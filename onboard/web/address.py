@@ -1,0 +1,22 @@
+"""Where the page is served, and whether it can be: without the libraries of the extra ``web``."""
+
+from importlib.util import find_spec
+
+DEFAULT_PORT = 8080
+
+
+class WebError(Exception):
+    """The page cannot be served; ``str`` is one line for a person."""
+
+
+def is_installed() -> bool:
+    """Whether the libraries of the extra ``web`` are there."""
+    return all(find_spec(name) is not None for name in ("starlette", "uvicorn", "websockets"))
+
+
+def parse_address(where: str) -> tuple[str, int]:
+    """Host and port of ``PORT`` or ``HOST:PORT``. Raises ``WebError``."""
+    host, _, port = where.rpartition(":")
+    if not port.isdigit() or not 0 <= int(port) < 1 << 16:
+        raise WebError(f"{where}: must be PORT or HOST:PORT, such as 127.0.0.1:{DEFAULT_PORT}")
+    return host.strip("[]") or "127.0.0.1", int(port)

@@ -1,0 +1,121 @@
+"""``onboard web``: the page for a live bus that is only listened to, or for a recorded log with a slider."""
+
+import argparse
+import asyncio
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from onboard.config.problems import ConfigError
+from onboard.config.site import load_site
+from onboard.core.site import Site
+from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.kinds.registry import system_of
+from onboard.web.address import DEFAULT_PORT, WebError
+from onboard.web.app import Source
+from onboard.web.live import LiveSource, LogSource
+from onboard.web.serve import WebServer
+from onboard.wire.codec import Codecs, codecs
+
+EXAMPLES = """\
+exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the command line or in a file
+
+examples:
+  onboard web -i socketcan -c can0 -b 500000 --site mysite.toml     a real bus: listened to, never spoken on
+  onboard web -i socketcand -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site mysite.toml
+  onboard web trace.log --site mysite.toml                          a recorded log, with a slider
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The command line of ``onboard web``."""
+    parser = argparse.ArgumentParser(
+        prog="onboard web",
+        description="Show a site as its bus tells it, on a page of this computer.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("log", nargs="?", type=Path, metavar="LOG", help="a log of candump -L instead of a bus")
+    parser.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    parser.add_argument(
+        "--web",
+        default=f"127.0.0.1:{DEFAULT_PORT}",
+        metavar="[HOST:]PORT",
+        help="where (default: %(default)s); other hosts need the token that is printed",
+    )
+    add_bus_arguments(parser)
+    return parser
+
+
+def main(argv: Sequence[str]) -> int:
+    """Entry point; returns the exit status."""
+    parser = build_parser()
+    args = parser.parse_args(argv)
+    if args.log is None and not hasattr(args, "interface"):
+        parser.error("name a log, or a bus: -i INTERFACE -c CHANNEL")
+    try:
+        site = load_site(args.site)
+        system = system_of(site)
+        codec = codecs(system.name, system.messages)
+        if args.log is not None:
+            return asyncio.run(_show_log(site, codec, args.log, _read(args.log), args.web))
+        settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
+        return asyncio.run(_show_bus(site, codec, settings, args.web))
+    except (ConfigError, BusOpenError, WebError) as error:
+        for line in str(error).splitlines():
+            print(line if isinstance(error, ConfigError) else f"onboard web: {line}", file=sys.stderr)
+        return 2
+
+
+def _read(path: Path) -> list[bytes]:
+    try:
+        return path.read_bytes().splitlines(keepends=True)
+    except OSError as error:
+        raise WebError(f"{path}: {error.strerror or error}; name an existing log") from error
+
+
+async def _show_log(site: Site, codec: Codecs, path: Path, lines: list[bytes], where: str) -> int:
+    try:
+        source = LogSource(site, codec, lines)
+    except ValueError as error:
+        raise WebError(f"{path}: {error}; name a log of this site in the format of candump -L") from error
+    playing = asyncio.get_running_loop().create_task(source.play())
+    try:
+        return await _serve(source, where, None)
+    finally:
+        playing.cancel()
+
+
+async def _show_bus(site: Site, codec: Codecs, settings: BusSettings, where: str) -> int:
+    source = LiveSource(site, codec)
+    bus = await open_bus(settings)
+    bus.subscribe(source.on_frame)
+    lost = asyncio.get_running_loop().create_task(bus.wait_lost())
+    try:
+        return await _serve(source, where, lost)
+    finally:
+        lost.cancel()
+        await bus.close()
+
+
+async def _serve(source: Source, where: str, lost: asyncio.Task[str] | None) -> int:
+    """Until a signal ends it, or the bus is gone."""
+    server = WebServer(source, where)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, server.stop)
+    status = 0
+
+    def on_lost(task: asyncio.Task[str]) -> None:
+        nonlocal status
+        if not task.cancelled():
+            status = 1
+            print(f"onboard web: the bus is gone: {task.result()}", file=sys.stderr)
+            server.stop()
+
+    if lost is not None:
+        lost.add_done_callback(on_lost)
+    print(f"picture at {server.address}", flush=True)
+    await server.run()
+    return status

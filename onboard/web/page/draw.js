@@ -1,0 +1,287 @@
+// Drawing the site as an elevation: floors above each other, lifts at the ends, everything to the millimetre that the
+// bus tells. Between two words of a machine it moves on at its last speed, never beyond the next segment's middle.
+
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+export class Stage {
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.context = canvas.getContext("2d");
+    this.layout = null;
+    this.hits = [];
+  }
+
+  setLayout(layout) {
+    this.layout = layout;
+    this.tracks = new Map(layout.tracks.map((track) => [track.number, track]));
+    this.alleys = layout.tracks.filter((track) => track.kind === "alley").sort((a, b) => b.number - a.number);
+    this.lifts = layout.tracks.filter((track) => track.kind === "lift");
+    this.spurs = layout.tracks.filter((track) => track.kind === "spur");
+    this.longest = Math.max(1, ...this.alleys.map((alley) => alley.length));
+    this.places = new Set(layout.places);
+    this.bays = new Map(layout.machines.filter((one) => one.station !== null).map((one) => [one.station, one]));
+    this.liftMachines = new Map(layout.machines.filter((one) => one.kind === "lift").map((one) => [one.home[0], one]));
+    this.resize();
+  }
+
+  resize() {
+    if (!this.layout) return;
+    const ratio = window.devicePixelRatio || 1;
+    const width = this.canvas.clientWidth || 600;
+    const cell = width / (this.longest + 3.9);
+    const rows = Math.max(1, this.alleys.length);
+    const high = Math.max(26, Math.min(cell * 2.4, (window.innerHeight * 0.82) / rows));
+    this.cell = cell;
+    this.floor = high;
+    this.canvas.style.height = `${Math.round(high * rows + 16)}px`;
+    this.canvas.width = Math.round(width * ratio);
+    this.canvas.height = Math.round((high * rows + 16) * ratio);
+    this.ratio = ratio;
+  }
+
+  // Middle of an alley's position, in pixels; index 0 and length + 1 are the platforms.
+  at(track, position) {
+    const row = this.alleys.findIndex((alley) => alley.number === track);
+    return { x: (position + 1.7) * this.cell, y: 8 + (row + 0.5) * this.floor, row };
+  }
+
+  liftY(track, position) {
+    const joins = this.tracks.get(track).joins;
+    const low = Math.max(1, Math.min(joins.length, Math.floor(position)));
+    const high = Math.min(joins.length, low + 1);
+    const one = this.at(joins[low - 1][0], 0).y;
+    const other = this.at(joins[high - 1][0], 0).y;
+    return one + (other - one) * Math.max(0, Math.min(1, position - low));
+  }
+
+  liftX(track) {
+    const [alley, index] = this.tracks.get(track).joins[0];
+    return this.at(alley, index === 1 ? 0 : this.longest + 1).x;
+  }
+
+  // Where a machine is now, in positions of its track.
+  position(machine, nowUs) {
+    const track = this.tracks.get(machine.track);
+    const pitch = track ? track.pitch_mm : 1;
+    const told = machine.index + machine.offset_mm / pitch;
+    const passed = Math.max(0, nowUs - machine.since_us) / 1e6;
+    const moved = Math.max(-1, Math.min(1, (machine.speed_mm_s * passed) / pitch));
+    return told + moved;
+  }
+
+  where(node, snapshot, nowUs) {
+    const machine = snapshot.machines[node];
+    const track = this.tracks.get(machine.track);
+    if (!track) return null;
+    const position = this.position(machine, nowUs);
+    if (track.kind === "lift") return { x: this.liftX(track.number), y: this.liftY(track.number, position) };
+    if (track.kind === "spur") {
+      const [alley, index] = track.joins[0];
+      const spot = this.at(alley, index);
+      return { x: spot.x, y: spot.y - this.floor * 0.3 };
+    }
+    const spot = this.at(track.number, Math.min(position, track.length + 1));
+    const lift = this.liftAt(track, machine.index);
+    if (lift !== null) {
+      const platform = snapshot.machines[this.liftMachines.get(lift).node];
+      return { x: spot.x, y: this.liftY(lift, this.position(platform, nowUs)) };
+    }
+    return spot;
+  }
+
+  liftAt(alley, index) {
+    if (index >= 1 && index <= alley.length) return null;
+    const end = index < 1 ? 1 : alley.length;
+    const lift = this.lifts.find((one) => one.joins.some(([track, at]) => track === alley.number && at === end));
+    return lift ? lift.number : null;
+  }
+
+  draw(snapshot, nowUs, chosen) {
+    if (!this.layout || !snapshot) return;
+    const { context: pen, ratio } = this;
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, this.canvas.width, this.canvas.height);
+    pen.textAlign = "center";
+    pen.textBaseline = "middle";
+    this.hits = [];
+    this.drawFloors(pen, snapshot);
+    this.drawAhead(pen, snapshot, nowUs, chosen);
+    this.drawShafts(pen, snapshot, nowUs);
+    for (const machine of this.layout.machines) {
+      if (machine.kind === "robot") this.drawRobot(pen, machine, snapshot, nowUs, chosen);
+    }
+  }
+
+  drawFloors(pen, snapshot) {
+    const { cell, floor } = this;
+    for (const alley of this.alleys) {
+      const left = this.at(alley.number, 1).x - cell / 2;
+      const middle = this.at(alley.number, 1).y;
+      pen.fillStyle = css("--free");
+      pen.fillRect(left, middle - floor * 0.14, cell * alley.length, floor * 0.28);
+      pen.fillStyle = css("--dim");
+      pen.font = `${Math.min(13, floor * 0.3)}px system-ui`;
+      pen.fillText(String(alley.number), cell * 0.45, middle);
+      for (let index = 1; index <= alley.length; index++) {
+        for (const side of [0, 1]) this.drawStation(pen, snapshot, alley.number, index, side);
+      }
+    }
+    pen.strokeStyle = css("--line");
+    for (const spur of this.spurs) {
+      const [alley, index] = spur.joins[0];
+      const spot = this.at(alley, index);
+      pen.strokeRect(spot.x - cell * 0.46, spot.y - floor * 0.44, cell * 0.92, floor * 0.26);
+    }
+  }
+
+  drawStation(pen, snapshot, track, index, side) {
+    const { cell, floor } = this;
+    const number = (track << 8) | (side << 7) | index;
+    const spot = this.at(track, index);
+    const box = { x: spot.x - cell * 0.42, y: spot.y + (side === 1 ? -0.45 : 0.18) * floor, w: cell * 0.84, h: floor * 0.26 };
+    const bay = this.bays.get(number);
+    const car = snapshot.cars[number];
+    if (bay) {
+      this.drawBay(pen, bay, box, car, snapshot.machines[bay.node]);
+    } else if (this.places.has(number)) {
+      pen.strokeStyle = css("--line");
+      if (car) {
+        pen.fillStyle = css("--car");
+        pen.fillRect(box.x, box.y, box.w, box.h);
+      } else {
+        pen.strokeRect(box.x, box.y, box.w, box.h);
+      }
+    } else {
+      return;
+    }
+    if (car && cell > 17 && !bay) this.text(pen, car.split(".")[1], box, css("--card"));
+    this.hits.push({ ...box, what: bay ? "machine" : "place", id: bay ? bay.node : number, car });
+  }
+
+  drawBay(pen, bay, box, car, machine) {
+    pen.lineWidth = 2;
+    pen.strokeStyle = css("--bay");
+    pen.fillStyle = car ? css("--car") : css("--card");
+    pen.fillRect(box.x, box.y, box.w, box.h);
+    pen.strokeRect(box.x, box.y, box.w, box.h);
+    pen.lineWidth = 1;
+    const doors = machine.doors;
+    if (doors) {
+      const inside = box.y < this.at(machine.track, 1).y ? box.y + box.h : box.y;
+      const outside = inside === box.y ? box.y + box.h : box.y;
+      this.drawDoor(pen, box, outside, doors.input);
+      this.drawDoor(pen, box, inside, doors.output);
+      pen.fillStyle = doors.light === "green" ? css("--hold") : css("--bad");
+      pen.beginPath();
+      pen.arc(box.x + box.w + 4, outside, 3, 0, 7);
+      pen.fill();
+    }
+    if (this.cell > 17) this.text(pen, car ? car.split(".")[1] : "I/O", box, car ? css("--card") : css("--bay"));
+  }
+
+  drawDoor(pen, box, y, state) {
+    pen.strokeStyle = css(state === "locked" || state === "closed" ? "--ink" : "--hold");
+    pen.lineWidth = 3;
+    pen.beginPath();
+    const open = state === "open" ? 0.12 : state === "opening" || state === "closing" ? 0.6 : 1;
+    pen.moveTo(box.x, y);
+    pen.lineTo(box.x + box.w * open, y);
+    pen.stroke();
+    pen.lineWidth = 1;
+  }
+
+  // Authority as a solid band, the plan as a thin line that goes on to its end.
+  drawAhead(pen, snapshot, nowUs, chosen) {
+    for (const machine of this.layout.machines) {
+      if (machine.kind !== "robot") continue;
+      const told = snapshot.machines[machine.node];
+      const strong = chosen === null || chosen === machine.node;
+      pen.globalAlpha = strong ? 0.5 : 0.12;
+      pen.fillStyle = css("--hold");
+      for (const [track, index] of told.holds) {
+        const row = this.tracks.get(track);
+        if (!row || row.kind !== "alley") continue;
+        const spot = this.at(track, index);
+        pen.fillRect(spot.x - this.cell / 2, spot.y - this.floor * 0.14, this.cell, this.floor * 0.28);
+      }
+      pen.globalAlpha = strong ? 0.9 : 0.15;
+      pen.strokeStyle = css("--plan");
+      pen.lineWidth = 2.5;
+      pen.setLineDash([6, 4]);
+      pen.beginPath();
+      let from = this.where(machine.node, snapshot, nowUs);
+      for (const [track, first, last] of told.plan) {
+        const row = this.tracks.get(track);
+        if (!row || !from) continue;
+        const to = row.kind === "alley" ? this.at(track, last) : row.kind === "lift" ? { x: from.x, y: this.liftY(track, last) } : from;
+        pen.moveTo(from.x, from.y);
+        pen.lineTo(to.x, to.y);
+        from = to;
+      }
+      pen.stroke();
+      pen.setLineDash([]);
+      pen.lineWidth = 1;
+      pen.globalAlpha = 1;
+    }
+  }
+
+  drawShafts(pen, snapshot, nowUs) {
+    const { cell, floor } = this;
+    for (const [track, machine] of this.liftMachines) {
+      const x = this.liftX(track);
+      const joins = this.tracks.get(track).joins;
+      const top = this.at(joins[joins.length - 1][0], 0).y - floor * 0.4;
+      const bottom = this.at(joins[0][0], 0).y + floor * 0.4;
+      pen.strokeStyle = css("--line");
+      pen.strokeRect(x - cell * 0.55, top, cell * 1.1, bottom - top);
+      const spot = this.where(machine.node, snapshot, nowUs);
+      const box = { x: x - cell * 0.5, y: spot.y - floor * 0.2, w: cell, h: floor * 0.4 };
+      pen.strokeStyle = css("--lift");
+      pen.lineWidth = 3;
+      pen.strokeRect(box.x, box.y, box.w, box.h);
+      pen.lineWidth = 1;
+      this.hits.push({ ...box, what: "machine", id: machine.node });
+    }
+  }
+
+  drawRobot(pen, machine, snapshot, nowUs, chosen) {
+    const spot = this.where(machine.node, snapshot, nowUs);
+    if (!spot) return;
+    const told = snapshot.machines[machine.node];
+    const { cell, floor } = this;
+    const box = { x: spot.x - cell * 0.46, y: spot.y - floor * 0.13, w: cell * 0.92, h: floor * 0.26 };
+    if (told.shuttle && told.shuttle.mm > 50) {
+      const out = (told.shuttle.mm / 5400) * floor * 0.3 * (told.shuttle.side === 1 ? -1 : 1);
+      pen.fillStyle = css("--robot");
+      pen.fillRect(spot.x - cell * 0.12, Math.min(spot.y, spot.y + out), cell * 0.24, Math.abs(out));
+    }
+    pen.fillStyle = told.car ? css("--car") : css("--robot");
+    pen.fillRect(box.x, box.y, box.w, box.h);
+    pen.strokeStyle = told.wait ? css("--wait") : chosen === machine.node ? css("--ink") : css("--robot");
+    pen.lineWidth = told.wait || chosen === machine.node ? 3 : 2;
+    pen.strokeRect(box.x, box.y, box.w, box.h);
+    pen.lineWidth = 1;
+    if (told.state === "silent" || told.state === "stopped") {
+      pen.strokeStyle = css("--bad");
+      pen.beginPath();
+      pen.moveTo(box.x, box.y);
+      pen.lineTo(box.x + box.w, box.y + box.h);
+      pen.moveTo(box.x + box.w, box.y);
+      pen.lineTo(box.x, box.y + box.h);
+      pen.stroke();
+    }
+    if (cell > 14) this.text(pen, machine.name.replace(/^MR/, ""), box, css("--card"));
+    this.hits.push({ ...box, what: "machine", id: machine.node });
+  }
+
+  text(pen, words, box, colour) {
+    pen.fillStyle = colour;
+    pen.font = `600 ${Math.max(7, Math.min(box.h * 0.8, (box.w / Math.max(2, words.length)) * 1.5))}px system-ui`;
+    pen.fillText(words, box.x + box.w / 2, box.y + box.h / 2 + 0.5);
+  }
+
+  // What is at a point of the picture, the last drawn first.
+  hit(x, y) {
+    return this.hits.findLast((box) => x >= box.x && x <= box.x + box.w && y >= box.y && y <= box.y + box.h) ?? null;
+  }
+}

@@ -1,0 +1,86 @@
+"""A search of its own for timings that stick: other states, other routes, other order; shares no code with the product.
+
+A robot is its whole remaining list of nodes; ways come from enumerating all ways by length. Slow and plain on purpose.
+"""
+
+from collections.abc import Iterator
+
+Way = tuple[int, ...]
+Edges = frozenset[frozenset[int]]
+
+
+def shortest(edges: Edges, start: Way, goal: int) -> Way | None:
+    """The shortest way that continues ``start`` without turning back, lowest nodes first; None where there is none."""
+    frontier = [start]
+    for _ in range(2 * len(edges) + 1):
+        done = sorted(way for way in frontier if way[-1] == goal)
+        if done:
+            return done[0]
+        grown = {}
+        for way in sorted(frontier):
+            for one in edges:
+                if way[-1] in one:
+                    (after,) = one - {way[-1]}
+                    if len(way) < 2 or after != way[-2]:
+                        grown.setdefault((way[-1], after), (*way, after))
+        frontier = list(grown.values())
+    return None
+
+
+def can_stick(edges: Edges, starts: Way, goals: Way, *, keep: bool) -> bool:
+    """Depth-first over robots' remaining ways: (behind or -1, node, ..., goal); an empty way has arrived."""
+    first = []
+    for start, goal in zip(starts, goals, strict=True):
+        way = shortest(edges, (start,), goal)
+        assert way is not None
+        first.append((-1, *way))
+    seen = set()
+    stack = [tuple(first)]
+    while stack:
+        ways = stack.pop()
+        if ways in seen:
+            continue
+        seen.add(ways)
+        after = list(_after(edges, ways, keep=keep))
+        if not after and any(ways):
+            return True
+        stack += after
+    return False
+
+
+def _after(edges: Edges, ways: tuple[Way, ...], *, keep: bool) -> Iterator[tuple[Way, ...]]:
+    taken = {frozenset(way[:2]) for way in ways if way and way[0] >= 0}
+
+    def grants(node: int, after: int) -> bool:
+        if frozenset((node, after)) in taken:
+            return False
+        mine = [one for one in edges if after in one]
+        left = [one for one in mine if one not in taken]
+        return not (keep and len(left) == 1 and len(mine) > 1)
+
+    for number, way in enumerate(ways):
+        if not way:
+            continue
+        for new in _steps(edges, ways, way, grants):
+            yield (*ways[:number], new, *ways[number + 1 :])
+
+
+def _steps(edges: Edges, ways: tuple[Way, ...], way: Way, grants: object) -> Iterator[Way]:
+    assert callable(grants)
+    if len(way) == 2:
+        yield ()
+        return
+    behind, node, wants = way[:3]
+    if grants(node, wants):
+        yield way[1:]
+        return
+    opposite = [one for one in ways if one[:2] == (wants, node) and one[2:3] == (behind,)]
+    if behind < 0 or not opposite:
+        return
+    for one in edges:
+        if node in one:
+            (after,) = one - {node}
+            if after != behind and grants(node, after):
+                again = shortest(edges, (node, after), way[-1])
+                if again is not None:
+                    yield again

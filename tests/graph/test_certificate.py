@@ -1,0 +1,159 @@
+"""Rows G02, G17 to G19, G21, G29, G30: all interleavings of the rules, certificates and counterexamples."""
+
+import json
+import random
+from pathlib import Path
+
+import pytest
+
+from bus_sim.certify.certificate import certify, count_stuck
+from bus_sim.certify.model import Model
+from bus_sim.certify.search import Search, Tasks, task_sets
+from bus_sim.certify.throughput import Pace, measure
+from bus_sim.cli import main
+from onboard.kinds.graph.network import Graph, complete, edge, grid, ring
+from onboard.kinds.graph.rules import Rules
+from tests.graph.brute_force import can_stick
+
+#: SYSTEMS 2.4: graph, robots, task sets, and how many of them can stick with rule G21 off and on.
+ROWS = [
+    ("3x3 grid", grid(3, 3), 2, 2052, 32, 0),
+    ("C5", ring(5), 2, 130, 5, 5),
+    ("C6", ring(6), 2, 315, 24, 23),
+    ("C8", ring(8), 2, 1204, 130, 129),
+    ("C6", ring(6), 3, 1420, 282, 318),
+    ("K4", complete(4), 2, 42, 0, 0),
+    ("K4", complete(4), 3, 44, 0, 0),
+    ("K5", complete(5), 3, 320, 0, 0),
+]
+
+
+@pytest.mark.parametrize(("graph", "robots", "sets", "off", "on"), [row[1:] for row in ROWS], ids=lambda one: "")
+def test_g21_g29_the_exhaustive_rows_to_the_last_integer(
+    graph: Graph, robots: int, sets: int, off: int, on: int
+) -> None:
+    assert count_stuck(graph, robots, Rules.PAPER) == (sets, off)
+    assert count_stuck(graph, robots, Rules.KEEP) == (sets, on)
+
+
+def test_g21_the_ring_where_the_rule_itself_sticks() -> None:
+    tasks = Tasks((0, 3), (2, 1))
+    assert not Search(Model(ring(6), Rules.PAPER)).can_stick(tasks)
+    stuck = Search(Model(ring(6), Rules.KEEP)).counterexample(tasks)
+    assert stuck is not None
+    assert [(move.robot, move.node) for move in stuck.moves] == [(0, 1), (1, 2)]
+    assert {(robot.start, robot.node) for robot in stuck.state} == {(0, 1), (3, 2)}
+
+
+def _some_graph(chance: random.Random) -> Graph:
+    """A ring of 5 or 6 with chords: every node has two edges or more."""
+    nodes = chance.choice((5, 6))
+    lengths = {edge(node, (node + 1) % nodes): 1 for node in range(nodes)}
+    for _ in range(chance.randint(1, 3)):
+        lengths[edge(*chance.sample(range(nodes), 2))] = 1
+    return Graph(lengths)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_g29_a_search_of_its_own_agrees_on_other_graphs(seed: int) -> None:
+    chance = random.Random(seed)
+    graph = _some_graph(chance)
+    edges = frozenset(frozenset(ends) for ends in graph.lengths_mm)
+    for rules in (Rules.PAPER, Rules.KEEP):
+        search = Search(Model(graph, rules))
+        for robots, most in ((2, 60), (3, 40)):
+            every = list(task_sets(graph, robots))
+            for tasks in chance.sample(every, most):
+                expected = can_stick(edges, *tasks, keep=rules is Rules.KEEP)
+                assert search.can_stick(tasks) == expected, (graph, rules, tasks)
+
+
+@pytest.mark.parametrize(
+    ("graph", "robots", "rules", "certified"),
+    [
+        (ring(6), 2, Rules.PAPER, False),
+        (ring(6), 2, Rules.KEEP, False),
+        (grid(3, 3), 3, Rules.PAPER, False),
+        (grid(3, 3), 3, Rules.KEEP, False),
+        (complete(4), 3, Rules.PAPER, True),
+        (grid(3, 3), 2, Rules.KEEP, True),
+    ],
+)
+def test_g24_g29_what_is_certified_and_what_is_not(graph: Graph, robots: int, rules: Rules, *, certified: bool) -> None:
+    found = certify(graph, robots, rules, 1)
+    assert found.certified is certified
+    if not certified:
+        # The counterexample is one: all moves are allowed, one after the other, and then nobody has one.
+        assert found.stuck is not None
+        model = Model(graph, rules)
+        state = model.start(*found.stuck.tasks)
+        for move in found.stuck.moves:
+            state = dict(model.moves(state))[move]
+        assert not model.moves(state)
+        assert not model.is_over(state)
+
+
+def test_g02_a_dead_end_is_not_certified() -> None:
+    found = certify(Graph({(0, 1): 1, (1, 2): 1, (0, 2): 1, (2, 3): 1}), 1, Rules.EDGE_AND_NODE, 4)
+    assert found.certified is False
+    assert "N3" in found.reason
+
+
+@pytest.mark.parametrize(("graph", "robots"), [(ring(5), 3), (grid(3, 3), 2), (complete(4), 3), (ring(6), 3)])
+def test_g29_an_edge_with_its_node_never_sticks(graph: Graph, robots: int) -> None:
+    # The certificate has an argument for it; the search through all timings confirms the argument.
+    assert count_stuck(graph, robots, Rules.EDGE_AND_NODE, capacity=robots)[1] == 0
+    assert certify(graph, robots, Rules.EDGE_AND_NODE, robots).certified
+    # With one slot a node too few robots find room: the search says so.
+    assert count_stuck(graph, robots, Rules.EDGE_AND_NODE, capacity=1)[1] > 0
+
+
+def test_g29_a_search_that_is_too_large_is_not_called_certified() -> None:
+    found = certify(complete(5), 3, Rules.PAPER, 1, limit=50)
+    assert found.certified is None
+    assert "50 states" in found.reason
+
+
+def test_g30_the_best_number_of_robots_is_measured_and_certified(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["certify", "grid:3x3", "--robots", "2", "--rules", "keep", "--up-to", "3"]) == 0
+    said = capsys.readouterr().out
+    assert "deadlock-free under these rules" in said
+    assert "proposed: 2 robots" in said  # three are not certified, and two do more than one
+    one, two = (measure(Model(grid(3, 3), Rules.KEEP), robots, Pace(1, 0.5)) for robots in (1, 2))
+    assert one.per_hour < two.per_hour < 2 * one.per_hour
+    assert one.stuck_at_s is two.stuck_at_s is None
+
+
+def test_g30_robots_that_stick_have_no_throughput_afterwards() -> None:
+    result = measure(Model(ring(6), Rules.PAPER), 2, Pace(1, 0.5))
+    assert result.stuck_at_s is not None
+    assert result.stuck_at_s < 600
+
+
+def test_g29_a_counterexample_is_written_and_played(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "stuck.json"
+    options = ["--robots", "2", "--rules", "paper", "--up-to", "1", "--counterexample", str(file)]
+    assert main(["certify", "ring:6", *options]) == 1
+    assert "not certified" in capsys.readouterr().out
+    assert main(["certify", "--play", str(file)]) == 0
+    assert "nobody can move" in capsys.readouterr().out
+    content = json.loads(file.read_text())
+    content["moves"].pop()
+    file.write_text(json.dumps(content))
+    assert main(["certify", "--play", str(file)]) == 1
+    file.write_text("{}")
+    assert main(["certify", "--play", str(file)]) == 2
+    assert str(file) in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [(["ring:2"], "too small"), (["standard"], "no graph"), (["ring:6", "--robots", "7"], "--robots 7")],
+)
+def test_g29_a_mistake_in_the_command_line_is_one_line(
+    arguments: list[str], word: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["certify", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert word in error
+    assert error.count("\n") == 1
