@@ -42,6 +42,8 @@ class GoingAround:
     take_up: Callable[[int, Sequence[Step], list[Work], int], list[Effect]]
     #: Tasks given back, with why, how often to say so still, and when next.
     given_back: dict[Reference, tuple[Reason, int, int]] = field(default_factory=dict)
+    #: Whether the drive does not do what it is told.
+    is_stuck: bool = False
     _seen: int = 0
     _admissions: int = 0
     _since_us: int | None = None
@@ -73,6 +75,21 @@ class GoingAround:
                 self._retry_at_us = now_us
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             effects += self._try(now_us)
+        return effects
+
+    def watch_drive(self, now_us: int) -> list[Effect]:
+        """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks."""
+        if self.carriage.stall.is_stuck(now_us) is self.is_stuck:
+            return []
+        self.is_stuck = not self.is_stuck
+        if not self.is_stuck:
+            self.turn_later(now_us)
+            return [Report("the drive moves again")]
+        lost = self.untouched()
+        effects: list[Effect] = [Report("the drive does not move")]
+        effects += self.drop(lost, now_us) if lost else []
+        for task in lost:
+            effects += self.forfeit(task, Reason.ACTUATOR_FAULT, now_us)
         return effects
 
     def turn_later(self, now_us: int) -> None:

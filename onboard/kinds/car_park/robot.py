@@ -114,7 +114,7 @@ class Robot:
     @property
     def state(self) -> MachineState:
         """Heartbeat state."""
-        if self._fault is not Reason.NONE:
+        if self._fault is not Reason.NONE or self.going_around.is_stuck:
             return MachineState.STOPPED
         if self.program.standing is None or self._recover_at_us is not None:
             return MachineState.STARTING
@@ -264,7 +264,8 @@ class Robot:
             return self.carriage.advance(now_us) if self.carriage.goal is not None else []
         if self._recover_at_us is not None and self._recover_at_us <= now_us:
             return self._recover(now_us)
-        effects = self.going_around.advance(now_us) if self._recover_at_us is None else []
+        effects = self.going_around.watch_drive(now_us)
+        effects += self.going_around.advance(now_us) if self._recover_at_us is None else []
         # A step can end without a word on any bus, and the next is to begin in the same moment.
         for _ in range(MAX_STEPS):
             step = self.program.step
@@ -407,7 +408,8 @@ class Robot:
         if step.action is LegAction.TRAVEL:
             self.carriage.go(step.destination)
         elif step.action is LegAction.RIDE:
-            return [ride_record(step), *self.riding.begin(step.track, step.to_index)]
+            told = self.carriage.statement(self.program.version, self.program.current)
+            return [ride_record(step), *told, *self.riding.begin(step.track, step.to_index)]
         elif step.work is not None:
             return self.shuttle.begin(step.work) + self._announce_start(step.work)
         return []
