@@ -7,6 +7,7 @@ from pathlib import Path
 from bus_sim.faults.injection import AnyFault
 from bus_sim.systems.cell.run import run_cell
 from bus_sim.systems.terminal.show import run_terminal
+from bus_sim.systems.turning.run import run_turning
 from onboard.core.site import Site
 
 
@@ -36,4 +37,5 @@ Runner = Callable[[Site, SystemOptions], int]
 RUNNERS: dict[str, Runner] = {
     "terminal": run_terminal,
     "cell": run_cell,
+    "turning": run_turning,
 }

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from onboard.config.cell import read_cell
 from onboard.config.reader import Table
 from onboard.config.terminal import read_terminal
+from onboard.config.turning import read_turning
 from onboard.core.site import Site
 
 
@@ -24,4 +25,5 @@ class Common(NamedTuple):
 READERS: dict[str, Callable[[Table, Common], Site]] = {
     "terminal": read_terminal,
     "cell": read_cell,
+    "turning": read_turning,
 }

@@ -22,6 +22,10 @@ from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.vehicle import VehicleFactory
+from onboard.kinds.turning.desk import DeskFactory as OrderDeskFactory
+from onboard.kinds.turning.machine import LatheFactory
+from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
+from onboard.kinds.turning.site import Turning
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +50,25 @@ _SYSTEMS: dict[str, System] = {
             TERMINAL_MESSAGES,
         ),
         System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: GoalDeskFactory()}, CELL_MESSAGES),
+        System(
+            Turning.system,
+            {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
+            TURNING_MESSAGES,
+        ),
     )
 }
+
+
+def add_system(system: System) -> None:
+    """One more system in this process, such as one that is being tried. Raises ``ValueError`` for a name twice."""
+    if system.name in _SYSTEMS:
+        raise ValueError(f"system {system.name}: there is one of this name")
+    _SYSTEMS[system.name] = system
+
+
+def remove_system(name: str) -> None:
+    """Take out what ``add_system`` put in. Raises ``KeyError``."""
+    del _SYSTEMS[name]
 
 
 def system_of(site: Site) -> System:

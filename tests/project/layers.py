@@ -85,13 +85,15 @@ LAYERS: dict[str, Layer] = {
     "onboard.trace": Layer(
         (*CORE_TYPES, *SYSTEM_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})
     ),
-    # The trace's own command line reads site files; the composition root loads it where it is asked for.
-    "onboard.trace.cli": Layer((*CORE_TYPES, *SYSTEM_TYPES, "onboard.config", "onboard.trace", "onboard.wire")),
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
         (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
     ),
+    # The trace's own command line; the composition root loads it where it is asked for.
+    "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
+    # Its commands are a composition root too: they name the contract of a site's system, and replay runs a controller.
+    "onboard.trace.commands": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
     "onboard": Layer(
         (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
         not_stdlib=frozenset({"random", "threading", "time"}),
