@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from onboard.core.authority import car_token, segment_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import Grade, LegAction, Reason, TaskPhase
-from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.effects import Effect, Report, Send
 from onboard.core.lifts import gate, lift_at
 from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
 from onboard.core.occupancy import itinerary_windows
@@ -19,6 +19,7 @@ from onboard.core.site import Segment
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.program import Handling, Program, Step, Work, to_itinerary
+from onboard.kinds.car_park.recovery import forfeited_record
 from onboard.kinds.car_park.travel import Carriage
 
 #: A plan that finds no way is tried again after this, us. Ours.
@@ -105,8 +106,11 @@ class GoingAround:
     def forfeit(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
         """Give an untouched task back; its steps are the caller's business."""
         self.given_back[task] = reason, SAY_AGAIN, now_us + SAY_AGAIN_US
-        entry: dict[str, str | int] = {"record": "forfeited", "task_origin": task.origin, "task": task.number}
-        return [Record(entry), Send(self._report(task, reason))]
+        return [forfeited_record(task), Send(self._report(task, reason))]
+
+    def lose(self, task: Reference) -> list[Effect]:
+        """A task is another's by its initiator's word; nobody need hear of that from me."""
+        return [forfeited_record(task), Report(f"task {task.origin}.{task.number} is another's now")]
 
     def untouched(self) -> list[Reference]:
         """Tasks in the program whose car was not touched and is in others' custody, in order."""
