@@ -103,6 +103,8 @@ class BusRun:
     observers: list[Callable[[Message, int], None]] = field(default_factory=list)
     #: Given every controller when it is powered up, before it starts: planted bugs come in here, and nothing else.
     before_start: list[Callable[[Controller], None]] = field(default_factory=list)
+    #: Told every machine whose controller lost its power.
+    after_crash: list[Callable[[Machine], None]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         system = system_of(self.site)
@@ -151,6 +153,8 @@ class BusRun:
             bus.power_off()
         journal = self.journals[machine.node_id]
         self.journals[machine.node_id] = replace(journal, entries=journal.replay())
+        for tell in self.after_crash:
+            tell(machine)
 
     def fleet_node(self, name: str) -> SimulatedBus | None:
         """A running controller's node on the fleet bus, by its machine's name; None while it is off."""

@@ -3,27 +3,45 @@
 import argparse
 import json
 import os
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from bus_sim.campaign import table
+from bus_sim.campaign.engine import on_cores, on_dask
+from bus_sim.campaign.points import SCENE, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES
-from bus_sim.campaign.runner import Plan, Result, run_campaign
-from bus_sim.campaign.trial import FAILURES, Verdict, play
+from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
+from bus_sim.campaign.trial import FAILURES, play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
+from onboard.core.site import Site
 
 HELP = """\
 Each seed brings its own customers and its own faults, drawn from the profile. A run with a failure is shrunk to the
-fewest faults that still fail; its scenario (bus-sim run --scenario FILE) and its trace are kept.
+fewest faults that still fail; its scenario (bus-sim run --scenario FILE) and its trace are kept. Every run is judged
+by the plant's oracle and by the checkers of `onboard trace check`: safety at any time, and when all faults are over
+also that everything goes on, that everybody is served or told why, and that all mirrors become equal.
+
+With --exhaustive one reference scene (a car in and out) is played again and again, each time with one single fault:
+every frame lost or doubled at each receiver, or every controller killed before each of its frames and around each of
+its journal writes.
 
 exit status:
-  0  safety held in every run
-  1  an invariant of the plant was broken, or a program failed
+  0  every run was safe, and went on once its faults were over
+  1  some run was not: the table says how, and the files that are named hold its scenario and its trace
   2  a mistake in the command line
+
+examples:
+  bus-sim campaign small --seeds 1-100 --faults crash
+  bus-sim campaign small --exhaustive crash --sample 400
+  bus-sim campaign standard --seeds 1-2000 --dask tcp://10.0.0.5:8786
 """
 
 
@@ -38,6 +56,11 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("site", help="name of a shipped site, or a site file")
     parser.add_argument("--seeds", default="1-16", metavar="A-B", help="from the first to the last (default: 1-16)")
     parser.add_argument("--faults", default="all", metavar="PROFILE", help=f"{', '.join(PROFILES)} (default: all)")
+    parser.add_argument(
+        "--exhaustive", choices=[str(one) for one in Single], help="every single fault of a kind in one reference scene"
+    )
+    parser.add_argument("--sample", type=int, metavar="N", help="with --exhaustive: only so many, spread over all")
+    parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--cars", type=int, default=6, metavar="N", help="cars in each run (default: 6)")
     parser.add_argument("--limit", type=float, default=7200.0, metavar="SECONDS", help="longest run (default: 7200)")
@@ -50,18 +73,14 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run_campaign_command(args: argparse.Namespace) -> int:
     """Play it. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for an unknown site."""
     site = find_site(args.site)
-    plan, seeds = _plan(args), _seeds(args.seeds)
-    jobs = args.jobs or os.cpu_count() or 1
+    plan = _plan(args)
     console = Console()
-    console.print(
-        f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}, {plan.arrivals.cars} cars each",
-        highlight=False,
-    )
+    trials, total = _trials(args, plan, site, console)
     results: list[Result] = []
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("runs", total=len(seeds))
-        for result in run_campaign(plan, seeds, jobs):
+        task = progress.add_task("runs", total=total)
+        for result in trials:
             results.append(result)
             progress.advance(task)
     results.sort(key=lambda result: result.seed)
@@ -69,8 +88,24 @@ def run_campaign_command(args: argparse.Namespace) -> int:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     if args.json is not None:
         args.json.write_text(json.dumps(table.to_json(plan, results), indent=2) + "\n", encoding="utf-8")
-    bad = (Verdict.VIOLATION, Verdict.CRASHED)
-    return 1 if any(result.report.verdict in bad for result in results) else 0
+    return 1 if any(result.report.verdict in FAILURES for result in results) else 0
+
+
+def _trials(args: argparse.Namespace, plan: Plan, site: Site, console: Console) -> tuple[Iterator[Result], int]:
+    """What is to be played, as an iterator over results, and how many they will be."""
+    jobs = args.jobs or os.cpu_count() or 1
+    play_all = partial(on_dask, args.dask) if args.dask else partial(on_cores, jobs)
+    if args.exhaustive is None:
+        seeds = _seeds(args.seeds)
+        head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
+        console.print(f"{head}, {plan.arrivals.cars} cars each", highlight=False)
+        return play_all(partial(run_seed, plan), seeds), len(seeds)
+    counts = count(site, reference(plan.site, plan.limit_s))
+    plan = replace(plan, usual_wait_s=counts.longest_wait_s)
+    every = [Point(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)]
+    chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
+    console.print(f"{args.exhaustive}s on {site.name}: {len(chosen)} of {len(every)} points", highlight=False)
+    return play_all(partial(run_point, plan), chosen), len(chosen)
 
 
 def _plan(args: argparse.Namespace) -> Plan:
@@ -82,6 +117,10 @@ def _plan(args: argparse.Namespace) -> Plan:
         raise DemandError(f"--cars {args.cars}: must be 1 or more")
     if not args.limit > 0:
         raise DemandError(f"--limit {args.limit}: must be above 0")
+    if args.sample is not None and (args.sample < 1 or args.exhaustive is None):
+        raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive")
+    if args.exhaustive is not None:
+        return Plan(args.site, args.exhaustive, args.limit, SCENE, args.out)
     return Plan(args.site, args.faults, args.limit, Arrivals(cars=args.cars), args.out)
 
 
@@ -114,6 +153,7 @@ def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
         f"longest wait {report.longest_wait_s:.0f} s   in {report.simulated_s:.0f} s",
         *(f"HALTED       {line}" for line in report.halted),
         *(f"VIOLATION    {line}" for line in report.violations),
+        *(f"STOOD STILL  {line}" for line in report.stalls),
         *([f"ERROR        {report.error}"] if report.error else []),
         *([f"trace        {trace}"] if trace is not None else []),
     ]

@@ -1,11 +1,13 @@
-"""Many trials over all cores; what each brings depends on its seed alone, never on which process played it."""
+"""Trials by their numbers: the seeds of a profile, or the points of the reference scene; failures are kept."""
 
-import multiprocessing
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
+from bus_sim.campaign.engine import on_cores
+from bus_sim.campaign.points import reference
 from bus_sim.campaign.profiles import draw_faults
 from bus_sim.campaign.shrink import shrink
 from bus_sim.campaign.trial import FAILURES, Report, Verdict, play
@@ -24,11 +26,20 @@ class Plan:
     limit_s: float = 7_200.0
     arrivals: Arrivals = field(default_factory=Arrivals)
     out: Path | None = None
+    #: The longest wait without faults, s, where it is known: of the reference scene, for single faults.
+    usual_wait_s: float | None = None
+
+
+class Point(NamedTuple):
+    """One single fault of the reference scene, by its number."""
+
+    number: int
+    fault: AnyFault
 
 
 @dataclass(frozen=True)
 class Result:
-    """One seed: what came of it, and of a failure the scenario that is left after shrinking, and where it lies."""
+    """One seed or point: what came of it, and of a failure the scenario left after shrinking, and where it lies."""
 
     seed: int
     report: Report
@@ -49,6 +60,16 @@ def run_seed(plan: Plan, seed: int) -> Result:
     return Result(seed, report, least, _keep(plan, site, seed, least, report))
 
 
+def run_point(plan: Plan, point: Point) -> Result:
+    """Play the reference scene with one single fault; there is nothing to shrink."""
+    site = find_site(plan.site)
+    scenario = reference(plan.site, plan.limit_s).with_faults([point.fault])
+    report = play(site, scenario, usual_wait_s=plan.usual_wait_s)
+    if report.verdict not in FAILURES:
+        return Result(point.number, report)
+    return Result(point.number, report, scenario, _keep(plan, site, point.number, scenario, report))
+
+
 def _still_fails(site: Site, scenario: Scenario, verdict: Verdict, faults: Sequence[AnyFault]) -> bool:
     return play(site, scenario.with_faults(faults)).verdict is verdict
 
@@ -67,10 +88,4 @@ def _keep(plan: Plan, site: Site, seed: int, least: Scenario, report: Report) ->
 
 def run_campaign(plan: Plan, seeds: Sequence[int], jobs: int) -> Iterator[Result]:
     """The results of all seeds, as they come in; with one job in this process."""
-    if jobs <= 1:
-        for seed in seeds:
-            yield run_seed(plan, seed)
-        return
-    # A fresh interpreter each: nothing that this process has done can reach a trial.
-    with multiprocessing.get_context("spawn").Pool(min(jobs, len(seeds))) as pool:
-        yield from pool.imap_unordered(partial(run_seed, plan), seeds)
+    return on_cores(jobs, partial(run_seed, plan), seeds)

@@ -12,6 +12,8 @@ COLUMNS = (
     Verdict.TOLD,
     Verdict.DELAYED,
     Verdict.STOPPED,
+    Verdict.APART,
+    Verdict.NOT_LIVE,
     Verdict.NOT_SERVED,
     Verdict.CRASHED,
     Verdict.VIOLATION,
@@ -35,7 +37,37 @@ def lines(results: Sequence[Result]) -> list[str]:
     for row in rows:
         counts = "".join(f"{came[row, column] or '.':>16}" for column in COLUMNS)
         text.append(f"{row:<18}{injected[row]:>9}{counts}")
-    return text + _failures(results)
+    return text + _customers(results) + _recovery(results) + _failures(results)
+
+
+def _customers(results: Sequence[Result]) -> list[str]:
+    reports = [result.report for result in results]
+    served, told = sum(one.served for one in reports), sum(one.told for one in reports)
+    full, waiting = sum(one.full for one in reports), sum(one.waiting for one in reports)
+    everybody = served + told + waiting
+    share = full / everybody if everybody else 0.0
+    hours = sum(one.simulated_s for one in reports) / 3600
+    return [
+        f"{len(reports)} runs, {hours:.1f} simulated hours, {everybody} customers: served {served}, told why {told}, "
+        f"left waiting {waiting}; refused because the park was full: {full} ({100 * share:.1f} %)"
+    ]
+
+
+def longest_recovery(results: Sequence[Result]) -> dict[str, tuple[int, int]]:
+    """By measure: the longest time of all runs, us, and in how many runs it was seen."""
+    found: dict[str, tuple[int, int]] = {}
+    for result in results:
+        for measure, us in result.report.recovery:
+            longest_us, runs = found.get(measure, (0, 0))
+            found[measure] = (max(longest_us, us), runs + 1)
+    return dict(sorted(found.items()))
+
+
+def _recovery(results: Sequence[Result]) -> list[str]:
+    return [
+        f"  {measure:<22} at most {us / 1e6:8.3f} s (seen in {runs} runs)"
+        for measure, (us, runs) in longest_recovery(results).items()
+    ]
 
 
 def _failures(results: Sequence[Result]) -> list[str]:
@@ -57,6 +89,7 @@ def to_json(plan: Plan, results: Sequence[Result]) -> dict[str, object]:
         "profile": plan.profile,
         "seeds": [result.seed for result in results],
         "simulated_h": sum(result.report.simulated_s for result in results) / 3600,
+        "recovery_us": {measure: us for measure, (us, _) in longest_recovery(results).items()},
         "verdicts": dict(Counter(result.report.verdict.value for result in results)),
         "runs": [
             {
@@ -68,7 +101,9 @@ def to_json(plan: Plan, results: Sequence[Result]) -> dict[str, object]:
                 "told": result.report.told,
                 "waiting": result.report.waiting,
                 "longest_wait_s": result.report.longest_wait_s,
+                "full": result.report.full,
                 "violations": list(result.report.violations),
+                "stalls": list(result.report.stalls),
                 "halted": list(result.report.halted),
                 "error": result.report.error,
                 "least": [str(fault) for fault in result.shrunk.faults] if result.shrunk is not None else None,

@@ -1,4 +1,4 @@
-"""The site file of a turning cell; docs/site-file.md describes every key."""
+"""The site file of a turning cell; docs/turning.md describes every key."""
 
 from itertools import pairwise
 from typing import TYPE_CHECKING

@@ -18,6 +18,11 @@ from onboard.kinds.cell.desk import DeskFactory as GoalDeskFactory
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
+from onboard.kinds.graph.agents import HostFactory
+from onboard.kinds.graph.desk import DeskFactory as VisitDeskFactory
+from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
+from onboard.kinds.graph.robot import RobotFactory as GraphRobotFactory
+from onboard.kinds.graph.site import FactoryGraph
 from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.terminal.site import Terminal
@@ -43,6 +48,15 @@ _SYSTEMS: dict[str, System] = {
         System(
             CarPark.system,
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
+        ),
+        System(
+            FactoryGraph.system,
+            {
+                KindCode.VEHICLE: GraphRobotFactory(),
+                KindCode.NODE: HostFactory(),
+                KindCode.DESK: VisitDeskFactory(),
+            },
+            GRAPH_MESSAGES,
         ),
         System(
             Terminal.system,

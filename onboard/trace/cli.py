@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from onboard.config.problems import ConfigError
-from onboard.trace.commands import check, convert, dump
+from onboard.trace.commands import check, convert, dump, story
 from onboard.trace.commands.common import Register, TraceError
 from onboard.trace.dump.filters import FilterError
 from onboard.trace.readers.open_log import LogOpenError
@@ -25,7 +25,13 @@ examples:
   onboard trace COMMAND --help
 """
 
-_COMMANDS: tuple[Register, ...] = (dump.register, convert.register, check.register)
+_COMMANDS: tuple[Register, ...] = (
+    dump.register,
+    convert.register,
+    story.register_calls,
+    story.register_why,
+    check.register,
+)
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -85,15 +85,15 @@ LAYERS: dict[str, Layer] = {
     "onboard.trace": Layer(
         (*CORE_TYPES, *SYSTEM_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})
     ),
+    # The trace's own command line reads site files; the composition root loads it where it is asked for.
+    "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
+    # Its commands are a composition root too: they name the contract of a site's system, and replay runs a controller.
+    "onboard.trace.commands": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
         (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
     ),
-    # The trace's own command line; the composition root loads it where it is asked for.
-    "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
-    # Its commands are a composition root too: they name the contract of a site's system, and replay runs a controller.
-    "onboard.trace.commands": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
     "onboard": Layer(
         (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
         not_stdlib=frozenset({"random", "threading", "time"}),
@@ -101,7 +101,7 @@ LAYERS: dict[str, Layer] = {
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
         ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
-        ("numpy", "ortools", "rich"),
+        ("distributed", "numpy", "ortools", "rich"),
         not_stdlib=frozenset({"threading"}),
     ),
     "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
@@ -112,6 +112,7 @@ EXCLUSIVE: dict[str, str] = {
     "aiomqtt": "onboard/io/mqtt.py",
     "can": "onboard/io/pycan.py",
     "cantools": "onboard/wire/dbc_file.py",
+    "distributed": "bus_sim/campaign/engine.py",
     "ortools": "bus_sim/compare/optimum.py",
 }
 

@@ -126,6 +126,8 @@ class OneCustodian(Rule):
         super().__init__(picture, report)
         self._stated: OrderedDict[tuple[int, int], int] = OrderedDict()
         self._open: list[tuple[Event[TaskReport], int]] = []
+        #: The place that each machine named last: a report may be long held up, while nobody acknowledges frames.
+        self._named: dict[int, int] = {}
 
     def handlers(self) -> Handlers:
         """Statements about cars, and reports that a car was put down."""
@@ -136,6 +138,8 @@ class OneCustodian(Rule):
         while self._open and now_us - self._open[0][1] > STATED_WITHIN_US:
             event, reported_us = self._open.pop(0)
             report = event.message
+            if self._named.get(report.sender) == report.station:
+                continue
             stated_us = self._stated.get((report.sender, report.station))
             if stated_us is None or stated_us < reported_us - STATED_WITHIN_US:
                 what = f"put a car down {_where(report.station)} and does not say which"
@@ -144,6 +148,7 @@ class OneCustodian(Rule):
     def _on_car(self, event: Event[CarAt]) -> None:
         said = event.message
         self._stated[said.sender, said.station] = event.time_us
+        self._named[said.sender] = said.station
         self._stated.move_to_end((said.sender, said.station))
         if len(self._stated) > MOST_CARS:
             self._stated.popitem(last=False)

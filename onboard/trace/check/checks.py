@@ -148,6 +148,7 @@ class Checks:
         self.verdict = Verdict(tuple(rule for rule in rules if not self._why_not(rule)))
         self.verdict.left_out = {rule.name: why for rule in rules if (why := self._why_not(rule))}
         self._last_us: int | None = None
+        self._excused_us = 0
         self._begin()
 
     def _why_not(self, rule: type[Rule]) -> str:
@@ -158,12 +159,17 @@ class Checks:
     def _begin(self) -> None:
         """Another run: nothing is known."""
         self._picture = Picture(self._site, disturbed=self._disturbed)
+        self._picture.excused_us = self._excused_us
         self._rules = [rule(self._picture, self._keep) for rule in self.verdict.rules]
         self._handlers: dict[type[Message], list[tuple[str, Callable[[Any], None]]]] = {}
         for rule in self._rules:
             for kind, handler in rule.handlers().items():
                 self._handlers.setdefault(kind, []).append((rule.name, handler))
         self._tick_us: int | None = None
+
+    def excuse(self, until_us: int) -> None:
+        """Until then, us of the log, machines are broken on purpose: rules of liveness begin to count there."""
+        self._excused_us = self._picture.excused_us = max(self._excused_us, until_us)
 
     def feed(self, time_us: int, channel: str, frame: Frame) -> None:
         """One frame of a log; ``channel`` tells buses apart, and may be any name."""

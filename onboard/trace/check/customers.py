@@ -30,6 +30,7 @@ class TasksServed(Rule):
     """Every task that a compartment calls for is done in the end, or refused with a reason."""
 
     name = "tasks-served"
+    liveness = True
     title = "every task is done, or refused with a reason"
     source = "issue 4, point 1"
 
@@ -67,7 +68,7 @@ class TasksServed(Rule):
     def tick(self, now_us: int) -> None:
         """Tasks that are open for too long."""
         for task, event in self._open.items():
-            if now_us - event.time_us <= SERVED_WITHIN_US:
+            if self.picture.waited_us(event.time_us, now_us) <= SERVED_WITHIN_US:
                 return
             if task not in self._told:
                 self._told.add(task)
@@ -79,6 +80,7 @@ class CustomersServed(Rule):
     """Whoever presses the key with a car in the bay, or puts a ticket in, gets a word, and then the car."""
 
     name = "customers-served"
+    liveness = True
     title = "every customer served, or told why"
     source = "issue 4, point 1; docs/decisions.md, flag 6"
     on_devices = True
@@ -121,11 +123,11 @@ class CustomersServed(Rule):
     def tick(self, now_us: int) -> None:
         """Who waits for too long."""
         for node, event in list(self._asked.items()):
-            if now_us - event.time_us > WORD_WITHIN_US:
+            if self.picture.waited_us(event.time_us, now_us) > WORD_WITHIN_US:
                 del self._asked[node]
                 self.find(event, (node,), "a customer pressed the key and got no word")
         for (node, car), event in self._tickets.items():
-            if now_us - event.time_us > SERVED_WITHIN_US and (node, car) not in self._told:
+            if self.picture.waited_us(event.time_us, now_us) > SERVED_WITHIN_US and (node, car) not in self._told:
                 self._told.add((node, car))
                 self.find(event, (node,), f"a customer still waits for car {car.origin}.{car.number}")
 

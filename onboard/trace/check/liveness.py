@@ -83,6 +83,7 @@ class SomethingHappens(_OpenTasks):
     """While a task is open, some machine or car moves, or a task goes on, within a minute beyond the longest motion."""
 
     name = "something-happens"
+    liveness = True
     title = "progress within 60 s while there is work"
     source = "issue 4, point 1"
 
@@ -130,7 +131,9 @@ class SomethingHappens(_OpenTasks):
 
     def tick(self, now_us: int) -> None:
         """Whether it stands still for too long."""
-        if not self.open or self._told or self._last is None or now_us - self._last.time_us <= self._limit_us:
+        if not self.open or self._told or self._last is None:
+            return
+        if self.picture.waited_us(self._last.time_us, now_us) <= self._limit_us:
             return
         self._told = True
         task = min(self.open, key=lambda one: (self.open[one], one))
@@ -146,6 +149,7 @@ class NobodyStarves(Rule):
     """
 
     name = "nobody-starves"
+    liveness = True
     title = "a bounded wait for each machine"
     source = "issue 3, point 3; issue 4, point 1"
     needs_site = True
@@ -176,7 +180,7 @@ class NobodyStarves(Rule):
     def _ended(self, node: int, now_us: int) -> None:
         waiting = self._waiting.pop(node, None)
         if waiting is not None:
-            self._note(node, now_us - waiting.time_us)
+            self._note(node, self.picture.waited_us(waiting.time_us, now_us))
             self._told.discard(node)
 
     def _note(self, node: int, waited_us: int) -> None:
@@ -185,7 +189,7 @@ class NobodyStarves(Rule):
     def tick(self, now_us: int) -> None:
         """Who waits for too long."""
         for node, event in self._waiting.items():
-            waited_us = now_us - event.time_us
+            waited_us = self.picture.waited_us(event.time_us, now_us)
             self._note(node, waited_us)
             if waited_us > self.limit_us and node not in self._told:
                 self._told.add(node)

@@ -32,6 +32,8 @@ class Picture:
         self.heard_us: dict[int, int] = {}
         #: Things that could not be judged, because the log does not tell enough.
         self.unjudged = 0
+        #: Until then machines were broken on purpose, us of the log: no rule of liveness counts time before it.
+        self.excused_us = 0
         self._site = site
 
     @property
@@ -45,6 +47,10 @@ class Picture:
     def has_site(self) -> bool:
         """Whether the site is known."""
         return self._site is not None
+
+    def waited_us(self, since_us: int, now_us: int) -> int:
+        """How long something has been due, for rules of liveness: from ``since_us``, or from the end of all faults."""
+        return now_us - max(since_us, self.excused_us)
 
     def kind(self, node: int) -> KindCode | None:
         """Kind of a machine by the site file."""

@@ -16,6 +16,8 @@ class Rule:
 
     ``needs_site``: it cannot be judged without the site file. ``undisturbed``: it holds only where no frame was lost or
     doubled on purpose. ``on_devices``: it judges device buses, so a log of the fleet bus alone tells it nothing.
+    ``liveness``: it says that something must happen in time; time in which machines were broken on purpose
+    (``Picture.excused_us``) does not count. All other rules hold at any time.
     """
 
     name: ClassVar[str]
@@ -24,6 +26,7 @@ class Rule:
     needs_site: ClassVar[bool] = False
     undisturbed: ClassVar[bool] = False
     on_devices: ClassVar[bool] = False
+    liveness: ClassVar[bool] = False
 
     def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
         self.picture = picture

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from onboard.core.site import Site
 from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.systems import rules_for
 from onboard.trace.commands.common import (
     Commands,
     TraceError,
@@ -52,7 +53,8 @@ def run(args: argparse.Namespace) -> int:
     site = site_of(args)
     contracts = codecs_of(site)
     fleet = _read_codec(args.dbc) if args.dbc is not None else contracts.fleet
-    verdict = _check(args, Checks(site, disturbed=args.faults, fleet=fleet, device=contracts.device))
+    checks = Checks(site, disturbed=args.faults, fleet=fleet, device=contracts.device, rules=rules_for(site))
+    verdict = _check(args, checks)
     if args.json is not None:
         write_text(args.json, json.dumps(verdict.to_json(), indent=2) + "\n")
     print("\n".join(_report(verdict, site)))

@@ -1,0 +1,51 @@
+"""The checkers of ``onboard.trace.check`` at every trial: they hear all buses, and share no code with the plant.
+
+What the plant's oracle finds happened to bodies; what the checkers find was said on a bus. A trial is safe where
+neither finds anything.
+"""
+
+from functools import partial
+
+from bus_sim.can.medium import Medium
+from bus_sim.run import FLEET, BusRun
+from onboard.core.frame import Frame
+from onboard.trace.check.checks import RULES, Checks
+
+#: Rules that say that something must happen in time; all others are rules of safety.
+LIVENESS = frozenset(rule.name for rule in RULES if rule.liveness)
+
+
+class Judges:
+    """Listens to every bus of a run from before its start. ``disturbed``: frames are lost or doubled on purpose."""
+
+    def __init__(self, run: BusRun, *, disturbed: bool) -> None:
+        self._site = run.site
+        self._checks = Checks(run.site, disturbed=disturbed, fleet=run.codecs.fleet, device=run.codecs.device)
+        self._listen(FLEET, run.fleet)
+        for node_id, medium in run.devices.items():
+            self._listen(run.site.machines[node_id].name, medium)
+
+    def _listen(self, channel: str, medium: Medium) -> None:
+        medium.tap(partial(self._hear, channel))
+
+    def _hear(self, channel: str, frame: Frame, time_us: int, _: str) -> None:
+        self._checks.feed(time_us, channel, frame)
+
+    @property
+    def is_unsafe(self) -> bool:
+        """Whether a rule was broken that holds at any time, also under faults."""
+        return bool(self._checks.verdict.counts.keys() - LIVENESS)
+
+    def excuse(self, until_us: int) -> None:
+        """Faults last until then, loop time in us: what must happen in time has time from there."""
+        self._checks.excuse(until_us)
+
+    def finish(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The run is over: what was unsafe, and what stood still though nothing was broken any more."""
+        findings = self._checks.finish().findings
+        unsafe = tuple(one.line(self._name) for one in findings if one.rule not in LIVENESS)
+        return unsafe, tuple(one.line(self._name) for one in findings if one.rule in LIVENESS)
+
+    def _name(self, node: int) -> str:
+        machine = self._site.machines.get(node)
+        return machine.name if machine is not None else str(node)

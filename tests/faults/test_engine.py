@@ -1,0 +1,37 @@
+"""Where trials are played makes no difference: this process, or the workers of a Dask scheduler."""
+
+import warnings
+from functools import partial
+
+import pytest
+
+from bus_sim.campaign.engine import on_cores, on_dask
+from bus_sim.campaign.runner import Plan, run_seed
+from bus_sim.cli import main
+from bus_sim.faults.scenario import Arrivals
+
+PLAN = Plan("level1", "bus", 3_600.0, Arrivals(cars=1))
+
+
+def test_a_campaign_over_a_scheduler_comes_to_the_same() -> None:
+    distributed = pytest.importorskip("distributed", reason="Dask is not installed: the extra campaign")
+    seeds = range(1, 11)
+    with warnings.catch_warnings():
+        # What Dask deprecates in itself is not ours to repair.
+        warnings.simplefilter("ignore")
+        with distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp://"
+        ) as cluster:
+            there = {r.seed: r.report for r in on_dask(cluster.scheduler_address, partial(run_seed, PLAN), seeds)}
+    here = {result.seed: result.report for result in on_cores(1, partial(run_seed, PLAN), seeds)}
+    assert there == here
+    assert len(there) == 10
+
+
+def test_where_no_scheduler_answers_one_line_says_so(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed", reason="Dask is not installed: the extra campaign")
+    monkeypatch.setattr("bus_sim.campaign.engine.ANSWER_S", 0.5)
+    assert main(["campaign", "level1", "--seeds", "1-2", "--dask", "tcp://127.0.0.1:9"]) == 2
+    assert "no Dask scheduler answers there" in capsys.readouterr().err

@@ -1,0 +1,74 @@
+"""Every single fault of the reference scene is a point with a number; a sample of each kind withstands it."""
+
+import random
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from bus_sim.campaign.points import Counts, Single, count, points, reference
+from bus_sim.campaign.runner import Plan, Point, run_point
+from bus_sim.campaign.trial import Verdict
+from bus_sim.can.faults import Fault
+from bus_sim.cli import main
+from bus_sim.faults.injection import AnyFault, Injection, parse_injection
+from bus_sim.sites import find_site
+
+SITE = "level1"
+
+
+@cache
+def counts() -> Counts:
+    return count(find_site(SITE), reference(SITE, 3_600.0))
+
+
+def every(single: Single) -> list[AnyFault]:
+    return points(find_site(SITE), single, counts())
+
+
+def test_each_frame_is_lost_once_at_each_of_its_receivers() -> None:
+    omissions = [one for one in every(Single.OMISSION) if isinstance(one, Fault)]
+    assert len(omissions) == len(counts().fleet_senders), "two machines: one receiver a frame"
+    assert [one.nth for one in omissions] == list(range(1, len(omissions) + 1))
+    assert all(one.receivers != (sender,) for one, sender in zip(omissions, counts().fleet_senders, strict=True))
+
+
+def test_each_machine_is_killed_at_each_frame_and_around_each_journal_write() -> None:
+    crashes = [one for one in every(Single.CRASH) if isinstance(one, Injection)]
+    robot = [one for one in crashes if one.target == "MR1" and one.number("restart_s") < 1]
+    assert sum(one.count("frame") > 0 for one in robot) == counts().sent["MR1"]
+    assert sum(one.count("write") > 0 for one in robot) == 2 * counts().written["MR1"]
+    assert {one.target for one in crashes} == {"IOC1", "MR1"}
+    assert [parse_injection(str(one)) for one in crashes] == crashes
+
+
+@pytest.mark.parametrize("single", [Single.OMISSION, Single.DUPLICATE])
+def test_a_sample_of_single_frames_lost_or_doubled_costs_nobody_the_car(single: Single) -> None:
+    # Of the last frames the run hardly shows the effect; they are in the whole, not in the sample.
+    chosen = random.Random(5).sample(list(enumerate(every(single)[:400], start=1)), 25)
+    plan = Plan(SITE, single, 3_600.0, usual_wait_s=counts().longest_wait_s)
+    for number, fault in chosen:
+        report = run_point(plan, Point(number, fault)).report
+        assert (report.violations, report.error, report.waiting) == ((), "", 0), str(fault)
+
+
+def test_a_point_that_fails_is_kept_and_can_be_played_again(tmp_path: Path) -> None:
+    plan = Plan(SITE, "crash", 200.0, out=tmp_path)
+    fault = parse_injection("actuator_stuck:target=IOC1,at_s=1,for_s=3000")
+    result = run_point(plan, Point(7, fault))
+    assert result.report.verdict is Verdict.NOT_SERVED
+    assert (tmp_path / "level1-crash-7.log").stat().st_size > 0
+    assert main(["run", "--scenario", str(tmp_path / "level1-crash-7.toml"), "--trace", str(tmp_path / "t.log")]) == 1
+
+
+def test_the_command_plays_a_sample_of_the_points(capsys: pytest.CaptureFixture[str]) -> None:
+    command = ["campaign", SITE, "--exhaustive", "duplicate", "--sample", "3", "--jobs", "1"]
+    assert main(command) == 0
+    told = capsys.readouterr().out
+    assert f"duplicates on level1: 3 of {len(every(Single.DUPLICATE))} points" in told
+    assert "3 customers: served 3" in told
+
+
+def test_a_sample_of_nothing_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["campaign", SITE, "--sample", "3"]) == 2
+    assert "--sample 3: must be 1 or more, and goes with --exhaustive" in capsys.readouterr().err

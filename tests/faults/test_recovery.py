@@ -1,0 +1,70 @@
+"""How long the fleet needs to get over a fault, looked at from outside, and whether it converges at all."""
+
+import pytest
+
+from bus_sim.campaign.recovery import Measure, healed_us
+from bus_sim.campaign.trial import Report, Verdict, play
+from bus_sim.faults.injection import parse_injection
+from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.planted.registry import BUGS
+from bus_sim.run import Simulation
+from bus_sim.sites import find_site
+
+
+def trial(*faults: str, cars: int = 1, limit_s: float = 1_200.0) -> Report:
+    """One car on the small site, with these faults."""
+    injections = tuple(parse_injection(fault) for fault in faults)
+    return play(find_site("small"), Scenario("small", 1, limit_s, Arrivals(cars, 20.0, 1.0, 100.0), injections))
+
+
+def times_s(report: Report) -> dict[str, float]:
+    return {measure: us / 1e6 for measure, us in report.recovery}
+
+
+def test_without_faults_there_is_nothing_to_get_over() -> None:
+    report = trial()
+    assert (report.verdict, report.recovery) == (Verdict.SERVED, ())
+
+
+def test_a_machine_that_falls_silent_is_missed_after_three_heartbeats() -> None:
+    report = trial("crash:target=ER1,at_s=40,restart_s=20")
+    times = times_s(report)
+    assert 4.0 <= times[Measure.LOSS_NOTICED] <= 6.2, "heartbeats come every two seconds"
+    assert 0.0 < times[Measure.RESTART_ADMITTED] < 15.0
+    assert Measure.HEAL_DIGESTS in times
+
+
+def test_a_machine_off_the_bus_works_again_soon_after_the_cause_is_gone() -> None:
+    times = times_s(trial("bus_off:target=MR1,at_s=40,for_s=0.5"))
+    assert 0.0 < times[Measure.BUS_OFF_WORKING] < 2.5, "its next heartbeat at the latest"
+
+
+def test_a_machine_that_stays_dead_is_not_waited_for() -> None:
+    report = trial("crash:target=ER2,at_s=40,restart=no")
+    assert (report.verdict, report.is_apart) == (Verdict.SERVED, False)
+
+
+def test_all_faults_are_over_with_the_last_of_them() -> None:
+    texts = ["burst:at_s=5,for_s=2", "power_cut:at_s=6,for_s=10,spread_s=4", "cancel:car=1,at_s=9", "lost_ticket:car=1"]
+    assert healed_us(parse_injection(text) for text in texts) == 20_000_000
+    assert healed_us([parse_injection("omission:until_us=77,probability=0.5")]) == 77
+
+
+def test_what_stands_still_while_faults_last_is_no_failure_but_what_does_so_afterwards_is() -> None:
+    """The only robots' drives hear no order, so an open task goes nowhere for longer than anybody may wait."""
+    stuck = [f"actuator_stuck:target={name},at_s=25,for_s={{}}" for name in ("MR1", "MR2")]
+    healing = trial(*(text.format(400) for text in stuck))
+    assert healing.stalls == ()
+    assert healing.verdict in (Verdict.SERVED, Verdict.DELAYED)
+
+
+def test_a_trial_hears_what_the_checkers_find(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A planted bug that the plant's oracle does not see, because nothing collides."""
+
+    def plant(simulation: Simulation, _: object) -> None:
+        BUGS["custody-first"].plant(simulation)
+
+    monkeypatch.setattr("bus_sim.campaign.trial.arm", plant)
+    report = trial(cars=2)
+    assert report.verdict is Verdict.VIOLATION
+    assert "one-custodian" in report.violations[0]
