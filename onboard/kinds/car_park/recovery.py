@@ -60,7 +60,7 @@ class Recovery:
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
     is_restart: bool = False
-    #: The last task whose car was left: whether anybody heard of it, nobody knows.
+    #: The last task whose car was left: who asks for it is told so.
     last_done: Reference | None = None
     #: Under which version each task was taken on, where it is not the first.
     versions: dict[Reference, int] = field(default_factory=dict)

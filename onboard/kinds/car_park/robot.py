@@ -324,7 +324,6 @@ class Robot:
         mine = self._taken_on(self.recovery.works)
         if self.recovery.last_done is not None:
             self._done.append(self.recovery.last_done)
-            mine.append(self._report(self.recovery.last_done, TaskPhase.DONE, 0))
         return self._publish(now_us) + mine
 
     def _recover(self, now_us: int) -> list[Effect]:
