@@ -16,6 +16,8 @@ from onboard.core.messages import Reference
 TEXTS: dict[DeskText, Event] = {
     DeskText.TAKE_TICKET: Event.TICKET,
     DeskText.FULL: Event.FULL,
+    # Turned away as well, if not for want of room.
+    DeskText.OUT_OF_ORDER: Event.FULL,
     DeskText.CAR_TOO_LARGE: Event.TOO_LARGE,
     DeskText.PLEASE_WAIT: Event.WAIT,
     DeskText.UNKNOWN_TICKET: Event.UNKNOWN,

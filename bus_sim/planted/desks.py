@@ -119,12 +119,17 @@ def _takes_and_sleeps(simulation: Simulation) -> None:
 
 
 def _drives_dead(simulation: Simulation) -> None:
-    """No drive hears its orders."""
+    """No drive hears its orders, and no robot notices."""
 
     def say(message: Message) -> Iterable[Message]:
         return [] if isinstance(message, DriveOrder) else [message]
 
     saying(simulation, KindCode.ROBOT, say)
+    in_behaviour(
+        simulation,
+        KindCode.ROBOT,
+        lambda robot: replace(robot.carriage.stall, "is_stuck", lambda _: lambda _now_us: False),
+    )
 
 
 def _refused_without_why(simulation: Simulation) -> None:

@@ -45,7 +45,7 @@ def _gate_any_time(simulation: Simulation) -> None:
     _gate_forgotten(simulation)
 
     def plant(lift: Any) -> None:
-        def may_have_gate(requester: int) -> Reason:
+        def may_have_gate(requester: int, _now_us: int) -> Reason:
             mine = lift.ride is not None and lift.ride.robot == requester
             lift._gate_was_out |= mine
             return Reason.NONE if mine else Reason.TOKEN_NOT_GRANTABLE_YET

@@ -26,7 +26,15 @@ def test_what_a_profile_draws_is_read_back_and_fits_the_site(profile: str) -> No
 
 def test_every_kind_of_the_table_does_something() -> None:
     site = find_site("small")
-    values: dict[str, Value] = {"target": "MR1", "members": "MR1", "receivers": "MR1", "at_s": 1.0, "car": 1}
+    values: dict[str, Value] = {
+        "target": "MR1",
+        "members": "MR1",
+        "receivers": "MR1",
+        "at_s": 1.0,
+        "car": 1,
+        "track": 1,
+        "index": 3,
+    }
     for name, kind in KINDS.items():
         given = {key: values[key] for key, setting in kind.settings.items() if setting.default is None}
         injection = Injection(name, given)

@@ -55,7 +55,8 @@ def test_what_stands_still_while_faults_last_is_no_failure_but_what_does_so_afte
     stuck = [f"actuator_stuck:target={name},at_s=25,for_s={{}}" for name in ("MR1", "MR2")]
     healing = trial(*(text.format(400) for text in stuck))
     assert healing.stalls == ()
-    assert healing.verdict in (Verdict.SERVED, Verdict.DELAYED)
+    # A robot that finds its drive stuck gives its task back, so the customer may be turned away with a word.
+    assert healing.verdict in (Verdict.SERVED, Verdict.DELAYED, Verdict.TOLD)
 
 
 def test_a_trial_hears_what_the_checkers_find(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -185,7 +185,7 @@ def test_p12_nobody_can_so_the_call_is_opened_again_then_refused_and_the_custome
     assert [award.result for award in awards] == [CallResult.REOPENED] * 4 + [CallResult.REFUSED]
     assert {award.reason for award in awards} == {Reason.NO_BID}
     assert not scene.all(Bid)
-    scene.first(DeskOrder, lambda order: order.text is DeskText.FULL)
+    scene.first(DeskOrder, lambda order: order.text is DeskText.OUT_OF_ORDER)
     summary = scene.simulation.plant.street.summary()
     assert (summary.refused_full, summary.queueing) == (1, 0)
 

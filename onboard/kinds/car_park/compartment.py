@@ -463,7 +463,8 @@ class Compartment:
         effects: list[Effect] = [
             Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
             *self._state_car(job.car, OUTSIDE, job.wheelbase_mm),
-            self._desk(DeskText.FULL, job.car),
+            # Nobody can although there is room: that is another word than full.
+            self._desk(DeskText.OUT_OF_ORDER if self.fleet.mirror.free_places() else DeskText.FULL, job.car),
         ]
         return effects + self._to_free()
 
