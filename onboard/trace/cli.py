@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from onboard.config.problems import ConfigError
-from onboard.trace.commands import charts, check, convert, dissector, dump, load, story
+from onboard.trace.commands import charts, check, convert, dissector, dump, load, replay, story
 from onboard.trace.commands.common import Register, TraceError
 from onboard.trace.dump.filters import FilterError
 from onboard.trace.readers.open_log import LogOpenError
@@ -34,6 +34,7 @@ _COMMANDS: tuple[Register, ...] = (
     charts.register_sequence,
     charts.register_diagram,
     load.register,
+    replay.register,
     dissector.register,
 )
 
