@@ -27,7 +27,6 @@ examples:
   onboard trace replay run.log --machine MR1 --site bus_sim/sites/small.toml
   onboard trace replay run.log --machine MR1 --site bus_sim/sites/small.toml --raise-costs 1
 """
-_MILLISECOND = 1_000
 
 
 def register(commands: Commands) -> None:
@@ -44,6 +43,12 @@ def register(commands: Commands) -> None:
         metavar="US",
         help=f"length of a durable write (default: {JOURNAL_US})",
     )
+    parser.add_argument(
+        "--first-us",
+        type=int,
+        metavar="US",
+        help="from power-up to the end of the log's first frame (default: as long as that frame takes)",
+    )
     parser.add_argument("--raise-costs", type=int, default=0, metavar="N", help="try it: its own bids cost N more")
 
 
@@ -59,8 +64,8 @@ def run(args: argparse.Namespace) -> int:
     factory: BehaviourFactory = factory_for(site, machine.kind)
     if args.raise_costs:
         factory = RaisedCosts(factory, args.raise_costs)
-    # All of a site is switched on at a whole moment; the first frame is over a little later.
-    origin_us = recording.first_us // _MILLISECOND * _MILLISECOND
+    first_us = recording.first_bits * 1_000_000 // site.bitrate if args.first_us is None else args.first_us
+    origin_us = recording.first_us - first_us
     driver = Driver(Holon(site, machine, factory), codecs, origin_us, args.journal_us)
     same, difference = compare(recording, driver.run(recording.heard, recording.last_us))
     if difference is None:

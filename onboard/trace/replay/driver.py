@@ -20,6 +20,7 @@ from onboard.core.negotiation import Estimator
 from onboard.core.negotiation.events import Needs, Proposal
 from onboard.core.site import Machine, Site
 from onboard.trace.candump import format_frame
+from onboard.trace.frame_bits import INTERMISSION_BITS, frame_bits
 from onboard.trace.raw import RawFrame
 from onboard.wire.codec import Codec, Codecs
 from onboard.wire.dbc_file import CONTROLLER, device_layouts
@@ -56,6 +57,8 @@ class Recording:
     said_fleet: list[Sent] = field(default_factory=list)
     said_device: list[Sent] = field(default_factory=list)
     first_us: int = 0
+    #: Length of the log's first frame: it was sent at power-up, and is stamped when it is over.
+    first_bits: int = 0
     last_us: int = 0
     has_devices: bool = False
 
@@ -99,6 +102,7 @@ def record(frames: Iterable[RawFrame], machine: Machine, codecs: Codecs, fleet: 
         frame = raw.classic()
         if not found.first_us:
             found.first_us = raw.time_us
+            found.first_bits = frame_bits(frame) - INTERMISSION_BITS if frame is not None else 0
         found.last_us = max(found.last_us, raw.time_us)
         if frame is None or frame.is_error or raw.channel not in (fleet, machine.name):
             continue
