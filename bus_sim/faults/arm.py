@@ -5,7 +5,7 @@ from functools import partial
 from typing import Final
 
 from bus_sim.can.faults import Fault
-from bus_sim.faults import bus, controllers, devices, people
+from bus_sim.faults import bus, controllers, devices, operators, people
 from bus_sim.faults.holon import FaultyHolon
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.table import KINDS
@@ -39,6 +39,8 @@ ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
     "oversize": people.oversize,
     "door_forced": people.door_forced,
     "moved": people.moved,
+    "blocked": operators.blocked,
+    "emergency_stop": operators.emergency_stop,
 }
 
 

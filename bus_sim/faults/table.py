@@ -226,4 +226,15 @@ KINDS: Final[Mapping[str, Kind]] = {
         "a standing carrier with its shuttle home is pushed along its track, as far as the next body lets it",
         _one(by_mm=_count("millimetres from -10000 to 10000", 600, -10_000, 10_000)),
     ),
+    "blocked": Kind(
+        Group.PEOPLE,
+        "an operator says that nobody can pass a segment; after for_s, that it can be passed again (0: never)",
+        {
+            "track": _count("the number of a track, from 1", None, 1, 254),
+            "index": _count("the index of a segment, from 1", None, 1, 255),
+            "at_s": _AT,
+            "for_s": _seconds(120.0),
+        },
+    ),
+    "emergency_stop": Kind(Group.PEOPLE, "an operator stops all machines at once", {"at_s": _AT}),
 }

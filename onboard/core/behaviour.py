@@ -29,6 +29,8 @@ class Fleet:
     negotiation: Negotiation
     entries: tuple[Mapping[str, str | int], ...] = ()
     petitions: Petitions = field(init=False)
+    #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
+    admissions: int = 0
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)

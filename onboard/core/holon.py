@@ -16,9 +16,11 @@ from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
     Award,
     Bid,
+    Blocked,
     BusTime,
     CallForProposals,
     CarAt,
+    Clear,
     Diagnostic,
     EmergencyStop,
     Heartbeat,
@@ -44,6 +46,8 @@ DIGEST_PATIENCE = 2
 ASK_AGAIN_US = 1_000_000
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
+#: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
+_OF_FOREIGNERS = (EmergencyStop, Heartbeat, Progress)
 #: Bus time on the wire has 48 bits of microseconds: 8.9 years.
 BUS_TIME_MODULUS = 1 << 48
 
@@ -77,6 +81,11 @@ class Holon:
         self.tokens.genesis_counts = self._has_past
         self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
+        for entry in entries:
+            if entry.get("record") in ("blocked", "clear"):
+                word = Blocked if entry["record"] == "blocked" else Clear
+                told = word(machine.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
+                self.mirror.on_word(told, 0)
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
@@ -112,6 +121,8 @@ class Holon:
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self._on_emergency_stop,
+            Blocked: self._on_word,
+            Clear: self._on_word,
         }
 
     # --- events in ---------------------------------------------------------------------------------------------
@@ -139,9 +150,13 @@ class Holon:
         if message.sender == self.node_id:
             self.drops[Reason.DUPLICATE_NODE_ID] += 1
             return self._halt("another node sends under this node-ID")
+        if message.sender in self.presence.foreign and not isinstance(message, _OF_FOREIGNERS):
+            self.drops[self.presence.foreign[message.sender][0]] += 1
+            return []
+        effects = self._awake(now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
-        effects = handler(message, now_us) if handler is not None else []
+        effects += handler(message, now_us) if handler is not None else []
         if isinstance(message, Itinerary | Heartbeat):
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
@@ -154,7 +169,7 @@ class Holon:
             self._sensed_early[type(message)] = message
             return []
         now_us = self.clock.bus_us(local_us)
-        return self._settle(self.behaviour.sense(message, now_us), now_us)
+        return self._settle(self._awake(now_us) + self.behaviour.sense(message, now_us), now_us)
 
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
@@ -163,9 +178,13 @@ class Holon:
             self._trust_at_us = None
             self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
-        effects = self.tokens.wake(now_us) + self._serve_petitions(now_us)
+        effects = self._awake(now_us) + self.tokens.wake(now_us) + self._serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
-        if not self._bus_time_lost:
+        if self.presence.is_admitted(now_us):
+            # What was planned before is old; the first word is that of a machine that takes part.
+            self.fleet.admissions += 1
+            self._heartbeat_due_us = now_us
+        if not self._bus_time_lost and not self.presence.is_held:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self._beat(now_us)
         return self._settle(effects, now_us)
@@ -177,17 +196,29 @@ class Holon:
             self._bus_time_due_us,
             self.tokens.next_wake(),
             self._petition_due(),
-            self._negotiation_due(),
-            self.behaviour.next_wake(),
+            self.presence.held_until_us,
+            None if self.presence.is_held else self._negotiation_due(),
+            None if self.presence.is_held else self.behaviour.next_wake(),
         ]
         due = [self.clock.local_us(time) for time in times if time is not None]
         if self._trust_at_us is not None:
             due.append(self._trust_at_us)
         return min(due) if due and self.halted is None else None
 
+    def _awake(self, now_us: int) -> list[Effect]:
+        """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
+        if self._heartbeat_due_us is None or not self.presence.awake(now_us):
+            return []
+        self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+        # One by one: all are asked at power-up only.
+        asked: list[Effect] = [Send(SyncRequest(self.node_id, node)) for node in self.mirror.peers]
+        return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
+
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
         if message.sender == self.node_id:
             return self._halt("another node sends under this node-ID")
+        if message.sender in self.presence.foreign:
+            return []
         if not self._is_time_source(message.sender):
             # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
             machine = self.site.machines.get(message.sender)
@@ -297,7 +328,11 @@ class Holon:
     def _may_not_bid(self, now_us: int) -> Reason:
         if self.clock.is_lost(self.clock.local_us(now_us)):
             return Reason.BUS_TIME_LOST
-        if self.behaviour.state in (MachineState.OBSTACLE, MachineState.STOPPED, MachineState.STARTING):
+        if self.presence.is_held or self.behaviour.state in (
+            MachineState.OBSTACLE,
+            MachineState.STOPPED,
+            MachineState.STARTING,
+        ):
             return Reason.POSITION_UNKNOWN
         return Reason.NONE
 
@@ -315,8 +350,11 @@ class Holon:
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
         if beat.contract != CONTRACT_VERSION or beat.site_digest != self.site.digest:
-            self.drops[Reason.OTHER_CONTRACT if beat.contract != CONTRACT_VERSION else Reason.OTHER_SITE] += 1
+            reason = Reason.OTHER_CONTRACT if beat.contract != CONTRACT_VERSION else Reason.OTHER_SITE
+            self.drops[reason] += 1
+            self.presence.heard_foreign(beat.sender, reason, now_us)
             return []
+        self.presence.foreign.pop(beat.sender, None)
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self._elect_time_source(self.clock.local_us(now_us))
@@ -339,7 +377,7 @@ class Holon:
                 f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
                 "a person must regenerate its tokens"
             )
-        effects = self.behaviour.statements(now_us)
+        effects = self.behaviour.statements(now_us) + self._blocked_again()
         known = self.mirror.peers.get(request.sender)
         if (
             request.whom == NOBODY
@@ -360,6 +398,18 @@ class Holon:
             return False
         return not self._has_past or is_newer(before, self.boot, 8)
 
+    def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
+        """A segment is blocked, or clear again; what I am steward of is in my journal."""
+        is_mine = self.site.stewards.get(word.track) == self.node_id
+        if not self.mirror.on_word(word, now_us) or not is_mine:
+            return []
+        record = "blocked" if isinstance(word, Blocked) else "clear"
+        return [Record({"record": record, "track": word.track, "index": word.index, "reason": int(word.reason)})]
+
+    def _blocked_again(self) -> list[Effect]:
+        tracks = [track for track, steward in self.site.stewards.items() if steward == self.node_id]
+        return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
+
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")
 
@@ -369,12 +419,12 @@ class Holon:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
-        for _ in range(MAX_ROUNDS):
+        for _ in range(0 if self.presence.is_held else MAX_ROUNDS):
             more = self.behaviour.advance(now_us)
             if not more:
                 return effects
             effects = effects + more
-        return effects + self._halt("the machine's steps do not come to rest")
+        return effects if self.presence.is_held else effects + self._halt("the machine's steps do not come to rest")
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -405,7 +455,7 @@ class Holon:
             self.mirror.digest(),
             self.boot,
             self.machine.kind,
-            self.behaviour.state,
+            MachineState.OBSTACLE if self.presence.is_held else self.behaviour.state,
         )
 
     def _elect_time_source(self, local_us: int) -> None:

@@ -268,6 +268,24 @@ class OperatorOrder(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class Blocked(Message):
+    """Segment (``track``, ``index``) cannot be passed: a person or a sensor says so. Plans go around it until Clear."""
+
+    track: int
+    index: int
+    reason: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class Clear(Message):
+    """A blocked segment can be passed again."""
+
+    track: int
+    index: int
+    reason: Reason
+
+
+@dataclass(frozen=True, slots=True)
 class Heartbeat(Message):
     """I live. ``mirror_digest`` is over the firm itineraries and cars known to the sender."""
 

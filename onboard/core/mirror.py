@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, OUTSIDE, Grade, KindCode, MachineState, Reason
 from onboard.core.lift_uses import standing_after
 from onboard.core.lifts import lift_tracks
-from onboard.core.messages import CarAt, Heartbeat, Itinerary, Progress, Reference
+from onboard.core.messages import Blocked, CarAt, Clear, Heartbeat, Itinerary, Progress, Reference
 from onboard.core.obstacles import Obstacles
 from onboard.core.occupancy import final_position, itinerary_windows, lift_uses, turned_in
 from onboard.core.passing import Plan, next_plan
@@ -125,6 +125,11 @@ class Mirror:
             lift_uses(self.site, itinerary, now_us, plan.first_begin_us),
         )
 
+    def on_word(self, word: Blocked | Clear, now_us: int) -> bool:
+        """Take up that a segment is blocked, or clear again; True where it is news."""
+        self._digest = None
+        return self.obstacles.hear(word, now_us)
+
     def set_aside(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> None:
         """A machine does not follow its plan: it is an obstacle at ``slots`` and passes nothing."""
         if self.obstacles.take_up(node, slots, reason, now_us):
@@ -206,13 +211,14 @@ class Mirror:
         return {node for node, peer in self.peers.items() if peer.heard_at_us >= limit_us}
 
     def digest(self) -> int:
-        """16 bits over firm itineraries (node, version) and cars (number, station): equal on nodes that agree."""
+        """16 bits over firm itineraries (node, version), cars (number, station) and blocked segments."""
         if self._digest is None:
             words = [node << 8 | it.version for node, it in sorted(self.itineraries.items())]
             for car, record in sorted(self.cars.items()):
                 if record.station == OUTSIDE:
                     continue
                 words += [car.origin << 16 | car.number, record.station]
+            words += [1 << 31 | segment.number for segment in sorted(self.obstacles.blocked)]
             self._digest = _crc16(words)
         return self._digest
 

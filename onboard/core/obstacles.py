@@ -5,14 +5,14 @@ and every slot whose token it holds, since nothing is taken back because of a ti
 on the bus (``Blocked``) until another clears it. What is known here steers plans only; tokens alone permit motion.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.core.authority import segment_token
 from onboard.core.codes import MOBILE_KINDS, MachineState, Reason
 from onboard.core.lifts import GATE_INDEX, PLATFORM_INDEX, lift_at, platform
-from onboard.core.messages import Progress
+from onboard.core.messages import Blocked, Clear, Progress
 from onboard.core.occupancy import standing_segments
 from onboard.core.reservations import FOREVER, Reservations, Use, Window
 from onboard.core.site import Machine, Segment, Site, TrackKind
@@ -38,7 +38,9 @@ class Obstacles:
     site: Site
     reservations: Callable[[], Reservations]
     machines: dict[int, Obstacle] = field(default_factory=dict)
-    blocked: dict[Segment, int] = field(default_factory=dict)
+    #: Segments that somebody says nobody can pass, and those of which it was taken back, each with why.
+    blocked: dict[Segment, Reason] = field(default_factory=dict)
+    cleared: dict[Segment, Reason] = field(default_factory=dict)
     changes: int = 0
     _slots: tuple[Segment, ...] = ()
 
@@ -64,20 +66,25 @@ class Obstacles:
         """Whether a slot is blocked, or some machine that is an obstacle has it."""
         return slot in self.blocked or any(slot in obstacle.slots for obstacle in self.machines.values())
 
-    def block(self, segment: Segment, node: int, now_us: int) -> bool:
-        """``node`` says that nobody can pass a segment; True where that is news."""
-        if segment in self.blocked or segment.track not in self.site.tracks:
+    def hear(self, word: Blocked | Clear, now_us: int) -> bool:
+        """Take up what somebody says of a segment; True where it is news. Segments of no site are passed over."""
+        segment = Segment(word.track, word.index)
+        if segment not in self._all_slots() or (segment in self.blocked) is isinstance(word, Blocked):
             return False
-        self.blocked[segment] = node
+        if isinstance(word, Blocked):
+            self.blocked[segment] = word.reason
+            self.cleared.pop(segment, None)
+        else:
+            del self.blocked[segment]
+            self.cleared[segment] = word.reason
         self._put(BLOCKED, self.blocked, now_us)
         return True
 
-    def clear(self, segment: Segment, now_us: int) -> bool:
-        """Somebody says that it can be passed again; True where that is news."""
-        if self.blocked.pop(segment, None) is None:
-            return False
-        self._put(BLOCKED, self.blocked, now_us)
-        return True
+    def words(self, node: int, tracks: Collection[int]) -> list[Blocked | Clear]:
+        """What ``node``, steward of ``tracks``, says again of their segments to who asks: blocked ones, and cleared."""
+        found: list[Blocked | Clear] = [Blocked(node, *one, why) for one, why in sorted(self.blocked.items())]
+        found += [Clear(node, *one, why) for one, why in sorted(self.cleared.items())]
+        return [word for word in found if word.track in tracks]
 
     def _put(self, owner: int, slots: Iterable[Segment], now_us: int) -> None:
         reservations = self.reservations()

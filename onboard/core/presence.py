@@ -2,6 +2,9 @@
 
 Any message is a sign of life. Who is silent, says STOPPED or OBSTACLE, or speaks another contract or site is in the way
 until it is heard again as a machine that takes part; a robot that was started again, until it has told a plan.
+
+The same holds for this machine: when it finds that it has slept for longer than the others wait for its word, or that
+more machines speak another contract or know another site than speak its own, it is an obstacle first (``is_held``).
 """
 
 from dataclasses import dataclass, field
@@ -12,6 +15,11 @@ from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
 from onboard.core.obstacles import STILL, holder_in
 from onboard.core.site import Machine, Site
 
+#: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word. Ours.
+SLEPT_BEATS = 2
+#: How long a machine that woke listens before it takes part, us: the others say what they plan. Ours.
+SETTLING_US = 2_000_000
+
 
 @dataclass
 class Presence:
@@ -21,14 +29,59 @@ class Presence:
     node_id: int
     mirror: Mirror
     tokens: TokenBook
-    #: Machines that speak another contract or know another site, and which of the two.
-    foreign: dict[int, Reason] = field(default_factory=dict)
+    #: Machines that speak another contract or know another site: which of the two, and when last heard.
+    foreign: dict[int, tuple[Reason, int]] = field(default_factory=dict)
+    #: Until when this machine is an obstacle after it woke, and how often it has been admitted since.
+    held_until_us: int | None = None
+    _active_us: int | None = None
     _listening_since_us: int | None = None
 
     @property
     def patience_us(self) -> int:
         """A machine that is not heard for so long is silent."""
         return MISSED_HEARTBEATS * self.site.timing.heartbeat_us
+
+    @property
+    def is_held(self) -> bool:
+        """Whether this machine is an obstacle: it neither moves nor bids."""
+        return self.held_until_us is not None
+
+    def awake(self, now_us: int) -> bool:
+        """Note that this machine lives; True where it finds that it has slept. Before its first beat it tells nothing.
+
+        It then waits until the others have said what they plan by now.
+        """
+        before_us, self._active_us = self._active_us, now_us
+        slept = before_us is not None and now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us
+        if slept:
+            self._begin_anew(now_us)
+            self.held_until_us = now_us + SETTLING_US
+        return slept
+
+    def is_admitted(self, now_us: int) -> bool:
+        """Whether the time as an obstacle has just ended."""
+        if self.held_until_us is None or now_us < self.held_until_us:
+            return False
+        if self._is_outvoted(now_us):
+            self.held_until_us = now_us + SETTLING_US
+            return False
+        self.held_until_us = None
+        return True
+
+    def heard_foreign(self, node: int, reason: Reason, now_us: int) -> None:
+        """A machine says that it speaks another contract, or knows another site."""
+        self.foreign[node] = reason, now_us
+        if node in self.site.machines:
+            self._judge(self.site.machines[node], now_us)
+        if self._is_outvoted(now_us) and self.held_until_us is None:
+            self.held_until_us = now_us + SETTLING_US
+
+    def _is_outvoted(self, now_us: int) -> bool:
+        """Whether more live machines are foreign to me than not; of two halves that with the lowest node-ID counts."""
+        since_us = now_us - self.patience_us
+        others = [node for node, (_, heard_us) in self.foreign.items() if heard_us > since_us]
+        ours = [self.node_id, *(node for node in self.mirror.alive(now_us) if node not in self.foreign)]
+        return (len(others), -min(others, default=0)) > (len(ours), -min(ours))
 
     def heard(self, node: int, now_us: int) -> None:
         """A sign of life; whoever was an obstacle may take part again."""
@@ -46,7 +99,7 @@ class Presence:
             if machine.node_id != self.node_id:
                 self._judge(machine, now_us)
 
-    def begin_anew(self, now_us: int) -> None:
+    def _begin_anew(self, now_us: int) -> None:
         """I have not listened for a while myself: everybody gets the time to be heard again."""
         self._listening_since_us = now_us
         for peer in self.mirror.peers.values():
@@ -65,7 +118,7 @@ class Presence:
         """Why a machine is an obstacle; NONE where it takes part, or has not had the time to say anything."""
         node = machine.node_id
         if node in self.foreign:
-            return self.foreign[node]
+            return self.foreign[node][0]
         peer, known = self.mirror.peers.get(node), self.mirror.obstacles.machines.get(node)
         heard_us = self._listening_since_us if peer is None else peer.heard_at_us
         if heard_us is None or now_us - heard_us >= self.patience_us:

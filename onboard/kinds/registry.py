@@ -18,6 +18,12 @@ from onboard.kinds.cell.desk import DeskFactory as GoalDeskFactory
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
+from onboard.kinds.graph.agents import HostFactory
+from onboard.kinds.graph.desk import DeskFactory as VisitDeskFactory
+from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
+from onboard.kinds.graph.robot import RobotFactory as GraphRobotFactory
+from onboard.kinds.graph.site import FactoryGraph
+from onboard.kinds.mapd.site import Mapd
 from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.terminal.site import Terminal
@@ -45,6 +51,15 @@ _SYSTEMS: dict[str, System] = {
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
         ),
         System(
+            FactoryGraph.system,
+            {
+                KindCode.VEHICLE: GraphRobotFactory(),
+                KindCode.NODE: HostFactory(),
+                KindCode.DESK: VisitDeskFactory(),
+            },
+            GRAPH_MESSAGES,
+        ),
+        System(
             Terminal.system,
             {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: MissionDeskFactory()},
             TERMINAL_MESSAGES,
@@ -55,6 +70,8 @@ _SYSTEMS: dict[str, System] = {
             {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
             TURNING_MESSAGES,
         ),
+        # Played without a bus so far (docs/import.md): no machine of it has a controller yet.
+        System(Mapd.system, {}),
     )
 }
 

@@ -130,9 +130,9 @@ class Activities:
         left = self._platform_of(body)
         if body.heard and at.track == body.at.track:
             self._travel(body, abs(position_mm - body.position_mm))
-        moved = at != body.at or message.speed_mm_s > 0
+        moved = at != body.at or message.speed_mm_s != 0
         body.heard = True
-        body.at, body.position_mm, body.moving = at, position_mm, message.speed_mm_s > 0
+        body.at, body.position_mm, body.moving = at, position_mm, message.speed_mm_s != 0
         if moved and body.waiting_since_us is not None:
             self._note_wait(body, time_us)
             body.waiting_since_us = None

@@ -122,6 +122,8 @@ _OPERATION = (
     Row(
         "Progress", (KindCode.ROBOT, KindCode.LIFT), _two, lambda _: _SECOND_US // 2, "segments at top speed, and stops"
     ),
+    Row("Blocked", _ALL, _one, _second, "a person or a sensor says so, once"),
+    Row("Clear", _ALL, _one, _second, "the same"),
     Row("Waiting", _ROBOT, _two, _second, "once for each thing waited for"),
     Row("TaskReport", _ROBOT, _two, _second, "one phase ends and the next begins"),
     Row("TaskReport", (), _rides, _window, "one for each ride won"),

@@ -11,8 +11,10 @@ from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, Grade, MachineS
 from onboard.core.messages import (
     Award,
     Bid,
+    Blocked,
     CallForProposals,
     CarAt,
+    Clear,
     Heartbeat,
     Itinerary,
     Message,
@@ -101,11 +103,17 @@ class SiteView:
                 self.itineraries[message.sender] = message
             case TaskReport():
                 self._on_report(message, time_us)
-            case Waiting():
-                where = Segment(message.track, message.index)
-                blocker = f" of {self.name(message.blocker)}" if message.blocker else ""
-                why = message.reason.name.lower().replace("_", " ")
-                self._say(time_us, f"{self.name(message.sender)} waits for {where}{blocker}: {why}")
+            case Waiting() | Blocked() | Clear():
+                self._say(time_us, self._told_of(message))
+
+    def _told_of(self, message: Waiting | Blocked | Clear) -> str:
+        """What is said of one segment, in words."""
+        where = Segment(message.track, message.index)
+        why = message.reason.name.lower().replace("_", " ")
+        if isinstance(message, Waiting):
+            blocker = f" of {self.name(message.blocker)}" if message.blocker else ""
+            return f"{self.name(message.sender)} waits for {where}{blocker}: {why}"
+        return f"{where} is {'blocked' if isinstance(message, Blocked) else 'clear again'}: {why}"
 
     def places_taken(self) -> dict[int, Reference]:
         """Car by station number, for cars that stand at one."""

@@ -103,7 +103,7 @@ LAYERS: dict[str, Layer] = {
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
         ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
-        ("distributed", "numpy", "ortools", "rich"),
+        ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
     "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),

@@ -1,12 +1,18 @@
 """Machines lost for a while or for good: obstacles, whose untouched tasks pass to others (issue 4, point 3)."""
 
+from collections.abc import Sequence
+from pathlib import Path
+
 import pytest
 
+from bus_sim import sites
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
-from onboard.core.codes import CallResult, Operation, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Progress, TaskReport
+from onboard.config.site import parse_site
+from onboard.core.codes import CallResult, MachineState, Operation, TaskPhase
+from onboard.core.messages import Award, CallForProposals, Heartbeat, Progress, TaskReport
+from onboard.core.site import Site
 from tests.system.scene import Scene, play, stays
 
 #: Who wins the first task of the small site and rides ER1 (129: ER2) down to it; who else could do it.
@@ -14,9 +20,18 @@ FIRST, OTHER = 11, 12
 CARS = ((0, 200), (60, 300), (120, None))
 
 
-def failing(*faults: str, cars: tuple[tuple[float, float | None], ...] = CARS, limit_s: float = 900) -> Scene:
+def failing(*faults: str, site: Site | None = None, cars: Sequence[tuple[float, float | None]] = CARS) -> Scene:
     injections = [parse_injection(fault) for fault in faults]
-    return play(find_site("small"), stays(*cars), plant=lambda simulation: arm(simulation, injections), limit_s=limit_s)
+    return play(
+        site or find_site("small"), stays(*cars), plant=lambda simulation: arm(simulation, injections), limit_s=900
+    )
+
+
+def above_the_street() -> Site:
+    """The small site without places on the street's floor: every car rides."""
+    text = (Path(sites.__file__).parent / "small.toml").read_text(encoding="utf-8")
+    places = ", ".join(f'"p(1,{index})"' for index in range(1, 11))
+    return parse_site(text.replace('sides = ["near", "far"]', f'sides = ["near", "far"]\nwithout = [{places}]'), "up")
 
 
 def assert_all_served(scene: Scene) -> None:
@@ -73,3 +88,37 @@ def test_a_lift_that_fails_with_a_carrier_aboard_is_an_obstacle_until_it_is_repa
     assert TaskPhase.FORFEITED in [report.phase for report in reports], "it says that it cannot come"
     left_us = min(t for t, p in scene.all(Progress) if p.sender == FIRST and p.track == 1 and p.index > 0 and t > 35e6)
     assert left_us > 135e6, "it leaves the platform after the repair"
+
+
+def test_a_car_aboard_a_lift_that_fails_arrives_when_it_is_repaired_and_the_other_lift_serves_the_rest() -> None:
+    scene = failing("crash:target=ER1,at_s=90,restart_s=60", site=above_the_street(), cars=((0, 300), (60, None)))
+    scene.assert_sound()
+    street = scene.simulation.plant.street.summary()
+    assert (street.parked, street.served, street.asking, street.queueing) == (2, 1, 0, 0)
+    done = {r.task.number: (t / 1e6, r.sender) for t, r in scene.all(TaskReport) if r.phase is TaskPhase.DONE}
+    assert done[1][1] == FIRST and 150 < done[1][0] < 180
+    assert done[2][1] == OTHER
+    assert not [r for _, r in scene.all(TaskReport) if r.phase is TaskPhase.FORFEITED and r.task.number == 1]
+
+
+@pytest.mark.parametrize("for_s", [40, 3000])
+def test_a_robot_whose_drive_is_stuck_stops_being_counted_on_until_it_moves(for_s: int) -> None:
+    scene = failing(f"actuator_stuck:target=MR1,at_s=28,for_s={for_s}")
+    assert_all_served(scene)
+    assert awards(scene) == [(FIRST, 1), (OTHER, 2)]
+    states = {beat.state for t, beat in scene.all(Heartbeat) if beat.sender == FIRST and 40e6 < t < 66e6}
+    assert states == {MachineState.STOPPED}
+    last = [beat.state for _, beat in scene.all(Heartbeat) if beat.sender == FIRST][-1]
+    assert (last is MachineState.STOPPED) is (for_s == 3000)
+
+
+def test_a_lift_whose_drive_is_stuck_is_gone_around() -> None:
+    scene = failing("actuator_stuck:target=ER1,at_s=33,for_s=90")
+    assert_all_served(scene)
+    states = {beat.state for t, beat in scene.all(Heartbeat) if beat.sender == 5 and 50e6 < t < 120e6}
+    assert states == {MachineState.STOPPED}
+
+
+def test_who_comes_back_aboard_before_the_platform_was_given_back_rides_on() -> None:
+    """Its sensors said nothing while it left the lift, so that it held the platform all the time."""
+    assert_all_served(failing("sensor_off:target=MR1,at_s=40,for_s=40"))

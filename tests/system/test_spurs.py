@@ -2,10 +2,12 @@
 
 import asyncio
 import random
+from collections.abc import Callable
 from functools import cache
 
 import pytest
 
+from bus_sim.demand import Demand
 from bus_sim.run import Simulation
 from bus_sim.show import draw_floor
 from bus_sim.sites import find_site
@@ -49,12 +51,16 @@ def told(scene: Scene, node: int, from_us: int = 0) -> list[Segment]:
     return [Segment(m.track, m.index) for at, m in scene.all(Progress, "fleet") if m.sender == node and at >= from_us]
 
 
-@pytest.fixture(scope="module")
-def passing() -> Scene:
+def in_the_way() -> Site:
     """MR1 stands between MR2 and the compartment; the only place is at the other end, and the spur in between."""
     without = tuple(f"p(1,{index}){side}" for index in range(1, 13) for side in "NF")[1:]
     kept = tuple(place for place in without if place not in ("p(1,4)N", "p(1,6)F"))
-    return play(alley(("p(1,8)", "p(1,11)"), ("p(1,6)",), kept), stays((0, 200)), before=idle, limit_s=600)
+    return alley(("p(1,8)", "p(1,11)"), ("p(1,6)",), kept)
+
+
+@pytest.fixture(scope="module")
+def passing() -> Scene:
+    return play(in_the_way(), stays((0, 200)), before=idle, limit_s=600)
 
 
 def test_p38_one_hides_in_the_spur_while_the_other_passes(passing: Scene) -> None:
@@ -103,12 +109,14 @@ def test_with_a_spur_for_each_both_serve_one_alley_and_end_in_spurs() -> None:
 KILLED_S = (26.6, 28.0, 30.7, 30.95, 32.0, 33.85, 35.0, 85.0, 88.45, 90.0, 91.45, 92.0, 94.0, 96.0)
 
 
-@pytest.mark.parametrize("at_s", KILLED_S)
-def test_p20_a_robot_killed_in_a_spur_or_in_its_mouth_goes_on(at_s: float) -> None:
+def killed(site: Site, demand: Demand, at_s: float, before: Callable[[Simulation], None] | None = None) -> Scene:
+    """MR1 loses its controller and gets it back with the same journal."""
     outages: list[asyncio.Task[None]] = []
 
     def kill(simulation: Simulation) -> None:
         machine = simulation.site.machine("MR1")
+        if before is not None:
+            before(simulation)
 
         async def outage() -> None:
             await asyncio.sleep(at_s)
@@ -118,11 +126,25 @@ def test_p20_a_robot_killed_in_a_spur_or_in_its_mouth_goes_on(at_s: float) -> No
 
         outages.append(simulation.loop.create_task(outage()))
 
-    scene = play(alley(("p(192,1)", "p(193,1)"), ("p(1,2)", "p(1,8)")), stays((0, 100)), before=kill, limit_s=500)
+    scene = play(site, demand, before=kill, limit_s=500)
     scene.assert_sound()
     assert outages[0].done() and outages[0].exception() is None
     assert scene.simulation.plant.street.summary().served == 1
+    return scene
+
+
+@pytest.mark.parametrize("at_s", KILLED_S)
+def test_p20_a_robot_killed_in_a_spur_or_in_its_mouth_goes_on(at_s: float) -> None:
+    scene = killed(alley(("p(192,1)", "p(193,1)"), ("p(1,2)", "p(1,8)")), stays((0, 100)), at_s)
     assert told(scene, MR1)[-1] == Segment(SPUR, 1)
+
+
+@pytest.mark.parametrize("after_s", [1.0, 4.0, 30.0], ids=["turning", "driving in", "inside"])
+def test_p20_a_robot_killed_in_a_spur_that_is_not_its_home_knows_which(passing: Scene, after_s: float) -> None:
+    turn_us, _ = passing.first(DriveState, lambda m: m.sender == MR1 and m.mode is DriveMode.TURNING)
+    scene = killed(in_the_way(), stays((0, 200)), turn_us / 1e6 + after_s, idle)
+    body = scene.simulation.plant.world.standing_position(MR1)
+    assert body is not None and told(scene, MR1)[-1] == body
 
 
 def test_the_times_of_the_restarts_meet_every_state_of_a_turn() -> None:

@@ -123,6 +123,13 @@ def test_p55_a_robots_time_is_split_into_what_it_does() -> None:
     assert machine(figures, "MR2").idle == 1
 
 
+def test_p55_driving_towards_lower_positions_is_driving_too() -> None:
+    figures = fold(
+        (0, at(6)), (10, call()), (12, award()), (12, plan(2, go(2, 6, 3))), (20, at(6, -500)), (30, at(3)), until_s=40
+    )
+    assert machine(figures).driving == pytest.approx(10 / 40)
+
+
 def test_p55_riding_counts_for_the_robot_and_the_lift_by_the_robots_word() -> None:
     figures = fold(
         (0, at(1)),

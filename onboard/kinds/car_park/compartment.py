@@ -370,8 +370,9 @@ class Compartment:
         self._number = successor(self._number, 16)
         car = Reference(self.fleet.node_id, self._number)
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
-        effects = self.fleet.tokens.create(car_token(*car))
-        effects.append(Record({"record": "number", "number": self._number}))
+        # The number first: one that is not used is no harm, one used twice would be.
+        effects: list[Effect] = [Record({"record": "number", "number": self._number})]
+        effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
         effects += self._state_car(car, self.station.number, bay.wheelbase_mm)
         effects.append(self._desk(DeskText.TAKE_TICKET, car))

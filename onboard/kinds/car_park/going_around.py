@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from onboard.core.authority import car_token, segment_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import Grade, LegAction, Reason, TaskPhase
-from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.effects import Effect, Report, Send
 from onboard.core.lifts import gate, lift_at
 from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
 from onboard.core.occupancy import itinerary_windows
@@ -19,6 +19,7 @@ from onboard.core.site import Segment
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.program import Handling, Program, Step, Work, to_itinerary
+from onboard.kinds.car_park.recovery import forfeited_record
 from onboard.kinds.car_park.travel import Carriage
 
 #: A plan that finds no way is tried again after this, us. Ours.
@@ -42,7 +43,10 @@ class GoingAround:
     take_up: Callable[[int, Sequence[Step], list[Work], int], list[Effect]]
     #: Tasks given back, with why, how often to say so still, and when next.
     given_back: dict[Reference, tuple[Reason, int, int]] = field(default_factory=dict)
+    #: Whether the drive does not do what it is told.
+    is_stuck: bool = False
     _seen: int = 0
+    _admissions: int = 0
     _since_us: int | None = None
     _retry_at_us: int | None = None
 
@@ -61,6 +65,9 @@ class GoingAround:
     def advance(self, now_us: int) -> list[Effect]:
         """Look whether the plan leads through an obstacle, where anything about them has changed."""
         effects = self._say_again(now_us)
+        if self.fleet.admissions != self._admissions:
+            self._admissions = self.fleet.admissions
+            self._since_us = self._retry_at_us = now_us
         changes = self.fleet.mirror.obstacles.changes
         if changes != self._seen:
             self._seen = changes
@@ -69,6 +76,21 @@ class GoingAround:
                 self._retry_at_us = now_us
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             effects += self._try(now_us)
+        return effects
+
+    def watch_drive(self, now_us: int) -> list[Effect]:
+        """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks."""
+        if self.carriage.stall.is_stuck(now_us) is self.is_stuck:
+            return []
+        self.is_stuck = not self.is_stuck
+        if not self.is_stuck:
+            self.turn_later(now_us)
+            return [Report("the drive moves again")]
+        lost = self.untouched()
+        effects: list[Effect] = [Report("the drive does not move")]
+        effects += self.drop(lost, now_us) if lost else []
+        for task in lost:
+            effects += self.forfeit(task, Reason.ACTUATOR_FAULT, now_us)
         return effects
 
     def turn_later(self, now_us: int) -> None:
@@ -84,8 +106,11 @@ class GoingAround:
     def forfeit(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
         """Give an untouched task back; its steps are the caller's business."""
         self.given_back[task] = reason, SAY_AGAIN, now_us + SAY_AGAIN_US
-        entry: dict[str, str | int] = {"record": "forfeited", "task_origin": task.origin, "task": task.number}
-        return [Record(entry), Send(self._report(task, reason))]
+        return [forfeited_record(task), Send(self._report(task, reason))]
+
+    def lose(self, task: Reference) -> list[Effect]:
+        """A task is another's by its initiator's word; nobody need hear of that from me."""
+        return [forfeited_record(task), Report(f"task {task.origin}.{task.number} is another's now")]
 
     def untouched(self) -> list[Reference]:
         """Tasks in the program whose car was not touched and is in others' custody, in order."""
@@ -177,6 +202,8 @@ class GoingAround:
         windows = itinerary_windows(self.fleet.site, told, now_us, steps[0].begin_us)
         slots = {window.segment for window in windows}
         slots |= {gate(step.track) for step in steps if step.action is LegAction.RIDE}
+        if any(slot in obstacles.blocked for slot in slots.difference(self.carriage.occupied())):
+            return True
         return any(obstacles.is_at(slot) and not tokens.holds(segment_token(slot)) for slot in slots)
 
     def _say_again(self, now_us: int) -> list[Effect]:

@@ -145,9 +145,12 @@ class ShuttleWork:
         key = car_token(*work.car)
         taken = work.handling is Handling.TAKE
         station = ANY_STATION if taken else work.station.number
-        statement = CarAt(self.fleet.node_id, work.car, station, self.fleet.tokens.seen[key], work.wheelbase_mm)
-        self.fleet.mirror.on_car(statement)
-        effects: list[Effect] = [Send(statement)]
+        effects: list[Effect] = []
+        if self.fleet.tokens.holds(key):
+            # After a restart it may be with its new custodian already, who states it then.
+            statement = CarAt(self.fleet.node_id, work.car, station, self.fleet.tokens.seen[key], work.wheelbase_mm)
+            self.fleet.mirror.on_car(statement)
+            effects.append(Send(statement))
         owner = keeper(self.fleet, work.station)
         given = [station_token(work.station)] if taken else [key, station_token(work.station)]
         for token in given:

@@ -11,14 +11,25 @@ from enum import Enum
 
 from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
+from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.lifts import gate, platform
-from onboard.core.messages import DriveOrder, DriveState, Itinerary, Leg, Message, PlatformState, Progress, TaskReport
+from onboard.core.messages import (
+    Award,
+    DriveOrder,
+    DriveState,
+    Itinerary,
+    Leg,
+    Message,
+    PlatformState,
+    Progress,
+    TaskReport,
+)
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine, Site
+from onboard.core.stall import Stall
 from onboard.kinds.car_park.bay_memory import BayMemory
 from onboard.kinds.car_park.lift_generation import LiftGeneration
 from onboard.kinds.car_park.stewardship import Stewardship
@@ -73,6 +84,8 @@ class Lift:
     drive: DriveState | None = None
     platform: PlatformState | None = None
     stewardship: Stewardship = field(init=False)
+    stall: Stall = field(default_factory=Stall)
+    _is_stuck: bool = False
     _sequence: int = 0
     _target: int | None = None
     _refresh_at_us: int | None = None
@@ -105,6 +118,8 @@ class Lift:
         """Heartbeat state."""
         if self.phase is LiftPhase.STARTING:
             return MachineState.STARTING
+        if self._is_stuck:
+            return MachineState.STOPPED
         return MachineState.IDLE if self.phase is LiftPhase.FREE else MachineState.WORKING
 
     @property
@@ -126,6 +141,7 @@ class Lift:
         if self.drive is None:
             self._sequence = message.sequence
         self.drive = message
+        self.stall.sensed(message.position_mm, now_us)
         self.generation.index = self._index()
         told = (self._index(), message.mode)
         if told == self._told:
@@ -136,7 +152,14 @@ class Lift:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """As steward of alleys: awards tell who may fetch a stored car, and a car given to me is stated anew."""
-        return self.stewardship.hear(message)
+        effects = self.stewardship.hear(message)
+        if not isinstance(message, Award) or message.result is not CallResult.AWARDED:
+            return effects
+        known = self.fleet.negotiation.knows(message.sender, message.call)
+        if message.winner == self.fleet.node_id and not known:
+            # Of a life before, or of before a sleep: the ride stands in its robot's itinerary, a word ends the repeats.
+            effects.append(Send(TaskReport(self.fleet.node_id, message.task, TaskPhase.AWARDED, 0, Reason.NONE)))
+        return effects
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An option is kept while it stands, and never driven for: only the robots' firm itineraries move the lift.
@@ -165,12 +188,13 @@ class Lift:
         if key == segment_token(platform(self.track)):
             return self._may_have_platform(requester, now_us)
         if key == segment_token(gate(self.track)):
-            return self._may_have_gate(requester)
+            return self._may_have_gate(requester, now_us)
         return self.stewardship.may_grant(key, requester, now_us)
 
     def advance(self, now_us: int) -> list[Effect]:
         """One step of the phase table."""
         effects = self.stewardship.review(now_us)
+        self._is_stuck = self.stall.is_stuck(now_us)
         if self.drive is None or self.platform is None:
             return effects
         return effects + self._table[self.phase](now_us)
@@ -204,14 +228,14 @@ class Lift:
         self._gate_was_out = False
         return Reason.NONE
 
-    def _may_have_gate(self, requester: int) -> Reason:
+    def _may_have_gate(self, requester: int, now_us: int) -> Reason:
         ride = self.ride
         if ride is None or ride.robot != requester:
             return Reason.TOKEN_NOT_GRANTABLE_YET
         if self.phase is LiftPhase.BOARDING and not self._gate_was_out and self._stands_at(ride.board):
             self._gate_was_out = True
             return Reason.NONE
-        if self.phase is LiftPhase.LEAVING and self._stands_at(ride.leave):
+        if self.phase is LiftPhase.LEAVING and self._stands_at(ride.leave) and self._onward(now_us) is None:
             # As often as it is asked for: who waits aboard gives the gate back. The ride ends with the platform.
             return Reason.NONE
         return Reason.DOOR_NOT_READY
@@ -300,11 +324,7 @@ class Lift:
         assert self.platform is not None and self.ride is not None
         aboard = self.platform.carrier_aboard and not self.platform.crossing
         if self._gate_was_out and self._holds_gate() and aboard:
-            self.phase = LiftPhase.RIDING
-            self.ride = self._as_planned_now(self.ride, now_us)
-            ride: dict[str, str | int] = {"record": "ride", "robot": self.ride.robot}
-            ride |= {"board": self.ride.board, "leave": self.ride.leave}
-            return [Record(ride), *self._go(self.ride.leave, now_us)]
+            return self._set_off(self._as_planned_now(self.ride, now_us), now_us)
         if self._holds_platform():
             # The robot gave the platform back without boarding: its plan has changed.
             return self._end_ride(now_us)
@@ -321,7 +341,35 @@ class Lift:
     def _when_leaving(self, now_us: int) -> list[Effect]:
         if self._holds_platform() and self._holds_gate():
             return self._end_ride(now_us)
-        return self._stand()
+        onward = self._rides_onward(now_us)
+        return self._stand() if onward is None else self._set_off(onward, now_us)
+
+    def _set_off(self, ride: Ride, now_us: int) -> list[Effect]:
+        self.ride, self.phase = ride, LiftPhase.RIDING
+        entry: dict[str, str | int] = {"record": "ride", "robot": ride.robot, "board": ride.board, "leave": ride.leave}
+        return [Record(entry), *self._go(ride.leave, now_us)]
+
+    def _rides_onward(self, now_us: int) -> Ride | None:
+        """Where whoever is aboard says that it rides on from this floor, without having given the platform back.
+
+        Its plan begins with that ride: it has come back before it could give the platform back, or has turned.
+        """
+        assert self.platform is not None
+        aboard = self.platform.carrier_aboard and not self.platform.crossing
+        return self._onward(now_us) if aboard and self._holds_gate() else None
+
+    def _onward(self, now_us: int) -> Ride | None:
+        """The ride from this floor that the robot of the ride in hand says it is in, by its plan and ``Progress``."""
+        assert self.ride is not None
+        robot = self.ride.robot
+        itinerary, seen = self.fleet.mirror.itineraries.get(robot), self.fleet.mirror.progress.get(robot)
+        if itinerary is None or seen is None or seen.itinerary_version != itinerary.version:
+            return None
+        leg = next(iter(itinerary.legs[seen.leg : seen.leg + 1]), None)
+        if leg is None or (leg.action, leg.track, leg.from_index) != (LegAction.RIDE, self.track, self.ride.leave):
+            return None
+        planned = rides_of(self.track, robot, itinerary, now_us)
+        return next((one for one in planned if (one.board, one.leave) == (leg.from_index, leg.to_index)), None)
 
     def _end_ride(self, now_us: int) -> list[Effect]:
         assert self.ride is not None
@@ -363,6 +411,7 @@ class Lift:
         return abs(drive.position_mm - self._position_mm(index)) <= MARK_TOLERANCE_MM
 
     def _stand(self) -> list[Effect]:
+        self.stall.rests()
         self._refresh_at_us = None
         self._target = None
         return []
@@ -381,6 +430,7 @@ class Lift:
         elif self._refresh_at_us is not None and self._refresh_at_us > now_us:
             return []
         site = self.fleet.site
+        self.stall.ordered(now_us)
         self._refresh_at_us = now_us + site.timing.drive_refresh_us
         order = DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s)
         return [Actuate(order)]

@@ -34,6 +34,11 @@ def handled_record(work: Work) -> Record:
     return Record(entry | {"handling": work.handling.value})
 
 
+def forfeited_record(task: Reference) -> Record:
+    """A task was given back, or is another's."""
+    return Record({"record": "forfeited", "task_origin": task.origin, "task": task.number})
+
+
 def ride_record(step: Step) -> Record:
     """A ride begins: from now on the floor is the lift's business."""
     return Record({"record": "riding", "lift": step.track, "board": step.from_index, "leave": step.to_index})
@@ -55,6 +60,8 @@ class Recovery:
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
     is_restart: bool = False
+    #: The last task whose car was left: who asks for it is told so.
+    last_done: Reference | None = None
     #: Under which version each task was taken on, where it is not the first.
     versions: dict[Reference, int] = field(default_factory=dict)
 
@@ -81,6 +88,8 @@ class Recovery:
             case "handled":
                 self.works = [work for work in self.works if not _is(work, entry)]
                 self.phase = None
+                if entry["handling"] == Handling.LEAVE.value:
+                    self.last_done = _task(entry)
             case "riding":
                 self.riding = (int(entry["lift"]), int(entry["board"]), int(entry["leave"]))
             case "floor":

@@ -16,7 +16,7 @@ from onboard.core.codes import (
     Reason,
     TaskPhase,
 )
-from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.effects import Effect, Halt, Report, Send
 from onboard.core.lift_uses import ride_us
 from onboard.core.lifts import platform_on, sill
 from onboard.core.messages import (
@@ -109,7 +109,7 @@ class Robot:
     @property
     def state(self) -> MachineState:
         """Heartbeat state."""
-        if self._fault is not Reason.NONE:
+        if self._fault is not Reason.NONE or self.going_around.is_stuck:
             return MachineState.STOPPED
         if self.program.standing is None or self._recover_at_us is not None:
             return MachineState.STARTING
@@ -180,10 +180,7 @@ class Robot:
 
     def _lose(self, task: Reference, now_us: int) -> list[Effect]:
         self.recovery.forget(task)
-        gone: list[Effect] = [
-            Record({"record": "forfeited", "task_origin": task.origin, "task": task.number}),
-            Report(f"task {task.origin}.{task.number} is another's now"),
-        ]
+        gone = self.going_around.lose(task)
         return gone + (self.going_around.drop([task], now_us) if self._recover_at_us is None else [])
 
     def _take_up(self, kept: int, steps: Sequence[Step], works: list[Work], now_us: int) -> list[Effect]:
@@ -259,7 +256,8 @@ class Robot:
             return self.carriage.advance(now_us) if self.carriage.goal is not None else []
         if self._recover_at_us is not None and self._recover_at_us <= now_us:
             return self._recover(now_us)
-        effects = self.going_around.advance(now_us) if self._recover_at_us is None else []
+        effects = self.going_around.watch_drive(now_us)
+        effects += self.going_around.advance(now_us) if self._recover_at_us is None else []
         # A step can end without a word on any bus, and the next is to begin in the same moment.
         for _ in range(MAX_STEPS):
             step = self.program.step
@@ -293,9 +291,12 @@ class Robot:
         if itinerary is not None:
             effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.current)]
         # An initiator that was restarted learns that its task is in hand.
-        to_take = [work for work in self.program.works() if work.handling is Handling.TAKE]
-        effects += [self._report(work.call.task, TaskPhase.AWARDED, work.station.number) for work in to_take]
+        effects += self._taken_on(self.program.works())
         return effects + self.fleet.tokens.statements()
+
+    def _taken_on(self, works: list[Work]) -> list[Effect]:
+        to_take = [work for work in works if work.handling is Handling.TAKE]
+        return [self._report(work.call.task, TaskPhase.AWARDED, work.station.number) for work in to_take]
 
     # --- steps -------------------------------------------------------------------------------------------------
 
@@ -320,8 +321,9 @@ class Robot:
         if self.recovery.is_restart:
             self._recover_at_us = now_us + SETTLING_US
         # Whoever has got one of them meanwhile, its initiator knows.
-        to_take = [work for work in self.recovery.works if work.handling is Handling.TAKE]
-        mine = [self._report(work.call.task, TaskPhase.AWARDED, work.station.number) for work in to_take]
+        mine = self._taken_on(self.recovery.works)
+        if self.recovery.last_done is not None:
+            self._done.append(self.recovery.last_done)
         return self._publish(now_us) + mine
 
     def _recover(self, now_us: int) -> list[Effect]:
@@ -370,8 +372,7 @@ class Robot:
             self.riding.begin(step.track, step.to_index)
 
     def _after_ride(self, step: Step) -> Segment:
-        floor = sill(self.fleet.site, step.track, step.to_index).track
-        there = platform_on(self.fleet.site, step.track, floor)
+        there = platform_on(self.fleet.site, step.track, sill(self.fleet.site, step.track, step.to_index).track)
         assert there is not None
         return there
 
@@ -408,7 +409,8 @@ class Robot:
                 # Before the turn: the drive tells only that it is across, not in which spur.
                 return [floor_record(step.track)]
         elif step.action is LegAction.RIDE:
-            return [ride_record(step), *self.riding.begin(step.track, step.to_index)]
+            told = self.carriage.statement(self.program.version, self.program.current)
+            return [ride_record(step), *told, *self.riding.begin(step.track, step.to_index)]
         elif step.work is not None:
             return self.shuttle.begin(step.work) + self._announce_start(step.work)
         return []

@@ -19,6 +19,8 @@ from onboard.kinds.car_park.bay_memory import BayMemory, car_record, winner_reco
 
 #: Calls remembered to know which car an award is about; older ones are long closed.
 MAX_CALLS = 64
+#: Cars that have left and are told still.
+MOST_GONE = 4
 #: A winner that is an obstacle for so long is lost, us: a restart takes some seconds, and its task is in its journal.
 #: Ours.
 LOST_AFTER_US = 8_000_000
@@ -134,11 +136,13 @@ class Stewardship:
         return Reason.NONE
 
     def car_statements(self) -> list[Effect]:
-        """Where each car in my custody stands."""
+        """Where each car in my custody stands, and which of them have left last: somebody may have missed that."""
+        mine = [one for one in self.fleet.mirror.cars.items() if one[1].custodian == self.fleet.node_id]
+        gone = [one for one in mine if one[1].station == OUTSIDE][-MOST_GONE:]
         return [
             Send(CarAt(self.fleet.node_id, car, record.station, record.version, record.wheelbase_mm))
-            for car, record in self.fleet.mirror.cars.items()
-            if record.custodian == self.fleet.node_id and record.station != OUTSIDE
+            for car, record in mine
+            if record.station != OUTSIDE or (car, record) in gone
         ]
 
     def _take_custody(self, car: Reference, version: int) -> list[Effect]:

@@ -20,6 +20,7 @@ from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.refuges import refuges
 from onboard.core.serial import successor
 from onboard.core.site import Segment, TrackKind
+from onboard.core.stall import Stall
 from onboard.kinds.car_park.axis import TrackAxis
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
@@ -54,6 +55,7 @@ class Carriage:
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
     way_on: Callable[[], list[Segment]] = list
     whole: AllOrNone = field(init=False)
+    stall: Stall = field(default_factory=Stall)
 
     def __post_init__(self) -> None:
         self.whole = AllOrNone(self.fleet.tokens)
@@ -149,6 +151,7 @@ class Carriage:
 
     def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
+        self.stall.sensed(state.position_mm, now_us)
         before = self.sensed
         if before is None:
             self.sequence = state.sequence
@@ -272,6 +275,7 @@ class Carriage:
         if self.sensed is None or self.sensed.mode is not DriveMode.STANDING:
             return []
         self.target = None
+        self.stall.rests()
         self.blocked = None
         effects: list[Effect] = []
         for segment in self.occupied():
@@ -302,7 +306,11 @@ class Carriage:
                 return None, reason
         reach = None
         reason = Reason.NONE
+        blocked = self.fleet.mirror.obstacles.blocked
         for index, slots in zip(ahead, self.axis.rights(ahead), strict=True):
+            if reach is not None and any(slot in blocked for slot in slots):
+                reason = Reason.IMPOSSIBLE
+                break
             verdicts = [authorised(state, slot) for slot in slots]
             reason = next((why for allowed, why in verdicts if not allowed), Reason.NONE)
             if reason is not Reason.NONE:
@@ -327,6 +335,7 @@ class Carriage:
         """Say once for what the machine waits, for whom and why; no order is repeated, so the drive brakes."""
         self.refresh_at_us = None
         self.target = None
+        self.stall.rests()
         tokens = self.fleet.tokens
         line = [slot for slots in self.axis.rights(ahead) for slot in slots]
         waits_for = next((slot for slot in line if not tokens.holds(segment_token(slot))), line[0])
@@ -339,6 +348,7 @@ class Carriage:
 
     def _order(self, now_us: int) -> Effect:
         assert self.target is not None
+        self.stall.ordered(now_us)
         self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
         site = self.fleet.site
         position_mm, across = site.position_mm(self.target), site.tracks[self.target.track].kind is TrackKind.SPUR
