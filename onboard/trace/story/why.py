@@ -22,7 +22,7 @@ from onboard.core.messages import (
     Waiting,
 )
 from onboard.core.site import Segment, Site, Station
-from onboard.trace.story.calls import TASKS
+from onboard.trace.story.calls import is_task
 from onboard.trace.words import Words
 
 #: Heartbeats missed in a row after which a machine counts as silent.
@@ -112,7 +112,7 @@ class Why:
             self._on_heartbeat(body, message, time_us)
         body.heard_us = time_us
         match message:
-            case CallForProposals() if message.operation in TASKS:
+            case CallForProposals() if is_task(message):
                 self._on_call(message, time_us)
             case Award():
                 self._on_award(message)
