@@ -203,6 +203,10 @@ class Why:
         if before is not None:
             return Cause(f"still busy with task {self._words.reference(before.task)}", story.owner)
         body = self._body(story.owner)
+        if not self._site.tracks:
+            # Machines of other systems tell no place that this fold knows; the task's phase is what there is.
+            phase = max(story.phases, default=TaskPhase.AWARDED)
+            return Cause(f"has the task, {phase.name.lower()}", story.owner)
         lift = self._lift_under(body)
         if lift is not None:
             return self._ride(story, body, lift, now_us)
