@@ -75,7 +75,16 @@ def test_p57_the_run_used_most_of_the_contract(run: Heard) -> None:
     """Else the test above would say little."""
     used = {frame.arbitration_id & ~0xFF for bus, frame in run.frames if bus == FLEET}
     unused = {layout.name for layout in fleet_layouts() if layout.frame_id not in used}
-    assert unused <= {"EmergencyStop", "OperatorOrder", "CallParent", "Diagnostic", "Waiting", "TokenRefusal"}
+    assert unused <= {
+        "Blocked",
+        "Clear",
+        "EmergencyStop",
+        "OperatorOrder",
+        "CallParent",
+        "Diagnostic",
+        "Waiting",
+        "TokenRefusal",
+    }
 
 
 def test_p16_unit_and_meaning_of_a_bid_are_defined_once_in_the_dbc() -> None:
