@@ -15,6 +15,7 @@ PACKAGES = {
     "canplayer": "can-utils",
     "log2asc": "can-utils",
     "log2long": "can-utils",
+    "rsvg-convert": "librsvg2-bin",
     "tshark": "tshark",
 }
 #: How long a foreign program may take, s; it waits on events, so this is only met by one that hangs.

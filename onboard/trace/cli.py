@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from onboard.config.problems import ConfigError
-from onboard.trace.commands import check, convert, dissector, dump, load, story
+from onboard.trace.commands import charts, check, convert, dissector, dump, load, replay, story
 from onboard.trace.commands.common import Register, TraceError
 from onboard.trace.dump.filters import FilterError
 from onboard.trace.readers.open_log import LogOpenError
@@ -31,7 +31,10 @@ _COMMANDS: tuple[Register, ...] = (
     story.register_calls,
     story.register_why,
     check.register,
+    charts.register_sequence,
+    charts.register_diagram,
     load.register,
+    replay.register,
     dissector.register,
 )
 

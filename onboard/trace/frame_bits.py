@@ -10,6 +10,8 @@ from onboard.core.frame import Frame
 
 #: CRC delimiter, ACK slot and delimiter, end of frame, intermission: never stuffed (ISO 11898-1, 10.4).
 _TAIL_BITS = 1 + 1 + 1 + 7 + 3
+#: What a frame's time stamp does not wait for.
+INTERMISSION_BITS = 3
 #: x^15 + x^14 + x^10 + x^8 + x^7 + x^4 + x^3 + 1 without its highest term (ISO 11898-1, 10.4.2.6).
 _CRC_POLYNOMIAL = 0x4599
 _CRC_BITS = 15

@@ -6,6 +6,7 @@ Units are the DBC's own; what a number means is known by the signal's name, whic
 from collections.abc import Iterable
 from dataclasses import fields
 from enum import IntEnum
+from functools import cache
 
 from onboard.core.codes import ANY_STATION, NOBODY, OUTSIDE, Criterion, TokenKind
 from onboard.core.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
@@ -25,6 +26,7 @@ class Words:
 
     def __init__(self, site: Site | None = None) -> None:
         self.site = site
+        self._names: dict[type[Message], tuple[str, ...]] = {}
         self._criteria: dict[tuple[int, int], Criterion] = {}
         self._bays = {s.number: n for n, s in site.compartments.items()} if site is not None else {}
 
@@ -69,8 +71,11 @@ class Words:
             del self._criteria[next(iter(self._criteria))]
 
     def _fields(self, message: Message) -> Iterable[str]:
-        values = {field.name: getattr(message, field.name) for field in fields(message)}
-        del values["sender"]
+        names = self._names.get(type(message))
+        if names is None:
+            names = tuple(field.name for field in fields(message) if field.name != "sender")
+            self._names[type(message)] = names
+        values = {name: getattr(message, name) for name in names}
         if "token_kind" in values:
             yield f"token {self.token(values.pop('token_kind'), values.pop('token'))}"
         if "track" in values and "index" in values:
@@ -119,11 +124,13 @@ class Words:
         return f"{value}{unit_of(name)}"
 
 
+@cache
 def unit_of(name: str) -> str:
     """A space and the unit that a signal's name ends in; empty where it has none."""
     return next((f" {unit}" for ending, unit in _UNITS if name.endswith(ending)), "")
 
 
+@cache
 def name_in_words(name: str) -> str:
     """A signal's name without its unit, in words."""
     for ending, _ in _UNITS:

@@ -89,6 +89,8 @@ LAYERS: dict[str, Layer] = {
     "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
     # Its commands are a composition root too: they name the contract of a site's system, and replay runs a controller.
     "onboard.trace.commands": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
+    # Judges nothing: it runs the very code of a controller, and only compares what comes out.
+    "onboard.trace.replay": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(

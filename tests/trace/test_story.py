@@ -1,7 +1,10 @@
 """Calls and customers' stories told from a log: what a run did is what they say, and planted causes are named."""
 
+from pathlib import Path
+
 import pytest
 
+from bus_sim.cli import main as bus_sim
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.trace.cli import main
@@ -53,8 +56,7 @@ def test_an_undisturbed_story_names_the_handling_the_way_and_the_lift() -> None:
         ("crash:target=MR1,at_s=30", 11, "started anew", 9),
         ("crash:target=MR1,at_s=30,restart=no", 11, "silent", 12),
         ("pause:target=MR1,at_s=40,for_s=30", 11, "silent", 12),
-        # After a while the lift counts as an obstacle, and the other one is taken.
-        ("actuator_stuck:target=ER1,at_s=12,for_s=60", 5, "is not ready", 12),
+        ("actuator_stuck:target=ER1,at_s=12,for_s=60", 5, "is not ready", 15),
     ],
 )
 def test_a_planted_cause_is_found(fault: str, node: int, word: str, at_least_s: float) -> None:
@@ -103,3 +105,16 @@ def test_a_task_that_is_not_there_is_one_clear_line(task: str, said: str, capsys
     assert main(["why", str(run_log()), task, "--site", str(SITE_FILE)]) == 2
     told = capsys.readouterr().err
     assert said in told and told.count("\n") == 1
+
+
+def test_a_site_without_tracks_is_told_by_phases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "graph.log"
+    bus_sim(["run", "graph", "--for", "300", "--speed", "max", "--trace", str(log)])
+    site = str(SITE_FILE.with_name("graph.toml"))
+    capsys.readouterr()
+    assert main(["why", str(log), "--site", site]) == 0
+    task = capsys.readouterr().out.split()[0]
+    assert main(["why", str(log), task, "--site", site]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any("has the task, " in line for line in lines)
+    assert lines[-1].split()[-2:] == lines[0].rpartition("waited ")[2].split()

@@ -20,8 +20,13 @@ from onboard.trace.words import Words
 
 _MS_MODULUS = 1 << 32
 _HALF_MS = 1 << 31
-#: What ends when the task is reported done; all other calls are for a part of one.
-TASKS = (Operation.PARK, Operation.RETRIEVE)
+#: Calls of the first depth that are no customer's: for a part of a task, and for room.
+_NO_TASKS = (Operation.RIDE, Operation.GIVE_WAY)
+
+
+def is_task(call: CallForProposals) -> bool:
+    """Whether a call is for a whole task, which ends when its owner reports it done."""
+    return call.depth == 0 and call.operation not in _NO_TASKS
 
 
 @dataclass
@@ -137,7 +142,7 @@ class Calls:
         for call in self._going:
             if call.terms.task == report.task and call.winner == report.sender and not call.is_over:
                 call.messages += 1
-                if call.terms.operation in TASKS and report.phase is TaskPhase.DONE:
+                if is_task(call.terms) and report.phase is TaskPhase.DONE:
                     call.finished_us = time_us
 
     def _on_progress(self, progress: Progress, time_us: int) -> None:
@@ -207,7 +212,9 @@ def _ending(call: Call, words: Words, start_us: int) -> str:
     if call.promised_us is not None:
         text += f"; promised {_at(call.promised_us, start_us)}"
     if call.finished_us is None:
-        return text + ("; finish not in this log" if call.terms.operation in (*TASKS, Operation.RIDE) else "")
+        return text + (
+            "; finish not in this log" if is_task(call.terms) or call.terms.operation is Operation.RIDE else ""
+        )
     text += f", finished {_at(call.finished_us, start_us)}"
     if call.promised_us is not None:
         text += f" ({(call.finished_us - call.promised_us) / 1e6:+.3f} s)"

@@ -22,7 +22,7 @@ from onboard.core.messages import (
     Waiting,
 )
 from onboard.core.site import Segment, Site, Station
-from onboard.trace.story.calls import TASKS
+from onboard.trace.story.calls import is_task
 from onboard.trace.words import Words
 
 #: Heartbeats missed in a row after which a machine counts as silent.
@@ -112,7 +112,7 @@ class Why:
             self._on_heartbeat(body, message, time_us)
         body.heard_us = time_us
         match message:
-            case CallForProposals() if message.operation in TASKS:
+            case CallForProposals() if is_task(message):
                 self._on_call(message, time_us)
             case Award():
                 self._on_award(message)
@@ -203,6 +203,10 @@ class Why:
         if before is not None:
             return Cause(f"still busy with task {self._words.reference(before.task)}", story.owner)
         body = self._body(story.owner)
+        if not self._site.tracks:
+            # Machines of other systems tell no place that this fold knows; the task's phase is what there is.
+            phase = max(story.phases, default=TaskPhase.AWARDED)
+            return Cause(f"has the task, {phase.name.lower()}", story.owner)
         lift = self._lift_under(body)
         if lift is not None:
             return self._ride(story, body, lift, now_us)

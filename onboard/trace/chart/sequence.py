@@ -1,0 +1,286 @@
+"""The sequence chart of a customer's task, or of one call: who said what to whom, as text and as SVG.
+
+The steps of a car's entry (Pujo et al. 2006, Fig. 9; row P50) are numbered where a message shows one. Steps of devices
+(the car left, the key, doors, light, shuttle) show only where the log holds device buses as well.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from onboard.core.codes import (
+    CallResult,
+    DeskInput,
+    DeskText,
+    DoorPosition,
+    DriveMode,
+    Grade,
+    LightColour,
+    Operation,
+    ShuttleMode,
+    TaskPhase,
+)
+from onboard.core.messages import (
+    Award,
+    BayState,
+    Bid,
+    CallForProposals,
+    CarAt,
+    DeskEvent,
+    DeskOrder,
+    DoorState,
+    DriveState,
+    Itinerary,
+    Message,
+    Progress,
+    Reference,
+    ShuttleState,
+    TaskReport,
+)
+from onboard.core.site import Site
+from onboard.trace.chart.svg import Drawing
+from onboard.trace.listener import Said
+from onboard.trace.words import Words
+
+#: The lane for what concerns everybody, and that of the devices and the customer.
+ALL = 0
+_TEXT_LANE = 15
+_LANE, _ROW, _TOP, _LEFT, _NOTES = 130, 20, 50, 90, 420
+#: What begins the story of a customer before the call does.
+_BEGINNINGS = ("a car stands in the bay", "desk: ticket")
+
+
+class Arrow(NamedTuple):
+    """One message: from a node to a node, or to all; ``step`` of Fig. 9, 0 where it is none."""
+
+    time_us: int
+    sender: int
+    receiver: int
+    text: str
+    step: int = 0
+
+
+@dataclass
+class Chart:
+    """Nodes in the order of their lanes, and arrows in the order of time."""
+
+    title: str
+    nodes: list[int]
+    arrows: list[Arrow]
+
+
+class _Story:
+    """Picks the messages of one task."""
+
+    def __init__(self, site: Site, task: Reference, words: Words) -> None:
+        self.task = task
+        self.car: Reference | None = None
+        self.owner = 0
+        self.operation: Operation | None = None
+        self.calls: dict[tuple[int, int], CallForProposals] = {}
+        self.offers: set[tuple[int, int]] = set()
+        self._lifts = {site.stewards[track]: track for track in site.lifts}
+        self._platforms = set(site.platforms)
+        self._words = words
+        self._seen: dict[object, object] = {}
+        self._desk_event: DeskEvent | None = None
+        self.loaded = self.over = self.pressed = False
+
+    def arrows(self, said: Said) -> Iterator[Arrow]:
+        """What a message adds to the chart."""
+        message = said.message
+        if self.over:
+            return
+        for receiver, text, step in self._fleet(message) if said.is_fleet else self._device(message):
+            yield Arrow(said.time_us, message.sender, receiver, text, step)
+
+    def _fleet(self, message: Message) -> Iterator[tuple[int, str, int]]:
+        match message:
+            case CallForProposals() if message.task == self.task:
+                yield from self._call(message)
+            case Bid() if (message.initiator, message.call) in self.calls:
+                call = self.calls[message.initiator, message.call]
+                self.offers.add((message.sender, message.itinerary_version))
+                step = self._park(0 if call.depth else 7)
+                yield message.initiator, f"bids {self._words.cost(message.cost, call.criterion)}", step
+            case Itinerary() if (message.sender, message.version) in self.offers:
+                yield ALL, f"tentative itinerary, {len(message.legs)} legs", self._park(9)
+            case Award() if (message.sender, message.call) in self.calls:
+                yield from self._award(message)
+            case Itinerary() if message.grade is Grade.FIRM and self._is_ours(message):
+                yield ALL, f"itinerary {message.version}, {len(message.legs)} legs", self._once("plan", self._park(11))
+            case TaskReport() if message.task == self.task:
+                yield from self._report(message)
+            case CarAt() if message.car == self.car and self._changed("car", message.station):
+                where = "aboard" if message.station == 0xFFFF else f"at {self._words.station(message.station)}"
+                yield ALL, f"car {self._words.reference(message.car)} {where}", 0
+            case Progress():
+                yield from self._progress(message)
+
+    def _call(self, call: CallForProposals) -> Iterator[tuple[int, str, int]]:
+        if self._once((call.sender, call.call), 1) == 0:
+            return
+        self.calls[call.sender, call.call] = call
+        if not call.depth:
+            self.operation, self.car = call.operation, call.car
+        what = call.operation.name.lower()
+        way = f"{self._words.station(call.from_station)} to {self._words.station(call.to_station)}"
+        yield ALL, f"call {call.call}: {what}, {way}", self._park(3 if not call.depth else 15)
+
+    def _award(self, award: Award) -> Iterator[tuple[int, str, int]]:
+        if not self._changed((award.sender, award.call), (award.result, award.winner)):
+            return
+        call = self.calls[award.sender, award.call]
+        if award.result is CallResult.AWARDED and not call.depth:
+            self.owner = award.winner
+        yield award.winner or ALL, f"call {award.call} {award.result.name.lower()}", self._park(0 if call.depth else 10)
+
+    def _is_ours(self, plan: Itinerary) -> bool:
+        key = (plan.stamp.initiator, plan.stamp.call)
+        return plan.sender == self.owner and any((who, call & 0xFF) == key for who, call in self.calls)
+
+    def _report(self, report: TaskReport) -> Iterator[tuple[int, str, int]]:
+        if not self._changed((report.sender, report.station), report.phase):
+            return
+        self.loaded |= report.phase is TaskPhase.LOADED
+        self.over = report.phase in (TaskPhase.DONE, TaskPhase.REFUSED)
+        step = {TaskPhase.LOADED: 13, TaskPhase.DONE: 21}.get(report.phase, 0)
+        yield ALL, f"task {report.phase.name.lower()}, {self._words.station(report.station)}", self._park(step)
+
+    def _progress(self, progress: Progress) -> Iterator[tuple[int, str, int]]:
+        if progress.sender == self.owner:
+            aboard = (progress.track, progress.index) in self._platforms
+            if self._changed("aboard", aboard) and (aboard or self._changed("boarded", True) is False):
+                yield ALL, "on the platform" if aboard else "off the platform", self._after(17 if aboard else 20)
+        elif progress.sender in self._lifts and self.owner and self._changed(progress.sender, progress.index):
+            yield ALL, f"lift at floor {progress.index}", self._after(18 if progress.speed_mm_s else 19)
+
+    def _device(self, message: Message) -> Iterator[tuple[int, str, int]]:
+        match message:
+            case BayState() if self._changed("load", message.load_kg > 0):
+                left = message.load_kg > 0
+                yield (
+                    message.sender,
+                    "a car stands in the bay" if left else "the bay is empty",
+                    int(left),
+                )
+            case BayState() if self._changed("front", message.carrier_in_front) and message.carrier_in_front:
+                yield message.sender, "a carrier stands before the bay", self._park(12)
+            case DeskEvent() if self._changed("desk", message.sequence):
+                step = 2 if message.event is DeskInput.KEY else 0
+                self.pressed |= bool(step)
+                yield message.sender, f"desk: {message.event.name.lower()}", self._once("key", step)
+            case DeskOrder() if message.text is DeskText.TAKE_TICKET and self._changed("ticket", message.car):
+                yield message.sender, f"ticket of car {self._words.reference(message.car)}", 2
+            case DoorState():
+                yield from self._doors(message)
+            case ShuttleState() if message.sender == self.owner and self._changed("shuttle", message.mode):
+                if message.mode in (ShuttleMode.GRIPPING, ShuttleMode.RELEASING):
+                    yield message.sender, f"shuttle {message.mode.name.lower()}", 0
+            case DriveState() if message.sender == self.owner and message.mode is DriveMode.MOVING:
+                if self._once("moves", 1):
+                    yield message.sender, "begins to move", self._park(12)
+
+    def _doors(self, state: DoorState) -> Iterator[tuple[int, str, int]]:
+        """Closing comes before opening, whatever the figure's numbers say (flag 5)."""
+        if self._changed("light", state.light):
+            red = state.light is LightColour.RED
+            yield state.sender, f"light {state.light.name.lower()}", self._bay(5 if red else 14)
+        if self._changed("input", state.input_door) and state.input_door in (DoorPosition.LOCKED, DoorPosition.OPEN):
+            shut = state.input_door is DoorPosition.LOCKED
+            yield state.sender, f"input door {state.input_door.name.lower()}", self._bay(5 if shut else 14)
+        if self._changed("output", state.output_door) and state.output_door in (DoorPosition.LOCKED, DoorPosition.OPEN):
+            shut = state.output_door is DoorPosition.LOCKED
+            yield state.sender, f"output door {state.output_door.name.lower()}", self._bay(14 if shut else 6)
+
+    def _park(self, step: int) -> int:
+        """Fig. 9 is of a car's entry; retrieval has no listing (flag 6)."""
+        return step if self.operation is Operation.PARK else 0
+
+    def _bay(self, step: int) -> int:
+        is_park = self.operation is Operation.PARK or (self.operation is None and self.pressed)
+        return step if is_park and (step == 14) is self.loaded else 0
+
+    def _after(self, step: int) -> int:
+        """Steps of the lift come after loading: the car may be parked without one."""
+        return self._park(step) if self.loaded else 0
+
+    def _once(self, key: object, step: int) -> int:
+        return step if self._changed(("once", key), 1) else 0
+
+    def _changed(self, key: object, value: object) -> bool:
+        before = self._seen.get(key)
+        self._seen[key] = value
+        return before != value
+
+
+def chart(site: Site, said: Iterable[Said], task: Reference) -> Chart | None:
+    """The chart of a task, None where the log does not hold it. What the bay's devices said just before counts in."""
+    words = Words(site)
+    story = _Story(site, task, words)
+    arrows: list[Arrow] = []
+    for one in said:
+        if not one.is_fleet and one.message.sender not in (task.origin, story.owner):
+            continue
+        arrows += story.arrows(one)
+    begun_us = next((one.time_us for one in arrows if one.text.startswith("call ")), None)
+    if begun_us is None:
+        return None
+    came_us = [one.time_us for one in arrows if one.time_us <= begun_us and one.text in _BEGINNINGS]
+    arrows = [one for one in arrows if one.time_us >= (came_us[-1] if came_us else begun_us)]
+    relevant = {task.origin, story.owner, *(sender for sender, _ in story.offers)}
+    winners = {one.receiver for one in arrows if one.text.startswith("call ")}
+    relevant = {node for node in relevant | winners if node}
+    arrows = [one for one in arrows if one.sender in relevant]
+    return Chart(f"task {words.reference(task)}", sorted(relevant), arrows)
+
+
+def as_text(found: Chart, words: Words, start_us: int) -> list[str]:
+    """Lanes of characters; ``o`` a message to all, ``>`` and ``<`` to one, ``*`` of a machine's own devices."""
+    head = " " * 17 + "".join(f"{words.machine(node):<{_TEXT_LANE}}" for node in found.nodes)
+    lines = [found.title, head.rstrip()]
+    for arrow in found.arrows:
+        step = f"{arrow.step:>3}" if arrow.step else "   "
+        lines.append(f"{(arrow.time_us - start_us) / 1e6:11.3f} s{step} {_lanes(found, arrow)}  {arrow.text}")
+    return lines
+
+
+def _lanes(found: Chart, arrow: Arrow) -> str:
+    row = [("|" + " " * (_TEXT_LANE - 1)) for _ in found.nodes]
+    text = list("".join(row)[: _TEXT_LANE * (len(found.nodes) - 1) + 1])
+    start = found.nodes.index(arrow.sender) * _TEXT_LANE
+    if arrow.receiver in found.nodes and arrow.receiver != arrow.sender:
+        end = found.nodes.index(arrow.receiver) * _TEXT_LANE
+        low, high = sorted((start, end))
+        text[low + 1 : high] = "-" * (high - low - 1)
+        text[end] = ">" if end > start else "<"
+        text[start] = "+"
+    else:
+        text[start] = "*" if arrow.receiver == arrow.sender else "o"
+    return "".join(text)
+
+
+def as_svg(found: Chart, words: Words, start_us: int) -> Drawing:
+    """Lifelines with arrows; a message to all goes to every lane."""
+    width = _LEFT + _LANE * len(found.nodes) + _NOTES
+    drawing = Drawing(width, _TOP + _ROW * (len(found.arrows) + 2), found.title)
+    drawing.text(8, 16, found.title)
+    lanes = {node: _LEFT + _LANE * number + _LANE / 2 for number, node in enumerate(found.nodes)}
+    for node, x in lanes.items():
+        drawing.text(x, _TOP - 10, words.machine(node), anchor="middle")
+        drawing.line([(x, _TOP), (x, _TOP + _ROW * (len(found.arrows) + 1))], "#999999", dash="3 3")
+    for number, arrow in enumerate(found.arrows):
+        y = _TOP + _ROW * (number + 1)
+        x = lanes[arrow.sender]
+        drawing.text(_LEFT - 8, y + 4, f"{(arrow.time_us - start_us) / 1e6:.3f} s", anchor="end", fill="#666666")
+        if arrow.receiver == arrow.sender:
+            drawing.area([(x - 4, y - 4), (x + 4, y - 4), (x + 4, y + 4), (x - 4, y + 4)], "#009E73", opacity=1)
+        elif arrow.receiver in lanes:
+            drawing.arrow(x, lanes[arrow.receiver], y, "#D55E00")
+        else:
+            for other in lanes.values():
+                if other != x:
+                    drawing.arrow(x, other, y, "#0072B2")
+        step = f"[{arrow.step}] " if arrow.step else ""
+        drawing.text(_LEFT + _LANE * len(found.nodes) + 6, y + 4, step + arrow.text)
+    return drawing

@@ -1,0 +1,289 @@
+"""The time-space diagram: position over time on every floor and in every lift, a line a machine.
+
+Light bands are reservations (what firm itineraries still planned, until a newer one replaced them), darker ones
+authority (segments whose token a mobile machine held). All of it from the fleet bus.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import NamedTuple
+
+from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, TokenKind
+from onboard.core.messages import BusTime, Itinerary, Leg, Progress, TokenGrant, TokenHeld
+from onboard.core.site import Segment, Site
+from onboard.trace.chart.svg import Drawing, colour, dashes
+from onboard.trace.listener import Said
+
+_WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 1200, 90, 20, 46, 30, 14
+#: Height of a segment's row, and of a lift's floor, pixels.
+_ROW, _MOST_HEIGHT = 14.0, 260.0
+_STEPS_S = (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1_200, 1_800, 3_600, 7_200, 14_400)
+_MOST_TICKS = 14
+_MS_MODULUS, _HALF_MS = 1 << 32, 1 << 31
+
+
+class Point(NamedTuple):
+    """Where a machine was: us of the log, place along the track in segments from index 1, speed as it said."""
+
+    time_us: int
+    place: float
+    speed_mm_s: int
+
+
+class Band(NamedTuple):
+    """A stretch of a track over time: places at the beginning and the end, and the node whose it is."""
+
+    node: int
+    track: int
+    begin_us: int
+    end_us: int
+    begin: tuple[float, float]
+    end: tuple[float, float]
+
+
+@dataclass
+class Picture:
+    """What is drawn: runs of points by node and track, bands of both layers."""
+
+    runs: list[tuple[int, int, list[Point]]] = field(default_factory=list)
+    reservations: list[Band] = field(default_factory=list)
+    authority: list[Band] = field(default_factory=list)
+    first_us: int = 0
+    last_us: int = 0
+
+
+class Watcher:
+    """A fold over the fleet bus: feed every message, then ``finish``."""
+
+    def __init__(self, site: Site, from_us: int | None = None, until_us: int | None = None) -> None:
+        self.picture = Picture()
+        self._site = site
+        self._from_us, self._until_us = from_us, until_us
+        self._open: dict[int, tuple[int, list[Point]]] = {}
+        self._plans: dict[int, tuple[int, Itinerary]] = {}
+        self._held: dict[Segment, tuple[int, int]] = {}
+        self._offset_us = 0
+        self._started = False
+
+    def feed(self, said: Said) -> None:
+        """Take up one message of the fleet bus."""
+        if self._until_us is not None and said.time_us > self._until_us:
+            return
+        if not self._started:
+            self._started = True
+            self.picture.first_us = said.time_us if self._from_us is None else self._from_us
+        self.picture.last_us = max(self.picture.last_us, said.time_us)
+        match said.message:
+            case BusTime():
+                self._offset_us = said.time_us - said.message.bus_time_us
+            case Progress():
+                self._on_progress(said.message, said.time_us)
+            case Itinerary() if said.message.grade is Grade.FIRM:
+                self._end_plan(said.message.sender, said.time_us)
+                self._plans[said.message.sender] = said.time_us, said.message
+            case TokenHeld() if said.message.token_kind is TokenKind.SEGMENT:
+                self._hold(said.message.token, said.message.sender, said.time_us)
+            case TokenGrant() if said.message.token_kind is TokenKind.SEGMENT:
+                self._let_go(_segment(said.message.token), said.time_us, of=said.message.sender)
+
+    def finish(self) -> Picture:
+        """The log is over: what is still going on ends with it."""
+        end_us = self.picture.last_us
+        for node, (track, points) in self._open.items():
+            points.append(Point(end_us, points[-1].place, 0))
+            self.picture.runs.append((node, track, points))
+        for node in list(self._plans):
+            self._end_plan(node, end_us)
+        for segment in list(self._held):
+            self._let_go(segment, end_us)
+        first_us = self.picture.first_us
+        self.picture.reservations = [band for band in self.picture.reservations if band.end_us > first_us]
+        self.picture.authority = [band for band in self.picture.authority if band.end_us > first_us]
+        return self.picture
+
+    def _on_progress(self, progress: Progress, time_us: int) -> None:
+        track = self._site.tracks.get(progress.track)
+        if track is None:
+            return
+        place = progress.index - 1 + progress.offset_mm / track.pitch_mm
+        point = Point(time_us, place, progress.speed_mm_s)
+        run = self._open.get(progress.sender)
+        if run is not None and run[0] == progress.track:
+            run[1].append(point)
+            return
+        if run is not None:
+            self.picture.runs.append((progress.sender, *run))
+        self._open[progress.sender] = progress.track, [point]
+
+    def _end_plan(self, node: int, end_us: int) -> None:
+        """Bands of a plan as long as it stood."""
+        told_us, plan = self._plans.pop(node, (0, None))
+        if plan is None:
+            return
+        begin_us = self._moment_us(plan.stamp.award_ms, told_us)
+        for leg in plan.legs:
+            until_us = self._moment_us(leg.end_ms, told_us)
+            band = _cut(_band(node, leg, begin_us, until_us), told_us, end_us)
+            if band is not None and leg.track in self._site.tracks and leg.action is not LegAction.RIDE:
+                self.picture.reservations.append(band)
+            begin_us = until_us
+
+    def _hold(self, token: int, node: int, time_us: int) -> None:
+        segment = _segment(token)
+        machine = self._site.machines.get(node)
+        if machine is None or machine.kind not in MOBILE_KINDS or segment.track not in self._site.tracks:
+            return
+        if segment.track in self._site.lifts or self._held.get(segment, (0, 0))[0] == node:
+            return
+        self._let_go(segment, time_us)
+        self._held[segment] = node, time_us
+
+    def _let_go(self, segment: Segment, time_us: int, of: int | None = None) -> None:
+        node, since_us = self._held.get(segment, (0, 0))
+        if not node or of not in (None, node):
+            return
+        del self._held[segment]
+        around = (segment.index - 1.5, segment.index - 0.5)
+        self.picture.authority.append(Band(node, segment.track, since_us, time_us, around, around))
+
+    def _moment_us(self, bus_ms: int, near_us: int) -> int:
+        away_ms = (bus_ms - (near_us - self._offset_us) // 1000) % _MS_MODULUS
+        return near_us + 1000 * (away_ms - _MS_MODULUS if away_ms >= _HALF_MS else away_ms)
+
+
+def _segment(token: int) -> Segment:
+    return Segment(token >> 8, token & 0xFF)
+
+
+def _band(node: int, leg: Leg, begin_us: int, end_us: int) -> Band:
+    start, stop = leg.from_index - 1.0, leg.to_index - 1.0
+    return Band(node, leg.track, begin_us, end_us, (start - 0.5, start + 0.5), (stop - 0.5, stop + 0.5))
+
+
+def _cut(band: Band, from_us: int, until_us: int) -> Band | None:
+    """The part of a band within a time, None where nothing is left."""
+    begin_us, end_us = max(band.begin_us, from_us), min(band.end_us, until_us)
+    if begin_us >= end_us:
+        return None
+
+    def at(time_us: int) -> tuple[float, float]:
+        share = (time_us - band.begin_us) / (band.end_us - band.begin_us)
+        low, high = (one + (two - one) * share for one, two in zip(band.begin, band.end, strict=True))
+        return low, high
+
+    return band._replace(begin_us=begin_us, end_us=end_us, begin=at(begin_us), end=at(end_us))
+
+
+def watch(site: Site, said: Iterable[Said], from_us: int | None = None, until_us: int | None = None) -> Picture:
+    """What a log of the fleet bus shows, within a time of it."""
+    watcher = Watcher(site, from_us, until_us)
+    for one in said:
+        if one.is_fleet:
+            watcher.feed(one)
+    return watcher.finish()
+
+
+def draw(site: Site, picture: Picture, start_us: int) -> Drawing:
+    """The diagram: a panel for each floor, lift and spur; seconds since ``start_us`` along the top."""
+    tracks = list(site.tracks.values())
+    heights = [min(_MOST_HEIGHT, _ROW * max(3, track.length + 2)) for track in tracks]
+    drawing = Drawing(_WIDTH, _TOP + sum(heights) + _GAP * len(tracks) + _BOTTOM, f"{site.name}: time and space")
+    numbers = {node: number for number, node in enumerate(sorted(site.machines))}
+    moving = [site.machines[node] for node in sorted({node for node, _, _ in picture.runs} & set(site.machines))]
+    x = float(_LEFT)
+    for machine in moving:
+        number = numbers[machine.node_id]
+        drawing.line([(x, 14), (x + 24, 14)], colour(number), width=2.5, dash=dashes(number))
+        drawing.text(x + 28, 18, machine.name)
+        x += 44 + 8 * len(machine.name)
+    drawing.text(x + 10, 18, "light band: reserved; dark band: authority held")
+    span_us = max(1, picture.last_us - picture.first_us)
+    scale = (_WIDTH - _LEFT - _RIGHT) / span_us
+    top = float(_TOP)
+    for track, height in zip(tracks, heights, strict=True):
+        is_lift = track.number in site.lifts
+        name = f"lift {site.machines[site.stewards[track.number]].name}" if is_lift else f"track {track.number}"
+        drawing.area([(_LEFT, top), (_WIDTH - _RIGHT, top), (_WIDTH - _RIGHT, top + height), (_LEFT, top + height)],
+                     "#f3f3f3", opacity=1)  # fmt: skip
+        drawing.text(8, top + 12, name)
+        speed_mm_s = (site.lift if is_lift else site.carrier).speed_mm_s
+        panel = _Panel(
+            drawing, picture, track.number, top, height, track.length, scale, track.pitch_mm, max(1, speed_mm_s)
+        )
+        panel.rows(is_lift=is_lift)
+        panel.bands(picture.reservations, numbers, 0.22, "reserved", site)
+        panel.bands(picture.authority, numbers, 0.38, "authority", site)
+        panel.runs(numbers)
+        top += height + _GAP
+    _time_axis(drawing, picture, start_us, scale, top)
+    return drawing
+
+
+@dataclass
+class _Panel:
+    drawing: Drawing
+    picture: Picture
+    track: int
+    top: float
+    height: float
+    length: int
+    scale: float
+    pitch_mm: int
+    speed_mm_s: int
+
+    def x(self, time_us: float) -> float:
+        return min(_WIDTH - _RIGHT, max(_LEFT, _LEFT + (time_us - self.picture.first_us) * self.scale))
+
+    def y(self, place: float) -> float:
+        """Platforms lie beside an alley, at both ends: places -1 and the length."""
+        share = (place + 1.5) / (self.length + 2)
+        return self.top + self.height * min(1.0, max(0.0, share))
+
+    def rows(self, *, is_lift: bool) -> None:
+        every = max(1, round(12 / (self.height / (self.length + 2))))
+        for index in range(1, self.length + 1, every):
+            label = f"floor {index}" if is_lift else f"p({self.track},{index})"
+            self.drawing.text(_LEFT - 4, self.y(index - 1) + 4, label, anchor="end", fill="#666666")
+
+    def bands(self, bands: list[Band], numbers: dict[int, int], opacity: float, what: str, site: Site) -> None:
+        for band in bands:
+            if band.track == self.track and band.node in numbers:
+                x1, x2 = self.x(band.begin_us), self.x(band.end_us)
+                points = [(x1, self.y(band.begin[0])), (x2, self.y(band.end[0])), (x2, self.y(band.end[1]))]
+                points.append((x1, self.y(band.begin[1])))
+                note = f"{site.machines[band.node].name}: {what}"
+                self.drawing.area(points, colour(numbers[band.node]), opacity=opacity, note=note)
+
+    def runs(self, numbers: dict[int, int]) -> None:
+        for node, track, points in self.picture.runs:
+            if track == self.track and node in numbers and points[-1].time_us >= self.picture.first_us:
+                line = [
+                    (self.x(time_us), self.y(place)) for time_us, place in _line(points, self.pitch_mm, self.speed_mm_s)
+                ]
+                self.drawing.line(line, colour(numbers[node]), width=2, dash=dashes(numbers[node]))
+
+
+def _line(points: list[Point], pitch_mm: int, speed_mm_s: int) -> list[tuple[float, float]]:
+    """Points to draw through: a machine that said it stands did so until it must have started for the next point."""
+    found: list[tuple[float, float]] = []
+    for before, after in pairwise(points):
+        found.append((before.time_us, before.place))
+        if before.speed_mm_s == 0:
+            # Evenly accelerated from a stand, or braked to one, it took twice the time of going at that speed.
+            way_mm = abs(after.place - before.place) * pitch_mm
+            spent_us = 2e6 * way_mm / abs(after.speed_mm_s or speed_mm_s)
+            found.append((max(before.time_us, after.time_us - spent_us), before.place))
+    last = points[-1]
+    return [*found, (last.time_us, last.place)]
+
+
+def _time_axis(drawing: Drawing, picture: Picture, start_us: int, scale: float, bottom: float) -> None:
+    span_s = (picture.last_us - picture.first_us) / 1e6
+    step_s = next((step for step in _STEPS_S if span_s / step <= _MOST_TICKS), _STEPS_S[-1])
+    second = -(-(picture.first_us - start_us) // (step_s * 1_000_000)) * step_s
+    while start_us + second * 1_000_000 <= picture.last_us:
+        x = _LEFT + (start_us + second * 1_000_000 - picture.first_us) * scale
+        drawing.line([(x, _TOP - 4), (x, bottom - _GAP)], "#cccccc", width=0.6)
+        drawing.text(x, _TOP - 8, f"{second} s", anchor="middle", fill="#666666")
+        second += step_s
