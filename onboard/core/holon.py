@@ -88,6 +88,7 @@ class Holon:
             slot=slot_of(site, machine.node_id),
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries)
+        self.fleet.drops = self.drops
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self.tokens.claim = self._claim
         self._asked_again_us: dict[int, int] = {}
@@ -267,7 +268,7 @@ class Holon:
 
     def _on_token_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         key = TokenKey(grant.token_kind, grant.token)
-        if genesis_holder(self.site, key) == NOBODY:
+        if not self._may_exist(key):
             self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         if self.tokens.is_news(key, grant.version):
@@ -280,7 +281,15 @@ class Holon:
         self.fleet.petitions.returned(key, now_us)
         return effects + self._serve_petitions(now_us)
 
+    def _may_exist(self, key: TokenKey) -> bool:
+        """Whether the site has such a token, so that no frame can fill the book with what nobody ever made."""
+        first = genesis_holder(self.site, key)
+        return first != NOBODY and first in self.site.machines
+
     def _on_token_held(self, statement: TokenHeld, now_us: int) -> list[Effect]:
+        if not self._may_exist(TokenKey(statement.token_kind, statement.token)):
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
         self.fleet.petitions.close(TokenKey(statement.token_kind, statement.token), statement.sender)
         return self.tokens.on_held(statement)
 

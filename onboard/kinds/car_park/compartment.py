@@ -367,11 +367,11 @@ class Compartment:
             return [self._desk(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
         if not self.fleet.mirror.free_places():
             return [self._desk(DeskText.FULL, Reference(0, 0))]
-        self._number = successor(self._number, 16)
-        car = Reference(self.fleet.node_id, self._number)
+        car = self._next_reference()
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
-        effects = self.fleet.tokens.create(car_token(*car))
-        effects.append(Record({"record": "number", "number": self._number}))
+        # The number first: whatever happens between the two writes, it is never used again.
+        effects: list[Effect] = [Record({"record": "number", "number": self._number})]
+        effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
         effects += self._state_car(car, self.station.number, bay.wheelbase_mm)
         effects.append(self._desk(DeskText.TAKE_TICKET, car))
@@ -397,12 +397,19 @@ class Compartment:
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         car = self.tickets.popleft()
-        self._number = successor(self._number, 16)
-        task = Reference(self.fleet.node_id, self._number)
+        task = self._next_reference()
         self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
         job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
         return [Record({"record": "number", "number": self._number}), job, *self._fetch(self.job, now_us)]
+
+    def _next_reference(self) -> Reference:
+        """The next number of a car or task; one under which a token was ever heard of is passed over."""
+        for _ in range(1 << 16):
+            self._number = successor(self._number, 16)
+            if car_token(self.fleet.node_id, self._number) not in self.fleet.tokens.seen:
+                break
+        return Reference(self.fleet.node_id, self._number)
 
     def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
         where = self._place_of(job.car)
