@@ -52,6 +52,7 @@ from onboard.kinds.car_park.bay_memory import (
     car_record,
     job_over_record,
     job_record,
+    next_number,
     ticket_record,
 )
 from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
@@ -369,7 +370,6 @@ class Compartment:
             return [self._desk(DeskText.FULL, Reference(0, 0))]
         car = self._next_reference()
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
-        # The number first: whatever happens between the two writes, it is never used again.
         effects: list[Effect] = [Record({"record": "number", "number": self._number})]
         effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
@@ -404,11 +404,7 @@ class Compartment:
         return [Record({"record": "number", "number": self._number}), job, *self._fetch(self.job, now_us)]
 
     def _next_reference(self) -> Reference:
-        """The next number of a car or task; one under which a token was ever heard of is passed over."""
-        for _ in range(1 << 16):
-            self._number = successor(self._number, 16)
-            if car_token(self.fleet.node_id, self._number) not in self.fleet.tokens.seen:
-                break
+        self._number = next_number(self._number, self.fleet)
         return Reference(self.fleet.node_id, self._number)
 
     def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
