@@ -370,8 +370,8 @@ class Compartment:
             return [self._desk(DeskText.FULL, Reference(0, 0))]
         car = self._next_reference()
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
-        effects: list[Effect] = [Record({"record": "number", "number": self._number})]
-        effects += self.fleet.tokens.create(car_token(*car))
+        number = Record({"record": "number", "number": self._number})
+        effects: list[Effect] = [number, *self.fleet.tokens.create(car_token(*car))]
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
         effects += self._state_car(car, self.station.number, bay.wheelbase_mm)
         effects.append(self._desk(DeskText.TAKE_TICKET, car))
