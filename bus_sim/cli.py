@@ -13,6 +13,7 @@ from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
 from bus_sim.faults.injection import AnyFault, parse_injection
+from bus_sim.importers.command import add_import, run_import
 from bus_sim.planted.bug import PlantedBug
 from bus_sim.planted.registry import find_bug
 from bus_sim.processes.fleet import ProcessesError
@@ -77,6 +78,7 @@ def build_parser() -> argparse.ArgumentParser:
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     add_compare(commands)
     add_campaign(commands)
+    add_import(commands)
     add_certify(commands)
     return parser
 
@@ -245,6 +247,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "dbc": _dbc,
     "compare": run_compare,
     "campaign": run_campaign_command,
+    "import": run_import,
     "certify": run_certify,
 }
 

@@ -64,7 +64,10 @@ def cell_width(site: Site, width: int) -> int:
 
 
 def draw_floor(site: Site, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
-    """Three lines: far places, alley with machines, near places and compartments; ``cell`` columns a position."""
+    """Three lines: far places, alley with machines, near places and compartments; ``cell`` columns a position.
+
+    A spur is drawn in round brackets beside its mouth, with whoever stands in it.
+    """
     taken = view.places_taken()
     compartments = set(site.compartments.values())
     places = set(site.places)
@@ -79,11 +82,30 @@ def draw_floor(site: Site, view: SiteView, track: int, cell: int = CELLS[0]) -> 
                 row.append(_boxed(str(car.number) if car else "I/O", "[]", cell), style="bold magenta")
             elif station in places:
                 row.append(_boxed(str(car.number) if car else "", "||", cell), style="cyan" if car else "dim")
+            elif site.spurs.get(station.segment) is not None and _is_at_spur(station, places | compartments):
+                row.append_text(_spur(view, Segment(site.spurs[station.segment], 1), cell))
             else:
                 row.append(" " * cell)
         rows.append(row)
     rows.insert(1, _alley(site, view, track, cell))
     return rows
+
+
+def _is_at_spur(station: Station, stations: set[Station]) -> bool:
+    """Whether a spur is drawn on this side of its mouth: the far one unless cars stand there."""
+    return station.side is Side.FAR or station._replace(side=Side.FAR) in stations
+
+
+def _spur(view: SiteView, inside: Segment, cell: int) -> Text:
+    node = next((node for node, (segment, _) in view.positions.items() if segment == inside), None)
+    if node is None:
+        return Text(_boxed("", "()", cell), style="dim")
+    return Text(_boxed(view.name(node)[-3:], "()", cell), style=_style(view, [node]))
+
+
+def _style(view: SiteView, nodes: list[int]) -> str:
+    """Of machines drawn in one place: whether any of them carries a car."""
+    return _LOADED if any(view.aboard.get(node) is not None for node in nodes) else "bold green"
 
 
 def _boxed(text: str, box: str, cell: int) -> str:
@@ -99,18 +121,26 @@ def _alley(site: Site, view: SiteView, track: int, cell: int) -> Text:
     here: dict[int, list[int]] = {}
     for node, (segment, _) in view.positions.items():
         machine = site.machines.get(node)
-        if segment.track == track and machine is not None and machine.kind is not KindCode.COMPARTMENT:
-            here.setdefault(segment.index, []).append(node)
+        if machine is None or machine.kind is KindCode.COMPARTMENT:
+            continue
+        # Index 0 of a spur is its mouth: whoever is there turns.
+        at = site.tracks[segment.track].joins[0] if _is_turning(site, segment) else segment
+        if at.track == track:
+            here.setdefault(at.index, []).append(node)
     for index in range(1, site.tracks[track].length + 1):
         nodes = here.get(index)
         if nodes is None:
             row.append(f"{'.':^{cell}}", style="dim")
         else:
-            loaded = any(view.aboard.get(node) is not None for node in nodes)
             name = view.name(nodes[0])
-            row.append(f"{name[:4] if cell > 4 else name[-cell:]:^{cell}}", style=_LOADED if loaded else "bold green")
+            row.append(f"{name[:4] if cell > 4 else name[-cell:]:^{cell}}", style=_style(view, nodes))
     row.append_text(_shaft(site, view, track, site.tracks[track].length + 1, cell))
     return row
+
+
+def _is_turning(site: Site, at: Segment) -> bool:
+    track = site.tracks.get(at.track)
+    return track is not None and track.kind is TrackKind.SPUR and at.index == 0
 
 
 def _shaft_width(site: Site, cell: int) -> int:

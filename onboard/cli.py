@@ -75,6 +75,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
+    if config.machine.kind not in system_of(config.site).factories:
+        what = f"a {config.machine.kind.name} of a {config.site.system} has no controller yet"
+        print(f"{args.machine}: {config.machine.name}: {what}; name a machine of another site", file=sys.stderr)
+        return 2
     if args.check:
         site = config.site
         print(f"{args.machine}: {config.machine.name} of site {site.name} (digest {site.digest:04X}): in order")

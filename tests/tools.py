@@ -14,6 +14,7 @@ PACKAGES = {
     "spin": "spin",
     "canplayer": "can-utils",
     "log2asc": "can-utils",
+    "log2long": "can-utils",
     "tshark": "tshark",
 }
 #: How long a foreign program may take, s; it waits on events, so this is only met by one that hangs.

@@ -22,6 +22,7 @@ from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
 from onboard.core.site import Site
+from onboard.kinds.car_park.site import CarPark
 
 HELP = """\
 Each seed brings its own customers and its own faults, drawn from the profile. A run with a failure is shrunk to the
@@ -73,6 +74,8 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run_campaign_command(args: argparse.Namespace) -> int:
     """Play it. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for an unknown site."""
     site = find_site(args.site)
+    if not isinstance(site, CarPark):
+        raise DemandError(f"{args.site}: a {site.system}, and campaigns bring cars; name a car park")
     plan = _plan(args)
     console = Console()
     trials, total = _trials(args, plan, site, console)

@@ -11,10 +11,13 @@ from bus_sim.certify.counterexample import play_file, write_counterexample
 from bus_sim.certify.model import Model
 from bus_sim.certify.throughput import Pace, measure
 from bus_sim.sites import SiteNotFoundError, find_site
+from bus_sim.systems.graph.against_optimum import compare
 from onboard.kinds.graph.network import Graph, complete, grid, ring
 from onboard.kinds.graph.rules import Rules
 from onboard.kinds.graph.site import FactoryGraph
 
+#: Cases that are compared with the optimum at most.
+MOST_CASES = 20
 _SPEC = re.compile(r"(?:ring:(\d{1,2})|complete:(\d{1,2})|grid:(\d{1,2})x(\d{1,2}))")
 _RULES = [rules.value for rules in Rules]
 
@@ -50,6 +53,12 @@ def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     parser.add_argument("--up-to", type=int, default=5, metavar="K", help="most robots to propose (default: 5)")
     parser.add_argument("--counterexample", type=Path, metavar="FILE", help="write it here, for bus-sim certify --play")
     parser.add_argument("--play", type=Path, metavar="FILE", help="play a counterexample step by step instead")
+    parser.add_argument(
+        "--optimum",
+        type=int,
+        metavar="CASES",
+        help="instead, 1 to 4 robots on a 3x3 grid on the bus: time to the last goal over the exact optimum",
+    )
     parser.add_argument("--table", action="store_true", help="count the task sets that can stick on known graphs")
 
 
@@ -57,6 +66,8 @@ def run_certify(args: argparse.Namespace) -> int:
     """The command. Raises ``SiteNotFoundError`` or ``ConfigError`` for a mistake in the command line or a file."""
     if args.table:
         return _table()
+    if args.optimum is not None:
+        return _optimum(args.optimum)
     if args.play is not None:
         return play_file(args.play)
     if args.site is None:
@@ -117,6 +128,16 @@ def _propose(graph: Graph, rules: Rules, capacity: int | None, most: int) -> Non
 def _pace(graph: Graph) -> Pace:
     """A metre a second; a graph without measures has edges of ten seconds."""
     return Pace() if max(graph.lengths_mm.values()) >= 1000 else Pace(speed_mm_s=1, load_s=0.5)
+
+
+def _optimum(cases: int) -> int:
+    site = find_site("graph")
+    if not isinstance(site, FactoryGraph) or not 1 <= cases <= MOST_CASES:
+        raise SiteNotFoundError(f"--optimum {cases}: must be 1 to {MOST_CASES}; a case of 4 robots takes 10 s")
+    print("robots  cases    mean   worst")
+    for robots in range(1, 5):
+        print(compare(site, grid(3, 3, 6000), robots, cases).line(), flush=True)
+    return 0
 
 
 def _table() -> int:

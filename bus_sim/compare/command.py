@@ -15,6 +15,7 @@ from bus_sim.demand import Demand, DemandError
 from bus_sim.sites import find_site
 from bus_sim.window import Window, choose_window
 from onboard.core.site import Site
+from onboard.kinds.car_park.site import CarPark
 
 #: What the command can compare on.
 PARTS = ("random", "day", "small")
@@ -73,6 +74,8 @@ def run_compare(args: argparse.Namespace) -> int:
     """Make the tables; the exit status. Raises ``DemandError`` for a person's mistake."""
     seeds, parts = _seeds(args.seeds), _parts(args.parts)
     site = find_site(args.site)
+    if not isinstance(site, CarPark):
+        raise DemandError(f"{args.site}: a {site.system}, and only car parks are compared; name a car park")
     small = find_site(SMALL_SITE)
     found: dict[str, Table | SmallTable] = {}
     for part in parts:

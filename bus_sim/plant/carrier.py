@@ -10,7 +10,7 @@ from bus_sim.plant.world import Change, RobotBody, World
 from onboard.core.codes import DriveMode
 from onboard.core.messages import DriveOrder, DriveState, Message
 from onboard.core.serial import is_newer
-from onboard.core.site import Axis, Site
+from onboard.core.site import Axis, Segment, Site, TrackKind
 
 #: A moving drive that has heard no order for this long brakes to a stand (dbc/device.dbc).
 DRIVE_TIMEOUT_US = 500_000
@@ -27,6 +27,10 @@ class Carrier:
     brakes where it moves, in mode FAULT until the switch closes. So it does, until it takes up another order, for a
     target beyond the end of its alley unless a platform stands there, whose shaft gate is open only then; and aboard a
     platform that is not at a floor. ``fault`` says why in words.
+
+    An order for the other way than the carrier is turned, into the spur or back into the alley, makes it turn first; it
+    does so only standing in the spur's mouth, and refuses elsewhere. A turn that was begun is ended whatever is ordered
+    meanwhile: the body does not leave its place. The order that is fresh then is carried out.
 
     An order is taken up if its sequence is the last one's or newer; any sequence counts after ``DRIVE_TIMEOUT_US``
     without orders, as that of a controller that started again. Repeating an order keeps it fresh. A DriveState follows
@@ -56,6 +60,7 @@ class Carrier:
         self._watchdog: Timer | None = None
         self._timer: Timer | None = None
         self._moving = False
+        self._turn_timer: Timer | None = None
         self._repeat_at_us = 0
         self._told_mm = 0
         link.subscribe(self._on_message)
@@ -70,6 +75,8 @@ class Carrier:
         """As told in DriveState."""
         if self.fault:
             return DriveMode.FAULT
+        if self._turn_timer is not None:
+            return DriveMode.TURNING
         if not self._moving:
             return DriveMode.STANDING
         return DriveMode.BRAKING if self._is_braking else DriveMode.MOVING
@@ -79,11 +86,16 @@ class Carrier:
         position_mm, speed_mm_s = self._body.motion.at(now_us)
         at_mark = self._at_mark()
         sequence = self._order.sequence if self._order is not None else 0
-        return DriveState(self.node_id, sequence, round(position_mm), round(speed_mm_s), self.mode, at_mark)
+        across = self._is_across
+        return DriveState(self.node_id, sequence, round(position_mm), round(speed_mm_s), self.mode, at_mark, across)
 
     @property
     def _body(self) -> RobotBody | PlatformBody:
         return self._world.robots[self.node_id]
+
+    @property
+    def _is_across(self) -> bool:
+        return self._site.tracks[self._body.track].kind is TrackKind.SPUR
 
     @property
     def _axis(self) -> Axis:
@@ -112,6 +124,8 @@ class Carrier:
         self._fresh_until_us = now_us + DRIVE_TIMEOUT_US
         is_repeat = order == self._order
         self._order = order
+        if self._turn_timer is not None:
+            return
         refusal = self._refusal(order)
         if refusal:
             self._fail(refusal, now_us)
@@ -128,7 +142,13 @@ class Carrier:
             return "the shuttle is out"
         if self._world.is_riding(self.node_id):
             return "the platform under the carrier is between two floors"
-        low_mm, high_mm = self._world.limits_mm(self._body.track)
+        track = self._body.track
+        if order.across is not self._is_across:
+            turned = self._world.other_way(self.node_id)
+            if turned is None:
+                return "the carrier does not stand in the mouth of a spur"
+            track = turned.track
+        low_mm, high_mm = self._world.limits_mm(track)
         if not low_mm <= order.target_mm <= high_mm:
             return f"target {order.target_mm} mm is beyond the end of the track, and no platform is there"
         return ""
@@ -141,6 +161,8 @@ class Carrier:
         limit_mm_s = min(order.speed_limit_mm_s, axis.speed_mm_s)
         if limit_mm_s <= 0:
             self._brake(now_us)
+        elif order.across is not self._is_across:
+            self._turn(now_us)
         elif speed_mm_s or abs(order.target_mm - position_mm) > AT_TARGET_MM:
             motion = driving(position_mm, speed_mm_s, order.target_mm, limit_mm_s, axis.acceleration_mm_s2, now_us)
             self._moving, self._is_braking = True, False
@@ -150,6 +172,31 @@ class Carrier:
             self._say(now_us)
         else:
             self._schedule(now_us)
+
+    # --- turning -----------------------------------------------------------------------------------------------
+
+    def _turn(self, now_us: int) -> None:
+        turned = self._world.other_way(self.node_id)
+        if turned is None:
+            return
+        self._turn_timer = self._timers.call_at(now_us + self._site.carrier_turn_us, lambda: self._end_turn(turned))
+        self._world.begin_turn(self.node_id, turned.track)
+
+    def _end_turn(self, turned: Segment) -> None:
+        now_us = self._timers.now_us()
+        self._turn_timer = None
+        self._world.end_turn(self.node_id, turned)
+        order = self._order
+        if order is not None and now_us < self._fresh_until_us:
+            refusal = self._refusal(order)
+            if refusal:
+                self._fail(refusal, now_us)
+                return
+            # Standing, so that the word of it is told in any case.
+            self._say(now_us)
+            self._carry_out(order, now_us)
+        else:
+            self._say(now_us)
 
     # --- stopping ----------------------------------------------------------------------------------------------
 

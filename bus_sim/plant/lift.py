@@ -63,6 +63,8 @@ class LiftDrive(Carrier):
     def _refusal(self, order: DriveOrder) -> str:
         if self._world.overhang(self.node_id) is not None:
             return OVER_THE_SILL
+        if order.across:
+            return "a platform does not turn"
         if not 0 <= order.target_mm <= (self._site.tracks[self._body.track].length - 1) * self._pitch_mm:
             return f"target {order.target_mm} mm is beyond the end of the shaft"
         return ""

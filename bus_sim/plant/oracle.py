@@ -11,6 +11,7 @@ from bus_sim.plant.bodies import Aboard, Location
 from bus_sim.plant.motion import Motion
 from bus_sim.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Span, Violation
 from bus_sim.plant.shaft_rules import ShaftRules
+from bus_sim.plant.spur_rules import SpurRules
 from bus_sim.plant.world import BayBody, Change, RobotBody, World
 from onboard.core.codes import DoorName, DoorPosition
 from onboard.core.site import Station, TrackKind
@@ -30,8 +31,10 @@ class Oracle:
         self._present: set[tuple[Rule, str]] = set()
         now_us = world.timers.now_us()
         for node_id, robot in world.robots.items():
-            self._spans[node_id] = Span(robot.track, robot.motion, now_us)
+            self._spans[node_id] = Span(robot.track, robot.motion, now_us, robot.turning_to)
         self._shafts = ShaftRules(world, self._spans)
+        self._spurs = SpurRules(world.site)
+        self._has_spurs = bool(world.site.spurs)
         self._judge_pairs(now_us)
         world.watch(self._on_change)
 
@@ -63,7 +66,8 @@ class Oracle:
             self._judge_track(node_id, now_us)
             self._judge_pairs(now_us, node_id)
             robot = self.world.robots[node_id]
-            self._spans[node_id] = Span(robot.track, robot.motion, now_us)
+            span = self._spans[node_id] = Span(robot.track, robot.motion, now_us, robot.turning_to)
+            self.violations += self._spurs.judge_turn(node_id, span)
         if change is Change.PERSON:
             self._judge_passage(node_id)
         if change is Change.CAR:
@@ -83,7 +87,7 @@ class Oracle:
     def _judge_robot(self, node_id: int, robot: RobotBody, now_us: int) -> Iterator[tuple[Rule, str]]:
         if not robot.is_out(now_us):
             return
-        if now_us < robot.motion.end_us:
+        if now_us < robot.motion.end_us or robot.turning_to is not None:
             yield Rule.SHUTTLE_HOME_TO_MOVE, f"robot {node_id}"
             return
         station = self.world.station_beside(node_id, robot.side)
@@ -143,18 +147,23 @@ class Oracle:
         return False
 
     def _once(self, rule: Rule, text: str) -> None:
-        if not any(v.rule is rule and v.text == text for v in self.violations):
-            self.report(rule, text)
+        self._note_once(Violation(self.world.timers.now_us(), rule, text))
+
+    def _note_once(self, violation: Violation) -> None:
+        if not any(v.rule is violation.rule and v.text == violation.text for v in self.violations):
+            self.violations.append(violation)
 
     # --- whole motions, afterwards -----------------------------------------------------------------------------
 
     def _judge_track(self, node_id: int, now_us: int) -> None:
-        """A carrier's centre stays on its segments, and beyond them only in a shaft."""
+        """A carrier's centre stays on its segments, and beyond them only in a shaft, or in the mouth of a spur."""
         span = self._spans[node_id]
         track = self.world.site.tracks[span.track]
         if track.kind is TrackKind.LIFT:
             return
         low_mm, high_mm = -track.pitch_mm / 2, (track.length - 0.5) * track.pitch_mm
+        if track.kind is TrackKind.SPUR:
+            low_mm -= track.pitch_mm
         for sills in self.world.sills.values():
             if span.track in sills:
                 far_mm = sills[span.track].centre_mm + sills[span.track].towards * track.pitch_mm / 2
@@ -173,6 +182,8 @@ class Oracle:
 
     def _judge_pair(self, first: int, second: int, now_us: int) -> None:
         one, two = self._spans[first], self._spans[second]
+        for violation in self._spurs.judge_pair((first, second), one, two, now_us) if self._has_spurs else ():
+            self._note_once(violation)
         if one.track != two.track:
             return
         from_us = max(one.from_us, two.from_us)

@@ -26,6 +26,7 @@ class Rule(Enum):
     LIFT_CRUSH = "a lift crushing what overhangs its sill"
     FALL = "a carrier in a shaft without a platform"
     ONE_ABOARD = "two bodies are on one platform"
+    TURN_IN_MOUTH = "a carrier turns elsewhere than in the mouth of a spur"
     RIDE_AT_REST = "a carrier moves on a moving platform"
 
 
@@ -41,8 +42,9 @@ class Violation(NamedTuple):
 
 
 class Span(NamedTuple):
-    """A carrier's motion and from when on it holds."""
+    """A carrier's motion and from when on it holds; ``turning_to`` is the track towards which it turns."""
 
     track: int
     motion: Motion
     from_us: int
+    turning_to: int | None = None

@@ -14,7 +14,7 @@ from bus_sim.plant.motion import Motion, standing
 from bus_sim.plant.shaft import PlatformBody, Sill, sills_of
 from bus_sim.plant.timers import Timers
 from onboard.core.codes import DoorName, DoorPosition, KindCode, Side
-from onboard.core.site import Segment, Site, Station
+from onboard.core.site import Segment, Site, Station, TrackKind
 
 #: Tolerance of the fine position sensor opposite a station, mm (row P34).
 MARK_TOLERANCE_MM = 5.0
@@ -42,12 +42,17 @@ Watcher = Callable[[Change, int, int], None]
 
 @dataclass
 class RobotBody:
-    """A robot as it is: its carrier on a track and its shuttle's extension (mm from home, towards ``side``)."""
+    """A robot as it is: its carrier on a track and its shuttle's extension (mm from home, towards ``side``).
+
+    From the end of a turn into a spur to the end of the turn back the track is the spur: its segment is at 0 mm and the
+    mouth one pitch before. ``turning_to`` is the track towards which a carrier turns now.
+    """
 
     track: int
     motion: Motion
     extension: Motion
     side: Side = Side.NEAR
+    turning_to: int | None = None
 
     def is_out(self, now_us: int) -> bool:
         """Whether any part of the shuttle is outside the carrier, or about to be."""
@@ -123,13 +128,14 @@ class World:
         return is_at_mark(position_mm, self.site.tracks[self.axis_of(node_id)].pitch_mm)
 
     def stands(self, node_id: int) -> bool:
-        """Whether a carrier's motion is at its end."""
-        return self.timers.now_us() >= self.robots[node_id].motion.end_us
+        """Whether a carrier's motion is at its end, and it does not turn."""
+        robot = self.robots[node_id]
+        return robot.turning_to is None and self.timers.now_us() >= robot.motion.end_us
 
     def standing_position(self, node_id: int) -> Segment | None:
         """The mark at which a robot's carrier stands still; index 0 or length + 1 of an alley on a platform there.
 
-        None between marks, while it moves, and while it rides.
+        Turned in the mouth of a spur it is index 0 of the spur. None between marks, while it moves, and while it rides.
         """
         robot = self.robots[node_id]
         if self.is_riding(node_id) or not self.stands(node_id) or not self.at_mark(node_id):
@@ -145,6 +151,31 @@ class World:
             return None
         return position
 
+    # --- spurs -------------------------------------------------------------------------------------------------
+
+    def other_way(self, node_id: int) -> Segment | None:
+        """Where a carrier would be, turned: index 0 of the spur in whose mouth it stands, or that mouth; else None."""
+        here = self.standing_position(node_id)
+        if here is None:
+            return None
+        track = self.site.tracks[here.track]
+        if track.kind is TrackKind.SPUR:
+            return track.joins[0] if here.index == 0 else None
+        spur = self.site.spurs.get(here)
+        return None if spur is None else Segment(spur, 0)
+
+    def begin_turn(self, node_id: int, track: int) -> None:
+        """A carrier begins to turn where it is, towards another track."""
+        self.robots[node_id].turning_to = track
+        self._tell(Change.CARRIER, node_id)
+
+    def end_turn(self, node_id: int, position: Segment) -> None:
+        """A carrier has turned: it stands at a position of the other track."""
+        robot = self.robots[node_id]
+        robot.track, robot.turning_to = position.track, None
+        robot.motion = standing(float(self.site.position_mm(position)), self.timers.now_us())
+        self._tell(Change.CARRIER, node_id)
+
     # --- lifts -------------------------------------------------------------------------------------------------
 
     def platform_floor(self, node_id: int) -> int | None:
@@ -159,9 +190,11 @@ class World:
         return track.joins[index - 1].track if 1 <= index <= track.length else None
 
     def limits_mm(self, floor: int) -> tuple[float, float]:
-        """How far a carrier may drive on an alley now: onto a platform only where one stands there."""
+        """How far a carrier may drive on a track now: onto a platform only where one stands there."""
         track = self.site.tracks[floor]
         low_mm, high_mm = 0.0, float((track.length - 1) * track.pitch_mm)
+        if track.kind is TrackKind.SPUR:
+            return -float(track.pitch_mm), high_mm
         for node_id in self.platforms:
             if self.platform_floor(node_id) == floor:
                 centre_mm = self.sills[node_id][floor].centre_mm

@@ -7,7 +7,7 @@ from dataclasses import replace as changed
 from typing import Any
 
 from bus_sim.planted.bug import PlantedBug
-from bus_sim.planted.tools import hearing, in_behaviour, replace
+from bus_sim.planted.tools import hearing, in_behaviour, reaches_goal, replace
 from bus_sim.run import Simulation
 from onboard.core.codes import KindCode, Reason
 from onboard.core.lifts import gate
@@ -101,7 +101,7 @@ def _leaves_at_any_floor(simulation: Simulation) -> None:
             return advance
 
         replace(riding, "advance", make)
-        replace(robot.carriage, "_reach", lambda _: lambda ahead: (ahead[-1], Reason.NONE))
+        replace(robot.carriage, "_reach", lambda _: reaches_goal(robot.carriage))
 
     in_behaviour(simulation, KindCode.ROBOT, plant)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from bus_sim.planted.bug import PlantedBug
-from bus_sim.planted.tools import at_start, hearing, in_behaviour, replace
+from bus_sim.planted.tools import at_start, hearing, in_behaviour, reaches_goal, replace
 from bus_sim.run import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, Reason, TokenKind
@@ -96,7 +96,7 @@ def _steward_for_ever(simulation: Simulation) -> None:
 
 def _unasked(simulation: Simulation) -> None:
     def plant(robot: Any) -> None:
-        replace(robot.carriage, "_reach", lambda _: lambda ahead: (ahead[-1], Reason.NONE))
+        replace(robot.carriage, "_reach", lambda _: reaches_goal(robot.carriage))
 
     in_behaviour(simulation, KindCode.ROBOT, plant)
 

@@ -9,9 +9,10 @@ from typing import Any
 from bus_sim.run import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.behaviour import Behaviour
-from onboard.core.codes import KindCode
+from onboard.core.codes import KindCode, Reason
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import Message
+from onboard.core.site import Segment
 
 #: What is said instead of one message; an empty list says nothing.
 Said = Callable[[Message], Iterable[Message]]
@@ -79,3 +80,8 @@ def hearing(simulation: Simulation, kind: KindCode | None, heard: Callable[[Cont
             replace(controller.holon, method, changed)
 
     at_start(simulation, kind, plant)
+
+
+def reaches_goal(carriage: Any) -> Callable[[list[int]], tuple[Segment, Reason]]:
+    """A carriage's reach where rights count for nothing: to the end of the way on its axis."""
+    return lambda ahead: (Segment(carriage.track, ahead[-1]), Reason.NONE)

@@ -6,7 +6,10 @@ from pathlib import Path
 
 from bus_sim.faults.injection import AnyFault
 from bus_sim.systems.cell.run import run_cell
+from bus_sim.systems.graph.run import run_graph
+from bus_sim.systems.mapd.run import run_mapd
 from bus_sim.systems.terminal.show import run_terminal
+from bus_sim.systems.turning.run import run_turning
 from onboard.core.site import Site
 
 
@@ -36,4 +39,7 @@ Runner = Callable[[Site, SystemOptions], int]
 RUNNERS: dict[str, Runner] = {
     "terminal": run_terminal,
     "cell": run_cell,
+    "graph": run_graph,
+    "mapd": run_mapd,
+    "turning": run_turning,
 }

@@ -12,7 +12,9 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from bus_sim.demand import DemandError
 from bus_sim.faults.arm import arm, check_targets, frame_faults
+from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.plant.link import BusDeviceLink
 from bus_sim.plant.timers import LoopTimers, Timers
 from bus_sim.run import BusRun, RunOptions, Simulation, buses_of, run_until
@@ -29,6 +31,13 @@ if TYPE_CHECKING:
 #: Pictures of a run that is watched, a second.
 PICTURES_S = 10
 STEP_US = 500_000
+#: Kinds of fault that need nothing of the plant but its timers; beside them all faults of single frames.
+FAULTS = frozenset(
+    {
+        *("burst", "bit_errors", "lossy", "reorder", "bus_off", "partition", "overflow", "babble"),
+        *("crash", "pause", "slow_node", "disk_full", "power_cut", "drift", "clock_jump"),
+    }
+)
 #: After the plant is done the machines may finish what they say, us.
 TAIL_US = 3_000_000
 
@@ -80,8 +89,11 @@ def play(
     picture: Callable[[BusRun, SystemPlant], str] | None = None,
     prepare: Callable[[BusRun], None] | None = None,
 ) -> Played:
-    """Run a site until its plant is done, or to ``limit_s``. Raises ``ValueError`` for a fault of another site."""
-    check_targets(options.faults, site)
+    """Run a site until its plant is done, or to ``limit_s``.
+
+    Raises ``DemandError``, before anything has run, for a fault that this site cannot have.
+    """
+    _check_faults(options.faults, site)
     loop = VirtualTimeLoop(pace=options.speed)
     try:
         asyncio.set_event_loop(loop)
@@ -89,6 +101,20 @@ def play(
     finally:
         asyncio.set_event_loop(None)
         loop.close()
+
+
+def _check_faults(faults: tuple[AnyFault, ...], site: Site) -> None:
+    """Faults of buses and of controllers are the same everywhere; those of doors, cars and customers are not."""
+    for fault in faults:
+        if isinstance(fault, Injection) and fault.kind not in FAULTS:
+            known = ", ".join(sorted(FAULTS))
+            raise DemandError(
+                f"--fault {fault}: only a car park has it, and {site.name} is a {site.system}; use {known}"
+            )
+    try:
+        check_targets(faults, site)
+    except ValueError as error:
+        raise DemandError(f"--fault: {error}") from error
 
 
 async def _play(

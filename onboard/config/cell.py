@@ -1,4 +1,4 @@
-"""The site file of a manufacturing cell; docs/site-file.md describes every key."""
+"""The site file of a manufacturing cell; docs/cell.md describes every key."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -25,6 +25,7 @@ class Constants:
     carrier: Axis
     carrier_length_mm: int
     carrier_clearance_mm: int
+    carrier_turn_us: int
     shuttle: Axis
     shuttle_reach_mm: int
     lift: Axis
@@ -41,6 +42,7 @@ def read_constants(root: Table, lift: Table, pitch_mm: int) -> Constants:
         _read_axis(carrier, 1_500, 500),
         length_mm,
         carrier.integer("clearance_mm", 0, 20_000, 50),
+        carrier.integer("turn_ms", 0, 60_000, 3_000) * 1000,
         _read_axis(shuttle, 750, 500),
         shuttle.integer("reach_mm", 500, 8_000, 5_400),
         _read_axis(lift, 1_083, 500),

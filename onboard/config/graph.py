@@ -1,4 +1,4 @@
-"""The site file of a factory graph; docs/site-file.md describes every key."""
+"""The site file of a factory graph; docs/graph.md describes every key."""
 
 from dataclasses import replace
 from itertools import count, pairwise

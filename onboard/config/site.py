@@ -73,6 +73,7 @@ def _read_car_park(root: Table, common: Common, *, crowded: bool) -> Site:
         carrier=constants.carrier,
         carrier_length_mm=constants.carrier_length_mm,
         carrier_clearance_mm=constants.carrier_clearance_mm,
+        carrier_turn_us=constants.carrier_turn_us,
         shuttle=constants.shuttle,
         shuttle_reach_mm=constants.shuttle_reach_mm,
         lift=constants.lift,

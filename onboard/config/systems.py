@@ -8,8 +8,11 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from onboard.config.cell import read_cell
+from onboard.config.graph import read_graph
+from onboard.config.mapd import read_mapd
 from onboard.config.reader import Table
 from onboard.config.terminal import read_terminal
+from onboard.config.turning import read_turning
 from onboard.core.site import Site
 
 
@@ -24,4 +27,7 @@ class Common(NamedTuple):
 READERS: dict[str, Callable[[Table, Common], Site]] = {
     "terminal": read_terminal,
     "cell": read_cell,
+    "graph": read_graph,
+    "mapd": read_mapd,
+    "turning": read_turning,
 }

@@ -88,3 +88,45 @@ class BehaviourFactory(Protocol):
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """The machine's steps."""
+
+
+@dataclass
+class Plain:
+    """A behaviour that does nothing by itself: a kind built on it writes only what its machine does."""
+
+    fleet: Fleet
+    kind: KindCode = KindCode.ANY
+    state: MachineState = MachineState.IDLE
+    itinerary_version: int = 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Nothing to silence, nothing to ask."""
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """No devices."""
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Nothing beyond what tokens, mirror and negotiation have heard."""
+        return []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """Whatever is won, nothing is done for it."""
+        return []
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Nothing that it holds is used."""
+        return Reason.NONE
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Nothing is ever due."""
+        return []
+
+    def next_wake(self) -> int | None:
+        """Never."""
+        return None
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Nothing to vouch for."""
+        return []

@@ -166,6 +166,7 @@ class DriveMode(IntEnum):
     MOVING = 1
     BRAKING = 2
     FAULT = 3
+    TURNING = 4
 
 
 class ShuttleAction(IntEnum):

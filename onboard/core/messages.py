@@ -294,23 +294,31 @@ class Diagnostic(Message):
 class DriveOrder(Message):
     """Go to ``target_mm`` on the present track at most at ``speed_limit_mm_s``; to be repeated, see the DBC.
 
-    A drive that hears no order for the DBC's time-out while it moves brakes to a stand.
+    A drive that hears no order for the DBC's time-out while it moves brakes to a stand. ``across`` means the spur at
+    whose mouth the carrier is: its segment 1 is at 0 mm and the mouth one pitch before. A drive that is not that way
+    turns first, and does so only where it stands in the mouth.
     """
 
     sequence: int
     target_mm: int
     speed_limit_mm_s: int
+    across: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class DriveState(Message):
-    """Position of the carrier's centre along its track and what the drive does; ``at_mark`` is the fine sensor."""
+    """Position of the carrier's centre along its track and what the drive does; ``at_mark`` is the fine sensor.
+
+    ``across`` tells that the carrier is turned towards a spur: its track is the spur, from the end of the turn into it
+    to the end of the turn back.
+    """
 
     sequence: int
     position_mm: int
     speed_mm_s: int
     mode: DriveMode
     at_mark: bool
+    across: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from onboard.core.lift_uses import standing_after
 from onboard.core.lifts import lift_tracks
 from onboard.core.messages import CarAt, Heartbeat, Itinerary, Progress, Reference
 from onboard.core.obstacles import Obstacles
-from onboard.core.occupancy import final_position, itinerary_windows, lift_uses
+from onboard.core.occupancy import final_position, itinerary_windows, lift_uses, turned_in
 from onboard.core.passing import Plan, next_plan
 from onboard.core.passing_order import PassingOrder
 from onboard.core.reservations import Reservations
@@ -174,7 +174,8 @@ class Mirror:
         for node in sorted(self.obstacles.machines):
             seen, machine = self.progress.get(node), self.site.machines[node]
             if machine.kind in MOBILE_KINDS:
-                found.append(machine.home if seen is None else Segment(seen.track, seen.index))
+                here = machine.home if seen is None else Segment(seen.track, seen.index)
+                found += [here, turned_in(self.site, here)]
         return [position for position in found if position is not None]
 
     def lift_floors(self, now_us: int, at_us: int) -> dict[int, int]:

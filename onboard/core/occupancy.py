@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from onboard.core.codes import LegAction
-from onboard.core.kinematics import Run, cleared_at_us, run_duration_us, time_at_us
+from onboard.core.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
 from onboard.core.lifts import PLATFORM_INDEX, lift_at, lift_index_of, platform, platform_on
 from onboard.core.messages import Itinerary, Leg
 from onboard.core.reservations import FOREVER, Use, Window
@@ -74,7 +74,13 @@ def alley_segments(site: Site, segment: Segment) -> list[Segment]:
 
 
 def standing_segments(site: Site, segment: Segment) -> list[Segment]:
-    """Segments that a carrier standing at ``segment`` occupies, a platform first, then those of its track."""
+    """Segments that a carrier standing at ``segment`` occupies, a platform first, then those of its track.
+
+    Index 0 of a spur is its mouth: whoever turns there is in both.
+    """
+    mouth = turned_in(site, segment)
+    if mouth is not None:
+        return junction_segments(site, mouth, Segment(segment.track, 1))
     on_track = alley_segments(site, segment)
     aboard = _platform_at(site, segment)
     return on_track if aboard is None else [aboard, *on_track]
@@ -86,6 +92,30 @@ def _platform_at(site: Site, position: Segment) -> Segment | None:
         return None
     lift_track = lift_at(site, position)
     return None if lift_track is None else platform(lift_track)
+
+
+def turn_in_us(site: Site, spur: int) -> int:
+    """From standing in the mouth of a spur to standing in it, or back: the turn, then a run over one segment."""
+    return ceil_ms(site.carrier_turn_us) + run_duration_us(site.tracks[spur].pitch_mm, site.carrier)
+
+
+def turned_in(site: Site, position: Segment) -> Segment | None:
+    """The mouth in which a machine at ``position`` is turned, which is index 0 of a spur; None for all others."""
+    track = site.tracks.get(position.track)
+    if track is None or track.kind is not TrackKind.SPUR or position.index != 0:
+        return None
+    return track.joins[0]
+
+
+def hop_origin(site: Site, leg: Leg) -> Segment | None:
+    """Where a hop through a spur's mouth begins; None for every other leg."""
+    if leg.action is not LegAction.TRAVEL or leg.from_index != leg.to_index:
+        return None
+    here, track = Segment(leg.track, leg.from_index), site.tracks[leg.track]
+    if track.kind is TrackKind.SPUR:
+        return track.joins[0] if leg.from_index == 1 else None
+    spur = site.spurs.get(here)
+    return None if spur is None else Segment(spur, 1)
 
 
 def junction_segments(site: Site, origin: Segment, inside: Segment) -> list[Segment]:
@@ -230,6 +260,9 @@ def _part_windows(site: Site, part: _Part) -> list[Window]:
     if leg.action is not LegAction.TRAVEL:
         return _stays(standing_segments(site, origin), begin_us, end_us)
     windows = []
+    if here is None:
+        # A plan told anew while its machine turns begins with the hop.
+        here = hop_origin(site, leg)
     if here is not None and here.track != leg.track:
         windows = _stays(junction_segments(site, here, origin), begin_us, end_us)
     if leg.from_index != leg.to_index:

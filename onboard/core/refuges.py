@@ -37,16 +37,17 @@ def open_refuges(site: Site, standing: Iterable[Segment]) -> frozenset[Segment]:
 
     Where there are several floors: no alley before compartments, so that the street alley stays free for all, no alley
     that is the only way to another unless the robot is the only one, and neither an alley nor a spur in which another
-    stands: at most one in each. One floor has no such choice; there every refuge is open, as the machines can pass each
-    other nowhere.
+    stands: at most one in each. One floor leaves that choice only where each robot has a spur; otherwise every refuge
+    is open there, as the machines can pass each other nowhere else.
     """
     alleys = [track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
-    if len(alleys) == 1:
+    robots = sum(machine.kind is KindCode.ROBOT for machine in site.machines.values())
+    if len(alleys) == 1 and not 1 < robots <= len(site.spurs):
         return refuges(site)
     street = {station.track for station in site.compartments.values()}
     # With compartments on all floors, the lowest of them has to be the one that stays free.
     closed = (street if street < set(alleys) else {min(alleys)}) | {segment.track for segment in standing}
-    if sum(machine.kind is KindCode.ROBOT for machine in site.machines.values()) > 1:
+    if robots > 1:
         closed |= passages(site)
     return _without(refuges(site), frozenset(closed))
 

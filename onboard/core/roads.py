@@ -11,7 +11,7 @@ from typing import NamedTuple
 from onboard.core.kinematics import run_duration_us
 from onboard.core.lift_uses import ride_us
 from onboard.core.lifts import lift_tracks, platform_on
-from onboard.core.occupancy import Sweep, alley_segments, leg_sweeps
+from onboard.core.occupancy import Sweep, alley_segments, leg_sweeps, turn_in_us
 from onboard.core.reservations import FOREVER
 from onboard.core.site import Segment, Site, TrackKind
 
@@ -60,7 +60,7 @@ class Roads:
             self._run_us[number] = tuple(durations)
         for track in site.tracks.values():
             if track.kind is TrackKind.SPUR:
-                hop_us = run_duration_us(track.pitch_mm, site.carrier)
+                hop_us = turn_in_us(site, track.number)
                 for mouth in track.joins:
                     self._join(mouth, Move(Segment(track.number, 1), hop_us, track.pitch_mm))
                     self._join(Segment(track.number, 1), Move(mouth, hop_us, track.pitch_mm))

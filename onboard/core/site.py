@@ -144,6 +144,8 @@ class Site:
     carrier: Axis = _NO_AXIS
     carrier_length_mm: int = 0
     carrier_clearance_mm: int = 0
+    #: How long a carrier takes to turn from an alley into a spur, or back, standing in the spur's mouth.
+    carrier_turn_us: int = 0
     lift: Axis = _NO_AXIS
     floor_height_mm: int = 0
 
@@ -169,6 +171,16 @@ class Site:
                 end = 0 if at.index == 1 else self.tracks[at.track].length + 1
                 found.setdefault(Segment(at.track, end), lift)
         return found
+
+    @cached_property
+    def spurs(self) -> dict[Segment, int]:
+        """Spur track by its mouth: the alley segment that it joins, and no other spur does."""
+        return {
+            mouth: track.number
+            for track in self.tracks.values()
+            if track.kind is TrackKind.SPUR
+            for mouth in track.joins
+        }
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""

@@ -18,10 +18,20 @@ from onboard.kinds.cell.desk import DeskFactory as GoalDeskFactory
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
+from onboard.kinds.graph.agents import HostFactory
+from onboard.kinds.graph.desk import DeskFactory as VisitDeskFactory
+from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
+from onboard.kinds.graph.robot import RobotFactory as GraphRobotFactory
+from onboard.kinds.graph.site import FactoryGraph
+from onboard.kinds.mapd.site import Mapd
 from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.vehicle import VehicleFactory
+from onboard.kinds.turning.desk import DeskFactory as OrderDeskFactory
+from onboard.kinds.turning.machine import LatheFactory
+from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
+from onboard.kinds.turning.site import Turning
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,13 +51,41 @@ _SYSTEMS: dict[str, System] = {
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
         ),
         System(
+            FactoryGraph.system,
+            {
+                KindCode.VEHICLE: GraphRobotFactory(),
+                KindCode.NODE: HostFactory(),
+                KindCode.DESK: VisitDeskFactory(),
+            },
+            GRAPH_MESSAGES,
+        ),
+        System(
             Terminal.system,
             {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: MissionDeskFactory()},
             TERMINAL_MESSAGES,
         ),
         System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: GoalDeskFactory()}, CELL_MESSAGES),
+        System(
+            Turning.system,
+            {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
+            TURNING_MESSAGES,
+        ),
+        # Played without a bus so far (docs/import.md): no machine of it has a controller yet.
+        System(Mapd.system, {}),
     )
 }
+
+
+def add_system(system: System) -> None:
+    """One more system in this process, such as one that is being tried. Raises ``ValueError`` for a name twice."""
+    if system.name in _SYSTEMS:
+        raise ValueError(f"system {system.name}: there is one of this name")
+    _SYSTEMS[system.name] = system
+
+
+def remove_system(name: str) -> None:
+    """Take out what ``add_system`` put in. Raises ``KeyError``."""
+    del _SYSTEMS[name]
 
 
 def system_of(site: Site) -> System:

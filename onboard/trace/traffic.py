@@ -117,8 +117,8 @@ _OPERATION = (
     Row("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride, said again once"),
     Row("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
     Row("Bid", (), _rides, _window, "one for each ride called for"),
-    Row("ItineraryHead", _ROBOT, _one, _window, "tentative with a bid, firm with its award, or a delay", _window),
-    Row("ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs with each head", _window),
+    Row("ItineraryHead", _ROBOT, _two, _window, "tentative with a bid, firm with its award, and a delay", _window),
+    Row("ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs, of all these together", _window),
     Row(
         "Progress", (KindCode.ROBOT, KindCode.LIFT), _two, lambda _: _SECOND_US // 2, "segments at top speed, and stops"
     ),

@@ -3,13 +3,16 @@
 cantools changes its internals with every release (it is pinned); nothing but this file would have to follow.
 """
 
+import re
 from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
+from cantools.database import DecodeError, load_string
 from cantools.database import Message as DbcMessage
 from cantools.database import Signal as DbcSignal
-from cantools.database import load_string
 from cantools.database.can.database import Database
+from cantools.database.namedsignalvalue import NamedSignalValue
 
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text
 
@@ -133,3 +136,58 @@ def system_layouts(system: str) -> tuple[tuple[MessageLayout, ...], tuple[Messag
     layouts = read_layouts(text) if text is not None else ()
     device = tuple(one for one in layouts if CONTROLLER in (*one.senders, *one.receivers))
     return tuple(one for one in layouts if one not in device), device
+
+
+class AnyDbcError(ValueError):
+    """A text that is no DBC; one line."""
+
+
+class Decoded(NamedTuple):
+    """A frame by a DBC: the message's name, its length in bytes, and signals as (name, value with its unit)."""
+
+    name: str
+    length: int
+    signals: tuple[tuple[str, str], ...]
+
+
+class AnyDbc:
+    """A DBC of whatever bus, for looking at logs. Files found in the wild leave out sections that the format wants.
+
+    ``warning`` says what had to be added, empty where nothing. Raises ``AnyDbcError``.
+    """
+
+    def __init__(self, text: str) -> None:
+        missing = [section for section in ("BS_", "BU_") if not re.search(rf"^\s*{section}\s*:", text, re.MULTILINE)]
+        self.warning = f"without {' and '.join(missing)}: read as if both were there and empty" if missing else ""
+        if missing:
+            first = re.search(r"^BO_\s", text, re.MULTILINE)
+            at = first.start() if first is not None else len(text)
+            # In the format's order: what is there already stays where it is only if the other follows it.
+            text = text[:at] + "".join(f"{section}:\n\n" for section in missing) + text[at:]
+        try:
+            database = load_string(text, database_format="dbc", strict=False)
+        except Exception as error:  # cantools and its parser have a dozen errors of their own for a bad text
+            raise AnyDbcError(" ".join(str(error).split())[:200]) from error
+        assert isinstance(database, Database)
+        self._messages = {(one.frame_id, one.is_extended_frame): one for one in database.messages}
+
+    def decode(self, can_id: int, data: bytes, *, is_extended: bool) -> Decoded | None:
+        """The frame in words, or None for an identifier that the DBC has not. A short frame gives what it holds."""
+        message = self._messages.get((can_id, is_extended))
+        if message is None:
+            return None
+        units = {signal.name: signal.unit or "" for signal in message.signals}
+        try:
+            values = message.decode(data, allow_truncated=True)
+        except (DecodeError, ValueError, KeyError):
+            return Decoded(message.name, message.length, (("data", data.hex().upper() or "none"),))
+        assert isinstance(values, dict)
+        signals = tuple((name, _told(value, units.get(name, ""))) for name, value in values.items())
+        return Decoded(message.name, message.length, signals)
+
+
+def _told(value: object, unit: str) -> str:
+    if isinstance(value, NamedSignalValue):
+        return str(value.name)
+    text = f"{value:.10g}" if isinstance(value, float) else str(value)
+    return f"{text} {unit}".rstrip()

@@ -52,6 +52,11 @@ class Decoder:
             return self._feed_call(part, now_us)
         return self._feed_itinerary(part, now_us)
 
+    @property
+    def unfinished(self) -> int:
+        """How many sets wait for more of their frames; at the end of a log they came to nothing."""
+        return len(self._sets)
+
     def _feed_call(self, part: Part, now_us: int) -> Message | None:
         key = ("call", part.sender, part.values[0])
         # Another call under this number, from a sender that has lost count: nothing of the older one may complete it.

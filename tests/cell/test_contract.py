@@ -12,12 +12,13 @@ from onboard.core.messages import Message, Reference
 from onboard.kinds.cell import messages as cell_messages
 from onboard.kinds.cell.goal_frames import Hearsay
 from onboard.kinds.cell.messages import OfferHigh, OfferLow, OfferNodes, from_halves, halves
+from onboard.kinds.turning import messages as turning_messages
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts
 from onboard.wire.decoder import Decoder
 from tests.wire.samples import judge_of
 
-SYSTEMS = {"cell": cell_messages.MESSAGES}
+SYSTEMS = {"cell": cell_messages.MESSAGES, "turning": turning_messages.MESSAGES}
 #: Message types (bits 16 to 23 of the identifier) of each system, on the fleet bus and on device buses.
 TYPES = {"cell": (range(0xA0, 0xB0), range(0xD0, 0xD8)), "turning": (range(0xB0, 0xB8), range(0xD8, 0xE0))}
 

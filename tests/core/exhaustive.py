@@ -24,7 +24,10 @@ Place = tuple[int, int]  # track, index
 
 @dataclass(frozen=True)
 class Problem:
-    """One query in ticks. ``held`` has (place, from, to or None for ever), ``visits`` (place, dwell, not before)."""
+    """One query in ticks. ``held`` has (place, from, to or None for ever), ``visits`` (place, dwell, not before).
+
+    ``turn`` is how long it takes to turn in the mouth of the spur, either way.
+    """
 
     length: int
     half_body: int
@@ -34,6 +37,7 @@ class Problem:
     start_tick: int
     visits: tuple[tuple[Place, int, int], ...]
     refuges: frozenset[Place]
+    turn: int = 0
 
 
 @dataclass(frozen=True)
@@ -97,8 +101,9 @@ class Exhaustive:
         found = [self.run(here, there) for here, there in pairs if here[0] == there[0] and here != there]
         if self.problem.spur_at is not None:
             mouth, inside = (1, self.problem.spur_at), (192, 1)
-            windows = tuple((place, 0, 4) for place in self.touched(mouth) + self.touched(inside))
-            found += [Edge(mouth, inside, 4, windows), Edge(inside, mouth, 4, windows)]
+            hop = 4 + self.problem.turn
+            windows = tuple((place, 0, hop) for place in self.touched(mouth) + self.touched(inside))
+            found += [Edge(mouth, inside, hop, windows), Edge(inside, mouth, hop, windows)]
         return found
 
     def run(self, origin: Place, goal: Place) -> Edge:

@@ -15,6 +15,7 @@ def line_site(
     clearance_mm: int = 0,
     spur_at: int | None = None,
     spur_length: int = 1,
+    turn_us: int = 0,
 ) -> CarPark:
     """One alley of ``length`` segments and, where asked for, a spur that joins it."""
     tracks = {ALLEY: Track(ALLEY, TrackKind.ALLEY, length, pitch_mm)}
@@ -31,6 +32,7 @@ def line_site(
         carrier=axis,
         carrier_length_mm=carrier_length_mm,
         carrier_clearance_mm=clearance_mm,
+        carrier_turn_us=turn_us,
         shuttle=Axis(750, 500),
         shuttle_reach_mm=5_400,
         lift=Axis(1_083, 500),

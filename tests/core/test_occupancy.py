@@ -109,6 +109,13 @@ def test_a_hop_into_a_spur_holds_its_mouth_until_it_ends() -> None:
     ]
 
 
+@pytest.mark.parametrize(("track", "index"), [(SPUR, 1), (ALLEY, 2)], ids=["into the spur", "out of it"])
+def test_a_plan_told_anew_in_the_middle_of_a_hop_still_holds_both_its_ends(track: int, index: int) -> None:
+    plan = itinerary(leg(LegAction.TRAVEL, track, index, index, 120))
+    held = [span for span in spans_ms(itinerary_windows(quick_site(), plan, 0)) if span[2] != -1]
+    assert sorted(held) == [("p(1,2)", 100, 120), ("p(192,1)", 100, 120)]
+
+
 def test_a_released_itinerary_holds_nothing() -> None:
     assert itinerary_windows(quick_site(), Itinerary(11, 1, Grade.RELEASED, Stamp(0, 0, 0), ()), 0) == []
 
@@ -168,3 +175,7 @@ def test_wherever_the_body_is_during_a_run_its_segments_are_held(
     windows = travel_windows(site, Segment(ALLEY, origin), goal, 0, run_duration_us(distance_mm, axis))
     held = {w.segment.index for w in windows if w.from_us - 1 <= at_s * 1e6 <= w.to_us + 1}
     assert overlapped <= held
+
+
+def test_whoever_is_turned_in_the_mouth_of_a_spur_is_in_both() -> None:
+    assert standing_segments(quick_site(), Segment(SPUR, 0)) == [Segment(ALLEY, 2), Segment(SPUR, 1)]

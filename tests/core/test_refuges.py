@@ -50,6 +50,14 @@ def test_on_one_floor_every_refuge_is_open() -> None:
     assert open_refuges(one_floor(), [Segment(1, 7)]) == refuges(one_floor())
 
 
+def test_on_one_floor_with_a_spur_for_each_the_alley_stays_free() -> None:
+    site = one_floor(2, extra='[[spurs]]\nat = "p(1,2)"\n[[spurs]]\nat = "p(1,8)"\n')
+    assert open_refuges(site, ()) == {Segment(SPUR, 1), Segment(SPUR + 1, 1)}
+    assert open_refuges(site, [Segment(SPUR, 1)]) == {Segment(SPUR + 1, 1)}
+    too_few = one_floor(2, extra='[[spurs]]\nat = "p(1,2)"\n')
+    assert open_refuges(too_few, ()) == refuges(too_few)
+
+
 def shafts(robots: int) -> Site:
     """Five floors; one lift serves floors 1 to 3, the other 3 to 5: from floor 3 on up there is no way but floor 3."""
     site = building(5, 6, Axis(1_500, 500), pitch_mm=2_400, floor_mm=2_500, carrier_length_mm=2_300)

@@ -40,13 +40,14 @@ def draw(rng: random.Random) -> Problem:
     )
     refuges = frozenset(rng.sample(places, rng.randint(min(2, len(places)), len(places))))
     half_body = rng.choice((1, 1, 1, 1, 2, 3))
-    return Problem(length, half_body, spur_at, tuple(held), start, rng.randrange(4), visits, refuges)
+    start_tick, turn = rng.randrange(4), rng.choice((0, 1, 4)) if spur_at is not None else 0
+    return Problem(length, half_body, spur_at, tuple(held), start, start_tick, visits, refuges, turn)
 
 
 def plan(problem: Problem) -> tuple[Route | NoRoute, int]:
     """The planner's answer, checked as a plan, and the free-flow bound."""
     body_mm = problem.half_body * PITCH_MM  # carrier and clearance share it, to have both in play
-    site = line_site(problem.length, PITCH_MM, AXIS, body_mm - 4, 2, problem.spur_at, 2)
+    site = line_site(problem.length, PITCH_MM, AXIS, body_mm - 4, 2, problem.spur_at, 2, problem.turn * TICK_US)
     reservations = Reservations()
     for number, (place, begin, end) in enumerate(problem.held):
         to_us = FOREVER if end is None else end * TICK_US

@@ -17,7 +17,7 @@ from onboard.core.site import Axis, Machine, Segment, Site
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.program import Program, Step
 from tests.core.buildings import building
-from tests.core.lines import ALLEY, line_site
+from tests.core.lines import ALLEY, SPUR, line_site
 
 #: 10 mm a segment, 1 m/s, top speed after 5 mm and 10 ms: half-millimetre arithmetic by hand, all times in 5 ms.
 QUICK = Axis(1_000, 100_000)
@@ -227,3 +227,19 @@ def test_any_delay_runs_through_all_plans_and_leaves_them_without_conflict(seed:
             for witness in robots:
                 meetings = witness.fleet.mirror.order.meetings(one.fleet.node_id, other.fleet.node_id)
                 assert one is other or [m for m in meetings if m.mine.to_us < FOREVER] == []
+
+
+def test_a_hop_out_of_a_spur_has_no_time_to_spare() -> None:
+    # It holds the mouth from its very begin: a delay of who passes there before is answered in full.
+    site = line_site(9, 10, QUICK, 10, spur_at=3)
+    one = robot(site, FIRST, [stand(1, 0, 200), travel(1, 8, 200, 280)])
+    inside = Step(LegAction.STAND, SPUR, 1, 1, 0, 300 * MS)
+    two = robot(site, SECOND, [inside, travel(3, 3, 300, 320)])
+    tell_all([one, two])
+    two.program.current = 1
+    two.program.shift(0)
+    for each in (one, two):
+        each.fleet.mirror.on_itinerary(two.told(), 0)
+    one.program.delay(1, 80 * MS)
+    assert two.hears(one.told()) is Answer.LATER
+    assert two.program.remaining[-1].end_us > 330 * MS

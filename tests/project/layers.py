@@ -86,7 +86,9 @@ LAYERS: dict[str, Layer] = {
         (*CORE_TYPES, *SYSTEM_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})
     ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
-    "onboard.trace.cli": Layer((*CORE_TYPES, *SYSTEM_TYPES, "onboard.config", "onboard.trace", "onboard.wire")),
+    "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
+    # Its commands are a composition root too: they name the contract of a site's system, and replay runs a controller.
+    "onboard.trace.commands": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
@@ -99,7 +101,7 @@ LAYERS: dict[str, Layer] = {
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
         ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
-        ("distributed", "numpy", "ortools", "rich"),
+        ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
     "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),

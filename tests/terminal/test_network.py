@@ -60,7 +60,7 @@ def test_m06_m16_m31_only_the_plan_that_misses_its_date_is_violated() -> None:
     site = fig3()
     traffic = Traffic(site)
     traffic.take_up(plan_of(site, 11, before=132), 10)
-    other = Plan(12, 1, 0, (Step(Action.GOTO, 7, 6), *plan_of(site, 12).steps[12:]), ())
+    other = Plan(12, 1, 0, (Step(Action.GOTO, 7, 6), *plan_of(site, 12).steps[12:]), (Load(4, NO_REFERENCE, 31, 2),))
     traffic.take_up(other, 10)
     assert traffic.violations(40) == []
     traffic.report(11, 1, 0, 40)

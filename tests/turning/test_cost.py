@@ -1,10 +1,12 @@
 """The five terms of a lathe's bid (rows P24, P26, P27)."""
 
+from dataclasses import replace
+
 import pytest
 
 from onboard.kinds.turning.cost import Edge, bill
 from onboard.kinds.turning.lathe import LatheState
-from onboard.kinds.turning.process import generate
+from onboard.kinds.turning.process import generate, wear_of
 from tests.turning.workshop import JOB, SHAFT, STEEL, lathe
 
 
@@ -29,14 +31,22 @@ def test_p26_the_five_terms_sum_to_the_bid() -> None:
 
 
 def test_p24_a_worn_tool_changes_the_bid() -> None:
-    fresh = generate(JOB, SHAFT, STEEL, lathe(1, 60.0), LatheState())
-    worn = generate(JOB, SHAFT, STEEL, lathe(1, 60.0), LatheState(used_min={1: 19.9}))
+    job = replace(JOB, batch=4)
+    fresh = generate(job, SHAFT, STEEL, lathe(1, 60.0), LatheState())
+    worn = generate(job, SHAFT, STEEL, lathe(1, 60.0), LatheState(used_min={1: 19.9}))
     assert fresh is not None and worn is not None
-    assert [tool.number for tool in worn.changes] == [1] and not fresh.changes
+    assert (worn.wear[1].changes, fresh.wear[1].changes, worn.wear[2].changes) == (1, 0, 0)
     # Two minutes of standing for the batch, and what the edge was still worth.
-    assert worn.bill.setup_eur - fresh.bill.setup_eur == pytest.approx(60.0 * 2 / 60 / 10)
-    assert worn.bill.tools_eur - fresh.bill.tools_eur == pytest.approx(8.0 * 0.1 / 20 / 10)
+    assert worn.bill.setup_eur - fresh.bill.setup_eur == pytest.approx(60.0 * 2 / 60 / 4)
+    assert worn.bill.tools_eur - fresh.bill.tools_eur == pytest.approx(8.0 * 0.1 / 20 / 4)
     assert worn.bill.total_cents > fresh.bill.total_cents
+
+
+def test_p24_an_edge_is_changed_before_a_part_that_it_would_not_last_for() -> None:
+    assert wear_of(5.0, 20.0, 3.0, 1) == (0, 0.0, 2.0)
+    # One part with 5 minutes left, then six with a new edge (2 minutes thrown away), then another edge.
+    assert wear_of(5.0, 20.0, 3.0, 8) == (2, 4.0, 17.0)
+    assert wear_of(0.0, 2.0, 3.0, 1) is None
 
 
 def test_p24_a_lathe_that_is_set_up_already_pays_no_setup() -> None:

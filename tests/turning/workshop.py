@@ -6,7 +6,7 @@ from onboard.kinds.turning.drawing import At, Drawing, Element
 from onboard.kinds.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work
 
 STEEL = Material(1, "C45", 2100.0, 1.6, 7.85)
-EVERYTHING = frozenset({Work.FACE, Work.ROUGH})
+EVERYTHING = (Work.FACE, Work.ROUGH)
 
 
 def tools(**changes: float) -> tuple[Tool, ...]:
@@ -14,7 +14,7 @@ def tools(**changes: float) -> tuple[Tool, ...]:
     rough = {"speed_m_min": 180.0, "depth_mm": 2.5, "feed_mm": 0.3, "nose_mm": 0.8, "edge_eur": 8.0, "life_min": 20.0}
     return (
         Tool(1, EVERYTHING, **(rough | changes)),
-        Tool(2, frozenset({Work.FINISH}), 240.0, 0.8, 0.25, 0.4, 6.0, 15.0),
+        Tool(2, (Work.FINISH,), 240.0, 0.8, 0.25, 0.4, 6.0, 15.0),
     )
 
 

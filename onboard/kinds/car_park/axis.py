@@ -1,49 +1,65 @@
-"""An alley as a carrier's drive sees it: positions in mm, slots with tokens, and the lifts' platforms at its ends."""
+"""A track as a carrier's drive sees it: positions in mm, slots with tokens, and what lies beyond its ends."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 from onboard.core.lifts import gate, lift_at, platform
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment, Site, Track, TrackKind
 
 
 @dataclass(frozen=True)
-class AlleyAxis:
-    """The axis of the alley of ``floor``: index 1 at 0 mm; index 0 and length + 1 where a lift stops at that end."""
+class TrackAxis:
+    """The axis of an alley or a spur: index 1 at 0 mm.
+
+    On an alley index 0 and length + 1 are the platforms of the lifts that stop there. On a spur index 0 is its mouth, a
+    pitch before index 1: a body there is turned, or turning, and needs both slots.
+    """
 
     site: Site
-    floor: int
+    number: int
+
+    @property
+    def track(self) -> Track:
+        """The alley or spur."""
+        return self.site.tracks[self.number]
+
+    @cached_property
+    def mouth(self) -> Segment | None:
+        """The alley segment that a spur joins; None for an alley."""
+        return self.track.joins[0] if self.track.kind is TrackKind.SPUR else None
 
     @cached_property
     def lowest(self) -> int:
         """First index of the axis."""
-        return 1 if lift_at(self.site, Segment(self.floor, 0)) is None else 0
+        return 1 if self.mouth is None and lift_at(self.site, Segment(self.number, 0)) is None else 0
 
     @cached_property
     def highest(self) -> int:
         """Last index of the axis."""
-        length = self.site.tracks[self.floor].length
-        return length if lift_at(self.site, Segment(self.floor, length + 1)) is None else length + 1
+        length = self.track.length
+        return length if lift_at(self.site, Segment(self.number, length + 1)) is None else length + 1
 
     def position_mm(self, index: int) -> int:
         """Centre of an index."""
-        return (index - 1) * self.site.tracks[self.floor].pitch_mm
+        return (index - 1) * self.track.pitch_mm
 
     def index_at(self, position_mm: int) -> int:
         """The index whose span holds a position."""
-        pitch_mm = self.site.tracks[self.floor].pitch_mm
+        pitch_mm = self.track.pitch_mm
         return max(self.lowest, min(self.highest, (position_mm + pitch_mm // 2) // pitch_mm + 1))
 
     def slot(self, index: int) -> Segment:
-        """The body slot of an index: an alley segment, or a lift's platform."""
-        lift = lift_at(self.site, Segment(self.floor, index))
-        return Segment(self.floor, index) if lift is None else platform(lift)
+        """The body slot of an index: a segment of the track, a lift's platform, or a spur's mouth."""
+        if index == 0 and self.mouth is not None:
+            return self.mouth
+        lift = lift_at(self.site, Segment(self.number, index))
+        return Segment(self.number, index) if lift is None else platform(lift)
 
     def crossing(self, index: int, other: int) -> list[Segment]:
         """The gate between two neighbouring indices, where one is a platform; else nothing."""
         for one in (index, other):
-            lift = lift_at(self.site, Segment(self.floor, one))
+            lift = lift_at(self.site, Segment(self.number, one))
             if lift is not None and index != other:
                 return [gate(lift)]
         return []
@@ -53,7 +69,7 @@ class AlleyAxis:
         needed = []
         for place, index in enumerate(indices):
             before = indices[place - 1] if place else index
-            needed.append([self.slot(index), *self.crossing(before, index)])
+            needed.append([self.slot(index), *self._beside(index), *self.crossing(before, index)])
         return needed
 
     def overlapped(self, low_mm: int, high_mm: int) -> list[Segment]:
@@ -62,4 +78,8 @@ class AlleyAxis:
         held = [self.slot(index) for index in indices]
         for one, other in pairwise(indices):
             held += self.crossing(one, other)
-        return held
+        return [*held, *(slot for slot in self._beside(indices[-1]) if slot not in held)]
+
+    def _beside(self, index: int) -> list[Segment]:
+        """What a body needs beside the slot that it is in: whoever turns in a mouth, the spur."""
+        return [Segment(self.number, 1)] if index == 0 and self.mouth is not None else []

@@ -19,7 +19,7 @@ from onboard.core.refuges import open_refuges
 from onboard.core.reservations import FOREVER, Reservations
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
-from onboard.core.site import Machine, Segment, Site, Station, TrackKind
+from onboard.core.site import Machine, Segment, Site, Station
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work, to_itinerary
 from onboard.kinds.car_park.site import car_park
 
@@ -269,9 +269,8 @@ class CarParkGeneration:
         return Visit(work.station.segment, self.handling_us(work.station))
 
     def _refuges(self) -> frozenset[Segment]:
-        """Where this robot may end. Spurs are left out: its carrier cannot turn into one yet."""
-        found = open_refuges(self.site, self.mirror.others_standing())
-        return frozenset(one for one in found if self.site.tracks[one.track].kind is not TrackKind.SPUR)
+        """Where this robot may end."""
+        return open_refuges(self.site, self.mirror.others_standing())
 
     def _lower_bounds(
         self,

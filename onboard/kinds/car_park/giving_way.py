@@ -105,5 +105,8 @@ def _slack_us(site: Site, step: Step) -> int:
     """How much later than at once a run in hand may still enter what lies ahead, by its planned end."""
     if step.action is not LegAction.TRAVEL:
         return 0
+    if step.from_index == step.to_index:
+        # A hop through the mouth of a spur holds both ends from its beginning.
+        return 0
     length_mm = abs(step.to_index - step.from_index) * site.tracks[step.track].pitch_mm
     return max(0, step.end_us - step.begin_us - run_duration_us(length_mm, site.carrier))

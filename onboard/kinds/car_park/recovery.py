@@ -40,7 +40,7 @@ def ride_record(step: Step) -> Record:
 
 
 def floor_record(track: int) -> Record:
-    """A ride is over: the carrier is on this alley."""
+    """A ride is over: the carrier is on this alley. Or it is about to turn into this spur from its mouth."""
     return Record({"record": "floor", "track": track})
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
-    NOBODY,
     CallResult,
     DriveMode,
     Grade,
@@ -34,7 +33,6 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.reservations import FOREVER, Window
 from onboard.core.serial import is_newer, to_bus_ms
 from onboard.core.site import Machine, Segment, Site, TrackKind
 from onboard.kinds.car_park.asking import AskingGeneration
@@ -63,9 +61,6 @@ class RobotFactory:
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
         """The robot's task-generation function."""
-        # No carrier turns into a spur yet: none is planned for.
-        spurs = [track for track in site.tracks.values() if track.kind is TrackKind.SPUR]
-        mirror.reservations.reserve(NOBODY, (Window(Segment(track.number, 1), 0, FOREVER) for track in spurs))
         generation = AskingGeneration if car_park(site).rides is RideCalls.BEFORE else CarParkGeneration
         return generation(site, machine, mirror, Program(site))
 
@@ -306,9 +301,12 @@ class Robot:
     # --- steps -------------------------------------------------------------------------------------------------
 
     def _find_place(self, now_us: int) -> list[Effect]:
-        """Admitted at a mark; between marks after a restart, first to the nearest one, as far as rights allow."""
+        """Admitted at a mark; between marks after a restart, first to the nearest one, as far as rights allow.
+
+        In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
+        """
         here = self.carriage.standing_at
-        if here is not None:
+        if here is not None and here == self.carriage.nearest:
             return self._admit(here, now_us)
         held = self.carriage.occupied()
         if self.carriage.goal is None and all(self.fleet.tokens.holds(segment_token(slot)) for slot in held):
@@ -407,6 +405,9 @@ class Robot:
     def _begin(self, step: Step, now_us: int) -> list[Effect]:
         if step.action is LegAction.TRAVEL:
             self.carriage.go(step.destination)
+            if self.fleet.site.tracks[step.track].kind is TrackKind.SPUR:
+                # Before the turn: the drive tells only that it is across, not in which spur.
+                return [floor_record(step.track)]
         elif step.action is LegAction.RIDE:
             return [ride_record(step), *self.riding.begin(step.track, step.to_index)]
         elif step.work is not None:

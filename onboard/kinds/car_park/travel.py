@@ -3,10 +3,13 @@
 The drive's target is always the centre of the last segment of an unbroken line of held ones, so the machine can stop
 inside its authority at any moment; orders are repeated only while ``authorised`` still agrees, and a drive that hears
 nothing brakes by itself.
+
+Into a spur a carrier turns in its mouth, and back into the alley there too. From the beginning of a leg into the spur
+until it is turned back its axis is the spur's, with the mouth at index 0; there it needs both slots before it turns.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.core.all_or_none import AllOrNone
 from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
@@ -16,8 +19,8 @@ from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.refuges import refuges
 from onboard.core.serial import successor
-from onboard.core.site import Segment
-from onboard.kinds.car_park.axis import AlleyAxis
+from onboard.core.site import Segment, TrackKind
+from onboard.kinds.car_park.axis import TrackAxis
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
 #: journal writes and frames. Ours.
@@ -36,15 +39,16 @@ class Carriage:
 
     fleet: Fleet
     track: int
+    #: As last told by the drive, its position on the axis in hand.
     sensed: DriveState | None = None
     goal: Segment | None = None
     sequence: int = 0
-    target: int | None = None
+    target: Segment | None = None
     refresh_at_us: int | None = None
     blocked: Segment | None = None
     stopped: bool = False
     _reported: Segment | None = None
-    _axes: dict[int, AlleyAxis] = field(default_factory=dict)
+    _axes: dict[int, TrackAxis] = field(default_factory=dict)
     #: What ``advance`` looked at when it last found nothing to do.
     _settled: tuple[object, ...] | None = None
     #: Where the carrier stood by the last word of its sensors.
@@ -57,10 +61,10 @@ class Carriage:
         self.whole = AllOrNone(self.fleet.tokens)
 
     @property
-    def axis(self) -> AlleyAxis:
-        """The alley that the carrier is on."""
+    def axis(self) -> TrackAxis:
+        """The alley that the carrier is on, or the spur that it is in, turns into or comes out of."""
         if self.track not in self._axes:
-            self._axes[self.track] = AlleyAxis(self.fleet.site, self.track)
+            self._axes[self.track] = TrackAxis(self.fleet.site, self.track)
         return self._axes[self.track]
 
     @property
@@ -69,7 +73,7 @@ class Carriage:
 
         Both must say so: the measured way, which tells the marks apart, and the fine sensor, which sees one (row P34).
 
-        On a lift's platform it is index 0 or length + 1 of the alley.
+        On a lift's platform it is index 0 or length + 1 of the alley, turned in a spur's mouth index 0 of the spur.
         """
         if self._stood is None or self._stood[0] is not self.sensed or self._stood[1] != self.track:
             self._stood = (self.sensed, self.track, self._mark())
@@ -85,10 +89,11 @@ class Carriage:
 
     @property
     def nearest(self) -> Segment:
-        """The position whose mark is nearest. Raises ``ValueError`` where no position is known."""
+        """The position with the nearest mark at which a plan can begin. Raises ``ValueError`` where none is known."""
         if self.sensed is None:
             raise ValueError("no position is known yet")
-        return Segment(self.track, self.axis.index_at(self.sensed.position_mm))
+        index = self.axis.index_at(self.sensed.position_mm)
+        return Segment(self.track, index) if index or self.axis.mouth is None else self.axis.mouth
 
     @property
     def arrived(self) -> bool:
@@ -106,9 +111,43 @@ class Carriage:
         """Slots that the body is in now, with the gate where it is across a sill; empty where it is unknown."""
         if self.sensed is None:
             return []
+        if self._in_mouth is not None:
+            return [self._in_mouth]
         half_mm = self.fleet.site.carrier_length_mm // 2
         position_mm = self.sensed.position_mm
         return self.axis.overlapped(position_mm - half_mm, position_mm + half_mm)
+
+    @property
+    def _in_mouth(self) -> Segment | None:
+        """The mouth where the carrier stands before it turns, the spur's axis already in hand; else None."""
+        state = self.sensed
+        if state is None or state.across or state.mode is DriveMode.TURNING:
+            return None
+        return self.axis.mouth
+
+    def _placed(self, state: DriveState) -> DriveState | None:
+        """A drive's word on the axis in hand, which is the alley's once it has turned back; None where it fits none."""
+        mouth = self.axis.mouth
+        if mouth is None:
+            return None if state.across else state
+        if state.across:
+            return state
+        if state.mode is DriveMode.TURNING or (self.goal is not None and self.goal.track == self.track):
+            return self._moved_to(state, mouth, Segment(self.track, 0))
+        self.track = mouth.track
+        return state
+
+    def _moved_to(self, state: DriveState, here: Segment, there: Segment) -> DriveState:
+        """The same place, which is ``here`` on one axis, as ``there`` on another."""
+        site = self.fleet.site
+        by_mm = site.position_mm(there) - site.position_mm(here)
+        return replace(state, position_mm=state.position_mm + by_mm)
+
+    def _told_at(self, state: DriveState) -> tuple[Segment, int]:
+        """Position and offset in mm as the fleet is told; index 0 of a spur is turned, or turning, in its mouth."""
+        index = self.axis.index_at(state.position_mm)
+        offset_mm = state.position_mm - self.axis.position_mm(index)
+        return self._in_mouth or Segment(self.track, index), offset_mm
 
     def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
@@ -119,8 +158,11 @@ class Carriage:
         before = self.sensed
         if before is None:
             self.sequence = state.sequence
-        self.sensed = state
-        here = Segment(self.track, self.axis.index_at(state.position_mm))
+        self.sensed = placed = self._placed(state)
+        if placed is None:
+            # Turned into some spur, but nobody remembers which.
+            return []
+        here, _ = self._told_at(placed)
         started_or_stopped = before is None or before.mode is not state.mode
         if here == self._reported and not started_or_stopped:
             return []
@@ -130,9 +172,8 @@ class Carriage:
         """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known."""
         if self.sensed is None:
             return []
-        here = Segment(self.track, self.axis.index_at(self.sensed.position_mm))
+        here, offset_mm = self._told_at(self.sensed)
         self._reported = here
-        offset_mm = self.sensed.position_mm - self.axis.position_mm(here.index)
         progress = Progress(
             self.fleet.node_id, itinerary_version, leg, here.track, here.index, offset_mm, self.sensed.speed_mm_s
         )
@@ -147,6 +188,19 @@ class Carriage:
             self.blocked = None
             if goal not in self.whole.slots:
                 self.whole.end()
+            self._face(goal)
+
+    def _face(self, goal: Segment) -> None:
+        """Take the axis of a goal in hand where that is another one and the carrier is not turned away from it."""
+        if self.sensed is None or goal.track == self.track:
+            return
+        mouth = TrackAxis(self.fleet.site, goal.track).mouth
+        if mouth is not None and mouth.track == self.track:
+            self.sensed = self._moved_to(self.sensed, mouth, Segment(goal.track, 0))
+            self.track = goal.track
+        elif self._in_mouth is not None:
+            self.sensed = self._moved_to(self.sensed, Segment(self.track, 0), self._in_mouth)
+            self.track = goal.track
 
     def advance(self, now_us: int) -> list[Effect]:
         """Ask for the segments ahead, extend the drive's target as far as they are held, and repeat its order."""
@@ -234,8 +288,10 @@ class Carriage:
         """Indices from where the body is to the goal, the goal included, in the order of travel."""
         assert self.goal is not None and self.sensed is not None
         here = self.axis.index_at(self.sensed.position_mm)
-        step = 1 if self.goal.index >= here else -1
-        return list(range(here, self.goal.index + step, step))
+        # Out of a spur the way on this axis ends in the mouth.
+        there = self.goal.index if self.goal.track == self.track else 0
+        step = 1 if there >= here else -1
+        return list(range(here, there + step, step))
 
     def _lookahead_segments(self) -> int:
         axis = self.fleet.site.carrier
@@ -243,8 +299,8 @@ class Carriage:
         ahead_mm = braking_mm + axis.speed_mm_s * LOOKAHEAD_US // 1_000_000
         return 2 + -(-ahead_mm // self.fleet.site.tracks[self.track].pitch_mm)
 
-    def _reach(self, ahead: list[int]) -> tuple[int | None, Reason]:
-        """The last index of the unbroken authorised line, or None and why not even the first step is allowed."""
+    def _reach(self, ahead: list[int]) -> tuple[Segment | None, Reason]:
+        """The last position of the unbroken authorised line, or None and why not even the first step is allowed."""
         state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped)
         for slot in self.occupied():
             allowed, reason = authorised(state, slot)
@@ -257,11 +313,21 @@ class Carriage:
             reason = next((why for allowed, why in verdicts if not allowed), Reason.NONE)
             if reason is not Reason.NONE:
                 break
-            reach = index
-        standing = self.standing_at
-        if reach is None or (standing is not None and reach == standing.index and standing != self.goal):
+            reach = Segment(self.track, index)
+        if reach is not None and self._turns_back:
+            return self.goal, reason
+        if reach is None or (reach == self.standing_at and reach != self.goal):
             return None, reason
         return reach, reason
+
+    @property
+    def _turns_back(self) -> bool:
+        """Whether the carrier is out of a spur in its mouth, and all that is left is to turn into the alley."""
+        state = self.sensed
+        if state is None or self.goal is None or self.goal.track == self.track:
+            return False
+        off_mm = abs(state.position_mm - self.axis.position_mm(0))
+        return state.mode in (DriveMode.STANDING, DriveMode.TURNING) and off_mm <= MARK_TOLERANCE_MM
 
     def _hold(self, ahead: list[int], reason: Reason) -> list[Effect]:
         """Say once for what the machine waits, for whom and why; no order is repeated, so the drive brakes."""
@@ -280,8 +346,10 @@ class Carriage:
     def _order(self, now_us: int) -> Effect:
         assert self.target is not None
         self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
-        position_mm = self.axis.position_mm(self.target)
-        return Actuate(DriveOrder(self.fleet.node_id, self.sequence, position_mm, self.fleet.site.carrier.speed_mm_s))
+        site = self.fleet.site
+        position_mm, across = site.position_mm(self.target), site.tracks[self.target.track].kind is TrackKind.SPUR
+        order = DriveOrder(self.fleet.node_id, self.sequence, position_mm, site.carrier.speed_mm_s, across)
+        return Actuate(order)
 
     def _give_back(self, now_us: int) -> list[Effect]:
         """Return segments that the body has left and does not need again before its goal."""

@@ -10,7 +10,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, Criterion, KindCode, MachineState, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.messages import CallForProposals, CarAt, Message, Reference, TaskReport
+from onboard.core.messages import CallForProposals, CarAt, Heartbeat, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
@@ -130,6 +130,8 @@ class Desk:
                 self.taken[message.car.number] = now_us + self.site.timing.call_window_us + LOOK_US
             case TaskReport():
                 return self._reported(message, now_us)
+            case Heartbeat():
+                return self.mirror.ask(message)
             case PlanHead():
                 self._is_new = True
         return []
@@ -141,7 +143,7 @@ class Desk:
         task = event.call.task
         self.calls.pop(task, None)
         if event.result is CallResult.AWARDED:
-            return self._won(task, event.winner, now_us)
+            return self.won(task, event.winner, now_us)
         self.orders.give_back(task)
         self._look_at_us = now_us + (LOOK_US if event.result is CallResult.REFUSED else 1)
         return [Record(self.orders.record())]
@@ -164,7 +166,7 @@ class Desk:
         if self._is_new or (self._look_at_us is not None and self._look_at_us <= now_us):
             self._is_new = False
             self._look_at_us = now_us + LOOK_US if self.orders.missions or self.orders.won else None
-            effects += self._look_after(now_us) + self._call_next(now_us)
+            effects += self._look_after(now_us) + self.call_next(now_us)
         return effects
 
     def next_wake(self) -> int | None:
@@ -195,7 +197,7 @@ class Desk:
                 transport = self.orders.open.get(task)
                 if transport is not None and not transport.urgent:
                     effects += self._withdraw(terms, now_us)
-        return effects + self._call_next(now_us)
+        return effects + self.call_next(now_us)
 
     def _withdraw(self, terms: CallTerms, now_us: int) -> list[Effect]:
         self.interrupted += 1
@@ -215,7 +217,7 @@ class Desk:
         ends = {node: self.mirror.traffic.end_of(node, now_us) for node in self.site.vehicles}
         return [node for node, end in ends.items() if end <= limit_us and node in alive and node not in busy]
 
-    def _call_next(self, now_us: int) -> list[Effect]:
+    def call_next(self, now_us: int) -> list[Effect]:
         """As many calls as robots are about to be free: never all boxes at once (M27)."""
         effects: list[Effect] = []
         free = len(self.candidates(now_us))
@@ -249,7 +251,8 @@ class Desk:
         self.calls[transport.task] = terms
         return list(self.fleet.negotiation.open(terms, now_us))
 
-    def _won(self, task: Reference, winner: int, now_us: int) -> list[Effect]:
+    def won(self, task: Reference, winner: int, now_us: int) -> list[Effect]:
+        """A robot has the task."""
         if task not in self.orders.open:
             return []
         self.orders.won[task] = winner

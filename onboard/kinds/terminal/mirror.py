@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import ANY_STATION
-from onboard.core.messages import CarAt, Message
+from onboard.core.codes import ANY_STATION, Grade
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import CarAt, Heartbeat, Message, SyncRequest
 from onboard.core.mirror import Mirror
 from onboard.core.serial import from_bus_ms, is_newer
 from onboard.kinds.terminal.messages import LaneState, PlanHead, PlanStep, PlanTask, StepReport, StepResult, TaskTerms
@@ -115,6 +116,18 @@ class TerminalMirror:
             for place, box in enumerate(row)
         }
         self.traffic.changes += 1
+
+    def ask(self, beat: Heartbeat) -> list[Effect]:
+        """Whoever told a newer plan than I have whole is asked to say it again; once a heartbeat is often enough."""
+        itinerary = self.fleet.itineraries.get(beat.sender)
+        if itinerary is None or beat.sender not in self.where:
+            return []
+        owned = self.traffic.plans.get(beat.sender)
+        if itinerary.grade is Grade.FIRM:
+            is_behind = owned is None or owned.plan.version != itinerary.version
+        else:
+            is_behind = owned is not None
+        return [Send(SyncRequest(self.node_id, beat.sender))] if is_behind else []
 
     def station_of(self, box: int) -> int:
         """The station at which a box stands, 0 where it stands nowhere."""

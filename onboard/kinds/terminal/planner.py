@@ -15,14 +15,16 @@ from onboard.kinds.terminal.memory import plan_record, read_plan
 from onboard.kinds.terminal.messages import Assignment, StepReport, StepResult
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.plan import Load, Plan, PlanReader, to_frames
-from onboard.kinds.terminal.search import Job
+from onboard.kinds.terminal.search import Job, remaining
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.traffic import Owned
 
 #: A violated plan that cannot be bettered is looked at again after this, us. Ours.
 AGAIN_US = 10_000_000
-#: A task that was won and is in no plan yet is spoken of again after this, us. Ours.
-SAY_US = 20_000_000
+#: How far the plan has come, and what was won and is not planned yet, is said again so often, us (dbc/terminal.dbc).
+SAY_US = 5_000_000
+#: Refused for so long without anybody before me, us: the steward sees another order. Ours.
+TELL_US = 10_000_000
 #: Plans are adopted in turns of bus time, one vehicle so long after the other, us: each sees what the one before has
 #: told, so that no two plans are made at once around the same gaps. Ours.
 TURN_US = 50_000
@@ -46,6 +48,7 @@ class Planner:
     _queue_at_us: int | None = None
     _said_at_us: int | None = None
     _turn_at_us: int | None = None
+    _refused_us: int | None = None
 
     @property
     def site(self) -> Terminal:
@@ -74,7 +77,7 @@ class Planner:
 
     def next_wake(self) -> int | None:
         """My next turn in which there is something to plan, or when a task is to be spoken of again."""
-        said_us = self._said_at_us if self.queue else None
+        said_us = self._said_at_us if self.queue or self.owned is not None else None
         return min((time for time in (said_us, self._turn_at_us) if time is not None), default=None)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
@@ -95,12 +98,18 @@ class Planner:
         self.generation.has_queue = bool(self.queue)
 
     def speak(self, now_us: int) -> list[Effect]:
-        """Say of a task that waits to be planned that it is not lost."""
-        if not self.queue or (self._said_at_us is not None and self._said_at_us > now_us):
+        """Say again how far the plan has come, and of a task that waits to be planned that it is not lost."""
+        owned = self.owned
+        effects: list[Effect] = []
+        if self._said_at_us is None or self._said_at_us > now_us:
+            self._said_at_us = self._said_at_us or now_us + SAY_US
             return []
         self._said_at_us = now_us + SAY_US
-        job = self.queue[0]
-        return [Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.AWARDED, job.target, Reason.NONE))]
+        if owned is not None and owned.current:
+            effects.append(Send(self.report(owned, owned.current - 1, owned.began)))
+        node = self.fleet.node_id
+        waiting = [TaskReport(node, job.task, TaskPhase.AWARDED, job.target, Reason.NONE) for job in self.queue]
+        return effects + [Send(report) for report in waiting]
 
     def over(self, now_us: int) -> list[Effect]:
         """The plan is over; under a version of its own, so that whoever missed the report asks."""
@@ -155,14 +164,41 @@ class Planner:
         effects: list[Effect] = []
         if turn_us == now_us:
             effects = self._plan_next(now_us) + self._mend(now_us)
+            effects = effects or self._tell_anew(now_us)
             turn_us = self._turn_us(now_us + TURN_US)
         due_us = self._planning_due(now_us)
         self._turn_at_us = max(turn_us, self._turn_us(due_us)) if due_us is not None else None
         return effects
 
+    def _tell_anew(self, now_us: int) -> list[Effect]:
+        """A steward that refuses me while I see nobody before me has another order: my plan is told anew, as it is."""
+        owned, tokens = self.owned, self.fleet.tokens
+        refused = [key.number >> 8 for key, why in tokens.refused.items() if why is Reason.TOKEN_NOT_GRANTABLE_YET]
+        first = [entity for entity in refused if self._is_first(entity)]
+        if owned is None or not first:
+            self._refused_us = None
+            return []
+        self._refused_us = now_us if self._refused_us is None else self._refused_us
+        if now_us - self._refused_us < TELL_US:
+            return []
+        self._refused_us = now_us
+        left = remaining(self.mirror.traffic, self.fleet.node_id, now_us)
+        return [] if left is None else self._adopt(replace(left, version=successor(self.version, 8)), now_us)
+
+    def _is_first(self, entity: int) -> bool:
+        """Whether nobody is before me in an entity's list but those inside, and there is room beside them."""
+        traffic = self.mirror.traffic
+        row = traffic.lists.get(entity, [])
+        inside = [one for one in row if traffic.is_inside(one)]
+        capacity = self.site.entities[entity].capacity
+        following = next((one for one in row if not traffic.is_inside(one)), None)
+        return following is not None and following.owner == self.fleet.node_id and len(inside) < capacity
+
     def _planning_due(self, now_us: int) -> int | None:
         """When there is something to plan, or to look at."""
         times = [self._again_at_us, self._patience_at_us]
+        if self.owned is not None and self.fleet.tokens.refused:
+            times.append(now_us + TELL_US)
         if self.queue:
             times.append(self._queue_at_us or now_us)
         if self.owned is not None and self.mirror.traffic.changes != self._looked_at:

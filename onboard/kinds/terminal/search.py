@@ -280,6 +280,8 @@ class Search:
                 place = self._stack_places(row, stay.box)[1]
                 first = (n for n, one in enumerate(row) if one.owner in ahead_of and not self.traffic.is_inside(one))
                 place = min(place, next(first, len(row)))
+                if stay is stays[0] and kept is None:
+                    place = self._first_rooms(stay, is_kept=False)[0].place
                 after = row[place - 1].key if place else NOBODY_BEFORE
                 for step in stay.steps:
                     at = max(at + step.duration, self.now)

@@ -7,6 +7,7 @@ on an entity in the order of its list; a new plan says after whom it comes, so a
 
 from collections import deque
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import NamedTuple
 
 from onboard.kinds.terminal.plan import Load, Plan, VisitKey
@@ -102,10 +103,12 @@ class Traffic:
             entity = plan.steps[first].entity
             visit = Visit(plan.owner, first, last)
             row = self.lists.setdefault(entity, [])
-            if number == 0 and kept is not None and kept[0] == entity:
-                row.insert(kept[1], visit)
+            if number == 0:
+                known_place = kept[1] if kept is not None and kept[0] == entity else None
+                row.insert(self._place_in_row(row, plan.steps[0].after, known_place), visit)
             else:
                 row.insert(self._place(row, visit, plan), visit)
+        self._straighten()
         return True
 
     def withdraw(self, owner: int) -> None:
@@ -125,6 +128,7 @@ class Traffic:
             self._take_out(owner)
         else:
             self._come_in(owner, owned.current)
+            self._straighten()
         return True
 
     def _come_in(self, owner: int, step: int) -> None:
@@ -173,6 +177,15 @@ class Traffic:
         owned_at = [self._told_begin(other) for other in row]
         return max(inside, sum(1 for told in owned_at if told <= begin))
 
+    def _place_in_row(self, row: list[Visit], after: VisitKey, known: int | None) -> int:
+        """Whoever is there already says whom it is behind: that is so on the ground. Nobody: in front."""
+        owners = [visit.owner for visit in row]
+        if not after.owner:
+            return 0
+        if after.owner in owners:
+            return owners.index(after.owner) + 1
+        return known if known is not None else sum(1 for visit in row if self.is_inside(visit))
+
     def _told_begin(self, visit: Visit) -> int:
         plan = self.plans[visit.owner].plan
         return plan.begin if visit.first == 0 else plan.steps[visit.first - 1].end
@@ -181,6 +194,42 @@ class Traffic:
         """Whether a stay has begun, by the reports heard."""
         owned = self.plans.get(visit.owner)
         return owned is not None and visit.first <= owned.current <= visit.last
+
+    def _straighten(self) -> None:
+        """Who is ahead on a lane, or passes a crossing for one first, comes first where both go next.
+
+        That is so on the ground, whatever a mirror that lacks a frame believes of the order.
+        """
+        for _ in range(len(self.plans)):
+            moved = [entity for entity in list(self.lists) if self._straighten_behind(entity)]
+            if not moved:
+                return
+
+    def _straighten_behind(self, entity: int) -> bool:
+        place = self.site.entities[entity]
+        if place.kind is not EntityKind.LANE and (place.kind is not EntityKind.CROSSING or place.capacity != 1):
+            return False
+        moved = False
+        for ahead, behind in pairwise(self.lists[entity]):
+            first, second = self._next_visit(ahead), self._next_visit(behind)
+            if first is None or second is None or first[0] != second[0] or self.is_inside(first[1]):
+                continue
+            row = self.lists[first[0]]
+            if row.index(second[1]) < row.index(first[1]) and not self.is_inside(second[1]):
+                row.remove(first[1])
+                row.insert(row.index(second[1]), first[1])
+                moved = True
+        return moved
+
+    def _next_visit(self, visit: Visit) -> tuple[int, Visit] | None:
+        """Where a machine goes from a stay, and its stay there."""
+        steps = self.plans[visit.owner].plan.steps
+        if visit.last + 1 >= len(steps):
+            return None
+        entity = steps[visit.last + 1].entity
+        following = (one for one in self.lists.get(entity, ()) if one.owner == visit.owner)
+        found = next((one for one in following if one.first == visit.last + 1), None)
+        return None if found is None else (entity, found)
 
     # --- dates -------------------------------------------------------------------------------------------------
 

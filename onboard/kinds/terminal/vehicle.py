@@ -11,7 +11,7 @@ from onboard.core.authority import MotionState, TokenKey, authorised, car_token,
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import CallForProposals, CarAt, Message, Reference, TaskReport
+from onboard.core.messages import CallForProposals, CarAt, Heartbeat, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Segment, Site
@@ -136,6 +136,8 @@ class Vehicle:
             return self.planner.assigned(message, now_us)
         if isinstance(message, CallForProposals):
             self.planner.called(message)
+        if isinstance(message, Heartbeat):
+            return self.mirror.ask(message)
         return []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:

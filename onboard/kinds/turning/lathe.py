@@ -21,7 +21,7 @@ class Tool:
     """
 
     number: int
-    works: frozenset[Work]
+    works: tuple[Work, ...]
     speed_m_min: float
     depth_mm: float
     feed_mm: float

@@ -6,6 +6,7 @@ out. Nothing here depends on other machines: the first of the paper's two kinds 
 
 from dataclasses import dataclass
 from math import pi
+from typing import NamedTuple
 
 from onboard.kinds.turning.clamping import Clamping, choose_clamping
 from onboard.kinds.turning.conditions import Conditions, choose_conditions, choose_tools, operations
@@ -16,11 +17,31 @@ from onboard.kinds.turning.lathe import Job, Lathe, LatheState, Material, Tool
 from onboard.kinds.turning.trajectories import Trajectory, cutting_min, rapid_min, trajectories
 
 
+class Wear(NamedTuple):
+    """One tool over a batch: edges changed, minutes of life thrown away with them, minutes left of the last one."""
+
+    changes: int
+    wasted_min: float
+    left_min: float
+
+
+def wear_of(left_min: float, life_min: float, cut_min: float, batch: int) -> Wear | None:
+    """An edge is changed before a part that it would not last for; None where no edge lasts for one part."""
+    if cut_min > life_min:
+        return None
+    changes, wasted_min = 0, 0.0
+    for _ in range(batch):
+        if left_min < cut_min:
+            changes, wasted_min, left_min = changes + 1, wasted_min + left_min, life_min
+        left_min -= cut_min
+    return Wear(changes, wasted_min, left_min)
+
+
 @dataclass(frozen=True, slots=True)
 class Process:
     """How a lathe would make one part, stage by stage, and what it costs. Times in minutes for one part.
 
-    ``wear_min`` is what each tool cuts; ``changes`` are the tools whose edge is changed before the batch.
+    ``wear_min`` is what each tool cuts; ``wear`` what that means for its edges over the whole batch.
     """
 
     clamping: Clamping
@@ -30,7 +51,7 @@ class Process:
     program: str
     machining_min: float
     wear_min: dict[int, float]
-    changes: tuple[Tool, ...]
+    wear: dict[int, "Wear"]
     bill: Bill
 
 
@@ -50,7 +71,9 @@ def generate(job: Job, drawing: Drawing, material: Material, lathe: Lathe, state
         number = path.conditions.tool.number
         wear_min[number] = wear_min.get(number, 0.0) + cutting_min(path)
     used = tuple(dict.fromkeys(tools))
-    changes = tuple(tool for tool in used if state.left_min(tool) < wear_min[tool.number])
+    wear = _wear(used, wear_min, job, state)
+    if wear is None:
+        return None
     machining_min = sum(cutting_min(path) + rapid_min(path, lathe) + lathe.tool_change_min for path in paths)
     return Process(
         clamping,
@@ -60,18 +83,28 @@ def generate(job: Job, drawing: Drawing, material: Material, lathe: Lathe, state
         program(drawing, paths),
         machining_min,
         wear_min,
-        changes,
+        wear,
         bill(
             lathe.hourly_eur,
             machining_min,
             tuple(Edge(tool.edge_eur, wear_min[tool.number], tool.life_min) for tool in used),
-            _setup_min(job, clamping, lathe, state) + lathe.edge_change_min * len(changes),
+            _setup_min(job, clamping, lathe, state) + lathe.edge_change_min * sum(one.changes for one in wear.values()),
             job.batch,
             bar_eur(job, clamping, material),
             lathe.load_min + lathe.unload_min,
-            sum(tool.edge_eur * state.left_min(tool) / tool.life_min for tool in changes),
+            sum(tool.edge_eur * wear[tool.number].wasted_min / tool.life_min for tool in used),
         ),
     )
+
+
+def _wear(used: tuple[Tool, ...], wear_min: dict[int, float], job: Job, state: LatheState) -> dict[int, Wear] | None:
+    found = {}
+    for tool in used:
+        wear = wear_of(state.left_min(tool), tool.life_min, wear_min[tool.number], job.batch)
+        if wear is None:
+            return None
+        found[tool.number] = wear
+    return found
 
 
 def bar_eur(job: Job, clamping: Clamping, material: Material) -> float:

@@ -1,7 +1,8 @@
 """Where a body is, in slots: computed from the site file and a ``Progress`` alone.
 
 A slot is what has a token of its own (docs/network.md): a segment of an alley or spur, a lift's platform (index 0 of
-the lift's track), and a lift's gate (index 255), which whoever is over the sill holds.
+the lift's track), and a lift's gate (index 255), which whoever is over the sill holds. Index 0 of a spur is its mouth,
+one pitch before its segment: whoever is there is turned, or turning, and is in both slots.
 """
 
 from dataclasses import dataclass
@@ -59,8 +60,17 @@ def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segm
     return slots
 
 
+def spur_slots(site: Site, spur: int, low_mm: float) -> list[Segment]:
+    """Slots of a body that reaches down to ``low_mm`` on a spur's axis: with the mouth where it is over the border."""
+    track = site.tracks[spur]
+    inside = Segment(spur, 1)
+    return [track.joins[0], inside] if low_mm + TOLERANCE_MM < -track.pitch_mm / 2 else [inside]
+
+
 def occupied(site: Site, body: Body) -> list[Segment]:
     """Slots that a robot's body is in."""
+    if site.tracks[body.track].kind is TrackKind.SPUR:
+        return spur_slots(site, body.track, body.position_mm - site.carrier_length_mm / 2)
     if site.tracks[body.track].kind is not TrackKind.ALLEY:
         return [Segment(body.track, body.index)]
     half_mm = site.carrier_length_mm / 2
@@ -69,6 +79,9 @@ def occupied(site: Site, body: Body) -> list[Segment]:
 
 def swept(site: Site, body: Body, until_mm: float) -> list[Segment]:
     """Slots that a robot's body is in and comes through until its centre is at ``until_mm`` on the same track."""
+    if site.tracks[body.track].kind is TrackKind.SPUR:
+        low_mm = min(float(body.position_mm), until_mm)
+        return spur_slots(site, body.track, low_mm - site.carrier_length_mm / 2)
     if site.tracks[body.track].kind is not TrackKind.ALLEY:
         return [Segment(body.track, body.index)]
     half_mm = site.carrier_length_mm / 2

@@ -1,5 +1,6 @@
 """Motion: only under authority and inside it, and never two bodies in one slot (design, section 5)."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -13,6 +14,7 @@ from onboard.trace.check.geometry import (
     body_of,
     lifts_under,
     occupied,
+    spur_slots,
     swept,
     token_of,
 )
@@ -59,9 +61,18 @@ class InsideAuthority(Rule):
         sensed_mm = self._sensed_mm.get(event.message.sender)
         if body is None or sensed_mm is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
+        site = self.picture.site
         body = replace(self.picture.on_floor(body), position_mm=sensed_mm)
-        if self.picture.site.tracks[body.track].kind is TrackKind.ALLEY:
-            self._judge(event, body, swept(self.picture.site, body, event.message.target_mm), "is sent through")
+        kind = site.tracks[body.track].kind
+        if kind is TrackKind.LIFT:
+            return
+        if event.message.across is (kind is TrackKind.SPUR):
+            slots = swept(site, body, event.message.target_mm)
+        else:
+            # Sent to turn where it is: into the spur of this mouth, or out of this one.
+            spur = site.spurs.get(Segment(body.track, body.index)) if event.message.across else body.track
+            slots = spur_slots(site, spur, -math.inf) if spur is not None else [Segment(body.track, body.index)]
+        self._judge(event, body, slots, "is sent through")
 
     def _judge(self, event: Event[Progress] | Event[DriveOrder], body: Body, slots: list[Segment], how: str) -> None:
         tokens = self.picture.tokens
@@ -76,7 +87,7 @@ class InsideAuthority(Rule):
 
 
 class OneBody(Rule):
-    """No two robots closer than a carrier's length on a track, and no two on one platform."""
+    """No two robots closer than a carrier's length on a track, no two on one platform, none at the mouth of another."""
 
     name = "one-body"
     title = "no two bodies in one slot or platform"
@@ -101,3 +112,15 @@ class OneBody(Rule):
                 self.find(event, (body.node, other.node), f"{apart_mm} mm apart on track {body.track}")
             for lift in sorted(lifts & lifts_under(site, other)):
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
+            for one, two in ((body, other), (other, body)):
+                if self._is_in_mouth_of(one, two):
+                    self.find(event, (body.node, other.node), f"{one.node} in the mouth of spur {two.track}")
+
+    def _is_in_mouth_of(self, one: Body, two: Body) -> bool:
+        """Whether a body on an alley is where another turns into a spur, or comes out of it."""
+        site = self.picture.site
+        if site.tracks[two.track].kind is not TrackKind.SPUR or len(occupied(site, two)) < 2:
+            return False
+        mouth = site.tracks[two.track].joins[0]
+        apart_mm = abs(one.position_mm - site.position_mm(mouth))
+        return one.track == mouth.track and apart_mm < site.carrier_length_mm - TOLERANCE_MM

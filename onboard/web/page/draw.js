@@ -78,7 +78,7 @@ export class Stage {
     if (track.kind === "spur") {
       const [alley, index] = track.joins[0];
       const spot = this.at(alley, index);
-      return { x: spot.x, y: spot.y - this.floor * 0.3 };
+      return { x: spot.x, y: spot.y - this.floor * 0.3 * Math.max(0, Math.min(1, position)) };
     }
     const spot = this.at(track.number, Math.min(position, track.length + 1));
     const lift = this.liftAt(track, machine.index);

@@ -1,0 +1,1 @@
+"""Sites from the files of others: maps and tasks of the MAPF community, openTCS plant models, Open-RMF buildings."""

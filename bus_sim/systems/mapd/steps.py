@@ -1,0 +1,166 @@
+"""A pick-up and delivery day without frames: the machines' own decision functions, step by step, and a judge.
+
+For benchmarks. Every step all robots bid anew for what is untouched; each that won or lost plans again around what the
+others have published, in the order of the bids; then all move at once.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from onboard.kinds.mapd.auction import Offer, Rule, Task, winners
+from onboard.kinds.mapd.floor import Floor
+from onboard.kinds.mapd.paths import Path, Paths
+from onboard.kinds.mapd.search import find_path
+
+
+@dataclass
+class Robot:
+    """One robot. ``loaded`` is whether its task has been picked up; ``free_at`` the step of the planned delivery."""
+
+    number: int
+    home: int
+    task: Task | None = None
+    loaded: bool = False
+    free_at: int = 0
+
+
+@dataclass
+class Day:
+    """A day's work: ``run`` plays it. ``served`` is the step at which each task was delivered, by number.
+
+    ``searches`` were made, and in ``failures`` of them a robot kept its former path. ``rests`` are where robots may
+    stay.
+    """
+
+    floor: Floor
+    homes: Sequence[int]
+    rests: frozenset[int]
+    tasks: Sequence[Task]
+    rule: Rule = field(default_factory=Rule)
+    step: int = 0
+    served: dict[int, int] = field(default_factory=dict)
+    searches: int = 0
+    failures: int = 0
+    #: Where each robot stood, step by step.
+    history: list[tuple[int, ...]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.robots = [Robot(number, home) for number, home in enumerate(self.homes)]
+        self.paths = Paths(self.floor.resources)
+        for robot in self.robots:
+            self.paths.put(robot.number, Path(0, (robot.home,)))
+        self.waiting = sorted(self.tasks, key=lambda task: (task.release, task.number))[::-1]
+        self.open: dict[int, Task] = {}
+        self.fresh = False
+        self.history.append(tuple(self.homes))
+
+    @property
+    def is_over(self) -> bool:
+        """Whether every task was served."""
+        return len(self.served) == len(self.tasks)
+
+    def run(self, limit: int = 20_000) -> "Day":
+        """Play until every task is served or ``limit`` steps have gone."""
+        while not self.is_over and self.step < limit:
+            self._arrive()
+            if not self.is_over:
+                self._decide()
+                self.step += 1
+                self._judge()
+        return self
+
+    @property
+    def service_time(self) -> float:
+        """Mean steps from release to delivery over the tasks served."""
+        release = {task.number: task.release for task in self.tasks}
+        return sum(step - release[number] for number, step in self.served.items()) / len(self.served)
+
+    @property
+    def makespan(self) -> int:
+        """Step of the last delivery."""
+        return max(self.served.values())
+
+    def at(self, robot: Robot) -> int:
+        """Its cell at this step."""
+        return self.paths.by_robot[robot.number].at(self.step)
+
+    def _arrive(self) -> None:
+        self.fresh = False
+        while self.waiting and self.waiting[-1].release <= self.step:
+            task = self.waiting.pop()
+            self.open[task.number] = task
+            self.fresh = True
+        for robot in self.robots:
+            if robot.task is None:
+                continue
+            if not robot.loaded and self.at(robot) == robot.task.pickup:
+                self._pick_up(robot, robot.task)
+            if robot.loaded and self.at(robot) == robot.task.delivery:
+                self.served[robot.task.number] = self.step
+                robot.task, robot.loaded = None, False
+                self.fresh = True
+
+    def _pick_up(self, robot: Robot, task: Task) -> None:
+        robot.loaded = True
+        self.fresh = True
+        del self.open[task.number]
+
+    def _offer(self, robot: Robot) -> Offer:
+        if robot.loaded and robot.task is not None:
+            return Offer(robot.number, robot.task.delivery, robot.free_at - self.step)
+        return Offer(robot.number, self.at(robot), 0)
+
+    def _decide(self) -> None:
+        if not self.fresh and all(robot.task for robot in self.robots):
+            return
+        won = winners(self.floor, self.rule, [self._offer(one) for one in self.robots], list(self.open.values()))
+        changed = []
+        for robot in self.robots:
+            task, bid = won.get(robot.number, (None, 0))
+            if not robot.loaded and task != robot.task:
+                changed.append((bid, robot.number))
+                robot.task = None
+        lost = {number for _, number in changed if number not in won}
+        for robot in self.robots:
+            if robot.task is None and robot.number not in won and (robot.number in lost or self._must_yield(robot)):
+                self._plan(robot, None)
+        for _, number in sorted(changed):
+            if number in won:
+                self._plan(self.robots[number], won[number][0])
+
+    def _must_yield(self, robot: Robot) -> bool:
+        return self.paths.by_robot[robot.number].rest not in self._rests(robot)
+
+    def _rests(self, robot: Robot) -> frozenset[int]:
+        """Where it may end: not in others' homes, nor where somebody has to pick up or deliver; its home always."""
+        wanted = {cell for task in self.open.values() for cell in (task.pickup, task.delivery)}
+        wanted.update(one.task.delivery for one in self.robots if one.task is not None)
+        return (self.rests - wanted - set(self.homes)) | {robot.home}
+
+    def _plan(self, robot: Robot, task: Task | None) -> None:
+        """A path for a task, or to a rest; where there is none the robot keeps its former path and has no task."""
+        old = self.paths.take(robot.number)
+        assert old is not None
+        goals = () if task is None else (task.pickup, task.delivery)
+        self.searches += 1
+        path = find_path(self.floor, self.paths, old.at(self.step), self.step, goals, self._rests(robot))
+        if path is None:
+            self.failures += 1
+            rest_of_old = tuple(old.at(step) for step in range(self.step, max(old.end, self.step) + 1))
+            self.paths.put(robot.number, Path(self.step, rest_of_old))
+            return
+        self.paths.put(robot.number, path)
+        robot.task = task
+        if task is not None:
+            picked = next(step for step, cell in path.steps() if cell == task.pickup)
+            robot.free_at = next(step for step, cell in path.steps() if cell == task.delivery and step >= picked)
+            if picked == self.step:
+                self._pick_up(robot, task)
+
+    def _judge(self) -> None:
+        """Note where all stand. Raises ``AssertionError`` where two met, whatever their paths say."""
+        before, now = self.history[-1], tuple(self.at(robot) for robot in self.robots)
+        self.history.append(now)
+        assert len({self.floor.resources[cell] for cell in now}) == len(now), f"two in one place, step {self.step}"
+        moves = {(a, b) for a, b in zip(before, now, strict=True) if a != b}
+        assert not any((b, a) in moves for a, b in moves), f"two robots change places, step {self.step}"

@@ -1,0 +1,1 @@
+"""The turning cell in the simulator."""

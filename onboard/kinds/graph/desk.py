@@ -1,0 +1,212 @@
+"""The order desk: orders for a robot by name go to it, all others are called for (rows G11, G28)."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Closed, Estimator, NegotiationEvent
+from onboard.core.site import Machine, Site
+from onboard.kinds.graph.agents import NoEstimator
+from onboard.kinds.graph.messages import VisitAnswer, VisitKey, VisitList, VisitResult, five, stops_of
+from onboard.kinds.graph.planning import call_terms
+
+#: After power-up the desk listens so long before it calls: who has an order in hand says so, us. Ours.
+LISTEN_US = 3_000_000
+#: The counter is told how an order stands this often, us (dbc/graph.dbc).
+ANSWER_US = 2_000_000
+#: An order by name is said again after this while its robot is not heard, us. Ours.
+LIST_AGAIN_US = 1_000_000
+#: A robot that has an order is asked this often how it stands, us. Ours.
+ASK_US = 20_000_000
+
+
+class Stage(Enum):
+    """How an order stands; each is journalled."""
+
+    HEARD = "not given to anybody"
+    CALLED = "bids may come"
+    IN_HAND = "a robot has it"
+    DONE = "done"
+    REFUSED = "refused"
+
+
+_RESULTS = {
+    Stage.HEARD: VisitResult.RECEIVED,
+    Stage.CALLED: VisitResult.RECEIVED,
+    Stage.IN_HAND: VisitResult.IN_HAND,
+    Stage.DONE: VisitResult.DONE,
+    Stage.REFUSED: VisitResult.REFUSED,
+}
+
+
+@dataclass
+class DeskOrder:
+    """One order: ``robot`` is whom it is for or who has it, 0 for nobody yet; ``named`` where a person named it."""
+
+    task: Reference
+    stops: tuple[int, ...]
+    robot: int
+    named: bool
+    stage: Stage = Stage.HEARD
+    answer_at_us: int | None = None
+    due_us: int | None = None
+
+    def record(self) -> Record:
+        """All of it, for the journal."""
+        entry: dict[str, str | int] = {"record": "visit", "number": self.task.number, "robot": self.robot}
+        entry |= {"named": int(self.named), "stops": " ".join(str(one) for one in self.stops)}
+        return Record(entry | {"stage": self.stage.name})
+
+
+class DeskFactory:
+    """Makes order desks."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
+        """Nothing to offer."""
+        return NoEstimator()
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "OrderDesk":
+        """The desk's steps."""
+        return OrderDesk(fleet)
+
+
+@dataclass
+class OrderDesk:
+    """One desk; ``orders`` by task, in the order in which they came."""
+
+    fleet: Fleet
+    kind: KindCode = KindCode.DESK
+    orders: dict[Reference, DeskOrder] = field(default_factory=dict)
+    _listen_until_us: int | None = None
+
+    def __post_init__(self) -> None:
+        for entry in self.fleet.entries:
+            if entry.get("record") == "visit":
+                task = Reference(self.fleet.node_id, int(entry["number"]))
+                stops = tuple(int(one) for one in str(entry["stops"]).split())
+                order = DeskOrder(task, stops, int(entry["robot"]), bool(entry["named"]), Stage[str(entry["stage"])])
+                # A call of an earlier life may still find a winner: it tells by its report.
+                order.stage = Stage.HEARD if order.stage is Stage.CALLED else order.stage
+                self.orders[task] = order
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        over = (Stage.DONE, Stage.REFUSED)
+        busy = any(order.stage not in over for order in self.orders.values())
+        return MachineState.WORKING if busy else MachineState.IDLE
+
+    @property
+    def itinerary_version(self) -> int:
+        """A desk goes nowhere."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Listen first: orders of an earlier life may be in hand."""
+        self._listen_until_us = now_us + LISTEN_US
+        for order in self.orders.values():
+            order.answer_at_us = now_us
+            order.due_us = now_us + LISTEN_US
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Orders at the counter; one that was heard before is only answered."""
+        if not isinstance(message, VisitKey):
+            return []
+        task = Reference(self.fleet.node_id, message.order)
+        order = self.orders.get(task)
+        if order is not None:
+            order.answer_at_us = now_us
+            return []
+        order = self.orders[task] = DeskOrder(task, stops_of(message), message.robot, message.robot != NOBODY)
+        order.answer_at_us = order.due_us = now_us
+        return [order.record()]
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Robots' reports."""
+        if not isinstance(message, TaskReport) or message.task not in self.orders:
+            return []
+        order = self.orders[message.task]
+        if order.stage in (Stage.DONE, Stage.REFUSED):
+            return []
+        match message.phase:
+            case TaskPhase.AWARDED if order.stage is Stage.HEARD:
+                order.robot = message.sender
+                return self._set(order, Stage.IN_HAND, now_us, ASK_US)
+            case TaskPhase.DONE:
+                order.robot = message.sender
+                return self._set(order, Stage.DONE, now_us, None)
+            case TaskPhase.REFUSED if order.named:
+                return self._set(order, Stage.REFUSED, now_us, None)
+        return []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """A call is over: somebody has the order, or nobody."""
+        order = self.orders.get(event.call.task) if isinstance(event, Closed) else None
+        if not isinstance(event, Closed) or order is None or order.stage is not Stage.CALLED:
+            return []
+        if event.winner:
+            order.robot = event.winner
+            return self._set(order, Stage.IN_HAND, now_us, ASK_US)
+        if event.result is CallResult.REFUSED:
+            return self._set(order, Stage.HEARD, now_us, LIST_AGAIN_US)
+        return self._set(order, Stage.HEARD, now_us, 0)
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """A desk keeps no rights."""
+        return Reason.NOT_AUTHORISED
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Give orders to robots, call, ask, and answer the counter."""
+        effects: list[Effect] = []
+        if self._listen_until_us is not None and self._listen_until_us <= now_us:
+            self._listen_until_us = None
+        for order in self.orders.values():
+            if self._listen_until_us is None and order.due_us is not None and order.due_us <= now_us:
+                effects += self._go_on(order, now_us)
+            if order.answer_at_us is not None and order.answer_at_us <= now_us:
+                over = order.stage in (Stage.DONE, Stage.REFUSED)
+                order.answer_at_us = None if over else now_us + ANSWER_US
+                result = _RESULTS[order.stage]
+                effects.append(Actuate(VisitAnswer(self.fleet.node_id, order.task.number, result, order.robot)))
+        return effects
+
+    def next_wake(self) -> int | None:
+        """When something is to be said or called."""
+        times = [self._listen_until_us]
+        for order in self.orders.values():
+            times.append(order.answer_at_us)
+            if self._listen_until_us is None:
+                times.append(order.due_us)
+        return min((time for time in times if time is not None), default=None)
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """No rights, no itinerary."""
+        return []
+
+    # --- steps -------------------------------------------------------------------------------------------------
+
+    def _go_on(self, order: DeskOrder, now_us: int) -> list[Effect]:
+        """What is due for an order: to be given, to be called for, or to be asked after."""
+        me = self.fleet.node_id
+        if order.stage is Stage.HEARD and order.named:
+            order.due_us = now_us + LIST_AGAIN_US
+            return [Send(VisitList(me, order.task.number, order.robot, *five(order.stops)))]
+        if order.stage is Stage.HEARD:
+            effects = self._set(order, Stage.CALLED, now_us, None)
+            return effects + self.fleet.negotiation.open(call_terms(order.task, *order.stops[:2]), now_us)
+        order.due_us = now_us + ASK_US
+        return [Send(SyncRequest(me, order.robot))]
+
+    def _set(self, order: DeskOrder, stage: Stage, now_us: int, due_in_us: int | None) -> list[Effect]:
+        order.stage = stage
+        order.answer_at_us = now_us
+        order.due_us = None if due_in_us is None else now_us + due_in_us
+        return [order.record()]

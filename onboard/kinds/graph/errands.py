@@ -1,0 +1,31 @@
+"""What a robot has to do: nodes to visit in turn, task by task; kept in the journal (rows G11, G13)."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from onboard.core.effects import Record
+from onboard.core.messages import Reference
+
+
+@dataclass(frozen=True, slots=True)
+class Errand:
+    """One task: ``stops`` are the nodes still to be visited; empty once it is done."""
+
+    task: Reference
+    stops: tuple[int, ...]
+
+
+def errand_record(errand: Errand) -> Record:
+    """How far a task is; the newest entry counts."""
+    entry: dict[str, str | int] = {"record": "errand", "origin": errand.task.origin, "number": errand.task.number}
+    return Record(entry | {"stops": " ".join(str(stop) for stop in errand.stops)})
+
+
+def errands(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, Errand]:
+    """All tasks of the journal by name, in the order in which they were taken on; others are passed over."""
+    found: dict[Reference, Errand] = {}
+    for entry in entries:
+        if entry.get("record") == "errand":
+            task = Reference(int(entry["origin"]), int(entry["number"]))
+            found[task] = Errand(task, tuple(int(stop) for stop in str(entry["stops"]).split()))
+    return found

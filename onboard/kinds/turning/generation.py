@@ -1,0 +1,134 @@
+"""A lathe's half of the negotiation: the five-term cost of a job, by its own tools and setup (rows P21, P24, P26, P27).
+
+It looks at no other machine: of the two kinds of task-generation functions in the paper this is the independent one.
+"""
+
+from dataclasses import dataclass, field, replace
+from itertools import chain
+
+from onboard.core.codes import ANY_STATION, Criterion, KindCode, Operation
+from onboard.core.messages import CallForProposals, Message, Reference
+from onboard.core.negotiation import CallKey, CallTerms, Proposal
+from onboard.core.site import Machine
+from onboard.kinds.turning.cost import Bill
+from onboard.kinds.turning.lathe import Job, Lathe, LatheState
+from onboard.kinds.turning.messages import BillBar, BillCutting, BillWaiting, TurningOrder
+from onboard.kinds.turning.process import Process, generate
+from onboard.kinds.turning.site import Turning
+
+#: Most orders of others remembered; the oldest go first. An order is called for right after it is told.
+MAX_KNOWN = 256
+#: Dearest term that a frame can say, cents: 20 bits.
+MAX_CENTS = (1 << 20) - 1
+
+
+@dataclass
+class LatheGeneration:
+    """Estimates for calls of operation MACHINE, in cents for one part.
+
+    ``state`` is kept by the machine from its sensors; ``in_hand`` are jobs won and not finished, ``promised`` those of
+    standing bids: a bid is for the state in which they will leave the lathe.
+    """
+
+    site: Turning
+    machine: Machine
+    state: LatheState = field(default_factory=LatheState)
+    in_hand: dict[Reference, Job] = field(default_factory=dict)
+    promised: dict[CallKey, Job] = field(default_factory=dict)
+    known: set[Reference] = field(default_factory=set)
+    _told: dict[Reference, Job] = field(default_factory=dict)
+
+    @property
+    def lathe(self) -> Lathe:
+        """This lathe."""
+        return self.site.lathes[self.machine.node_id]
+
+    def hear(self, message: Message) -> None:
+        """Take up what an order is."""
+        if isinstance(message, TurningOrder):
+            task = Reference(message.sender, message.task)
+            self._told.pop(task, None)
+            if len(self._told) >= MAX_KNOWN:
+                del self._told[next(iter(self._told))]
+            self._told[task] = job_of(message)
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """Nothing is known to be dearer than nothing: prices are each lathe's own."""
+        return 0
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """The cost itself: working it out looks at nobody else."""
+        process = self.process(call)
+        return None if process is None else process.bill.total_cents
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        """The bid, with its five terms said before it."""
+        process = self.process(call)
+        if process is None:
+            return None
+        job = self._told[call.task]
+        bill = bill_messages(self.machine.node_id, call.task, process.bill)
+        return Proposal(process.bill.total_cents, None, (job,), (), (), bill)
+
+    def process(self, call: CallForProposals) -> Process | None:
+        """How this lathe would make a part of a call's order; None where it cannot, or has it in hand."""
+        wanted = call.operation is Operation.MACHINE and call.criterion is Criterion.MONEY
+        job = self._told.get(call.task) if wanted and call.task not in self.known else None
+        if job is None:
+            return None
+        process = self.make(job, self.foreseen())
+        if process is None or max(*(round(100 * term) for term in process.bill), process.bill.total_cents) > MAX_CENTS:
+            return None
+        return process
+
+    def make(self, job: Job, state: LatheState) -> Process | None:
+        """The five stages for a job in a state of the lathe; None for a drawing or material that the site has not."""
+        drawing, material = self.site.drawings.get(job.drawing), self.site.materials.get(job.material)
+        if drawing is None or material is None:
+            return None
+        return generate(job, drawing, material, self.lathe, state)
+
+    def foreseen(self) -> LatheState:
+        """The lathe's state when all that it has won or offered is made."""
+        state = LatheState(dict(self.state.used_min), self.state.set_up_for)
+        for job in chain(self.in_hand.values(), self.promised.values()):
+            process = self.make(job, state)
+            if process is not None:
+                state = after(job, process, state)
+        return state
+
+
+def after(job: Job, process: Process, state: LatheState) -> LatheState:
+    """The state in which a job leaves the lathe: what its edges have still to live, and what it is set up for."""
+    left_min = {number: wear.left_min for number, wear in process.wear.items()}
+    used = {tool.number: tool.life_min - left_min[tool.number] for tool in process.tools}
+    return LatheState({**state.used_min, **used}, (job.drawing, process.clamping.chuck.name))
+
+
+def job_of(message: TurningOrder) -> Job:
+    """An order's job."""
+    return Job(message.drawing, message.material, message.bar_mm, message.batch, message.face_um / 1000)
+
+
+def order_message(task: Reference, job: Job) -> TurningOrder:
+    """Inverse of ``job_of``."""
+    face_um, bar_mm = round(job.face_mm * 1000), round(job.bar_mm)
+    return TurningOrder(task.origin, task.number, job.drawing, job.material, job.batch, bar_mm, face_um)
+
+
+def call_terms(task: Reference, job: Job) -> CallTerms:
+    """What a call for a job asks for; what the job is goes ahead in a frame of its own."""
+    terms = CallTerms(
+        task, Operation.MACHINE, KindCode.LATHE, Criterion.MONEY, ANY_STATION, ANY_STATION, Reference(*task), 0
+    )
+    return replace(terms, detail=(order_message(task, job),))
+
+
+def bill_messages(node: int, task: Reference, bill: Bill) -> tuple[Message, ...]:
+    """The five terms and their sum, in cents."""
+    machining, tools, setup, material, latency = (round(100 * term) for term in bill)
+    return (
+        BillCutting(node, *task, machining, tools),
+        BillWaiting(node, *task, setup, latency),
+        BillBar(node, *task, material, bill.total_cents),
+    )

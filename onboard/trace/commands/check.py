@@ -1,0 +1,92 @@
+"""``onboard trace check``: judge a log by every rule."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from onboard.core.site import Site
+from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.systems import rules_for
+from onboard.trace.commands.common import (
+    Commands,
+    TraceError,
+    add_command,
+    add_log,
+    add_site,
+    codecs_of,
+    open_log,
+    site_of,
+    write_text,
+)
+from onboard.trace.words import Words
+from onboard.wire.codec import Codec
+from onboard.wire.dbc_file import read_layouts
+
+HELP = """\
+exit status:
+  0  no rule was broken
+  1  a rule was broken; each finding is one line with its time, its machines and the frame that shows it
+  2  a mistake in the command line or in a file; one line says where and what to do
+
+examples:
+  onboard trace check trace.log --site bus_sim/sites/standard.toml
+  bus-sim run small --trace run.log --devices && onboard trace check run.log --site bus_sim/sites/small.toml
+  candump -L can0 | onboard trace check - --site mysite.toml
+"""
+
+
+def register(commands: Commands) -> None:
+    """Add the command."""
+    check = add_command(commands, "check", "judge a log by every rule that a fleet must keep", HELP, run)
+    add_log(check)
+    add_site(check)
+    check.add_argument("--dbc", type=Path, metavar="FILE", help="DBC of the fleet bus instead of the built-in contract")
+    check.add_argument(
+        "--faults", action="store_true", help="frames were lost on purpose: leave out rules that need every frame"
+    )
+    check.add_argument("--json", type=Path, metavar="FILE", help="write the verdict as JSON too")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Judge; 0 where no rule was broken."""
+    site = site_of(args)
+    contracts = codecs_of(site)
+    fleet = _read_codec(args.dbc) if args.dbc is not None else contracts.fleet
+    checks = Checks(site, disturbed=args.faults, fleet=fleet, device=contracts.device, rules=rules_for(site))
+    verdict = _check(args, checks)
+    if args.json is not None:
+        write_text(args.json, json.dumps(verdict.to_json(), indent=2) + "\n")
+    print("\n".join(_report(verdict, site)))
+    sys.stdout.flush()
+    return 0 if verdict.is_good else 1
+
+
+def _report(verdict: Verdict, site: Site | None) -> list[str]:
+    return verdict.lines(Words(site).machine)
+
+
+def _check(args: argparse.Namespace, checks: Checks) -> Verdict:
+    with open_log(args) as log:
+        for frame in log:
+            classic = frame.classic()
+            if classic is None:
+                checks.verdict.unknown["CAN FD frame"] += 1
+            else:
+                checks.feed(frame.time_us, frame.channel, classic)
+        verdict = checks.finish()
+    for fault, count in log.faults.counts.items():
+        verdict.unknown[fault.value] += count
+    if not verdict.messages:
+        raise TraceError(f"{args.log}: no message of this contract in it; is it the log of a fleet bus?")
+    return verdict
+
+
+def _read_codec(path: Path) -> Codec:
+    try:
+        return Codec(read_layouts(path.read_text(encoding="utf-8-sig")))
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read ({error.strerror}); name an existing DBC") from error
+    except Exception as error:  # the DBC reader has a dozen errors of its own for a bad text
+        why = " ".join(str(error).split())[:200]
+        raise TraceError(f"{path}: not a DBC of this contract ({why}); a site's DBC is for other tools") from error

@@ -1,0 +1,165 @@
+"""``onboard trace dump``: a log as candump prints a bus, or a readable line a message."""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TextIO
+
+from onboard.trace.commands.common import (
+    Commands,
+    TraceError,
+    add_command,
+    add_log,
+    add_site,
+    codecs_of,
+    open_log,
+    site_of,
+    tell_faults,
+)
+from onboard.trace.dump.decode import DbcLines, MessageLines
+from onboard.trace.dump.filters import FilterSet, parse_filters
+from onboard.trace.dump.formats import Look, Screen, Stamp, log_line, time_of_name
+from onboard.trace.raw import RawFrame
+from onboard.trace.readers.open_log import Log
+from onboard.wire.dbc_file import AnyDbc, AnyDbcError
+
+HELP = """\
+filters, as candump has them; hexadecimal, an identifier of 8 digits is a 29-bit one:
+  ID:MASK        frames with IDENTIFIER & MASK == ID & MASK
+  ID~MASK        frames with IDENTIFIER & MASK != ID & MASK
+  #ERRORMASK     error frames of these classes (linux/can/error.h); without one only -e shows error frames
+  j              join: all filters must match
+  fleet,ID:MASK  on this bus only; several arguments for several buses
+
+A log that does not mark which frames its own host sent is shown as canplayer would play it: as sent (TX).
+
+examples:
+  onboard trace dump run.log
+  onboard trace dump run.log -tz fleet 0C000000:1C000000
+  candump -L can0 | onboard trace dump - --decode --site mysite.toml
+  onboard trace dump car.log --decode --dbc car.dbc
+"""
+
+
+def register(commands: Commands) -> None:
+    """Add the command."""
+    dump = add_command(commands, "dump", "print a log as candump prints a bus, or in words", HELP, run)
+    add_log(dump)
+    dump.add_argument("filters", nargs="*", metavar="[BUS,]FILTER", help="what to show; default: all data frames")
+    dump.add_argument("-t", dest="stamp", choices="adzA", default="", help="time: absolute, delta, zero, Absolute date")
+    dump.add_argument("-c", dest="colour", action="count", default=0, help="colour (twice: the whole line)")
+    dump.add_argument("-i", dest="binary", action="store_true", help="data in binary")
+    dump.add_argument("-a", dest="ascii", action="store_true", help="data as ASCII too")
+    dump.add_argument("-S", dest="swap", action="store_true", help="data in reverse order, marked with `")
+    dump.add_argument("-l", dest="file", action="store_true", help="write a log named candump-DATE_TIME.log instead")
+    dump.add_argument("-L", dest="log_format", action="store_true", help="the format of log files")
+    dump.add_argument("-n", dest="count", type=int, metavar="COUNT", help="stop after so many frames")
+    dump.add_argument("-e", dest="errors", action="store_true", help="error frames too, in words")
+    dump.add_argument("-x", dest="extra", action="store_true", help="direction, BRS and ESI")
+    dump.add_argument("--decode", action="store_true", help="one readable line a message")
+    add_site(dump)
+    dump.add_argument("--dbc", type=Path, metavar="FILE", help="with --decode: any DBC instead of the fleet's contract")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print, and tell what could not be printed."""
+    sets = parse_filters(args.filters, errors=args.errors)
+    with open_log(args) as log:
+        chosen = _Chosen(log, sets, args.count)
+        if args.decode:
+            _decode(args, chosen)
+        elif args.file:
+            _write_file(chosen)
+        else:
+            screen = Screen(_look(args), tuple(one.channel for one in sets if one.channel != "any"))
+            _print_all(screen.text(frame) for frame in chosen)
+            tell_faults(log)
+    if chosen.errors_hidden:
+        print(f"{log.name}: error frames not shown: {chosen.errors_hidden}; -e shows them", file=sys.stderr)
+    return 0
+
+
+class _Chosen:
+    """The frames that pass; error frames that nobody asked about are counted."""
+
+    def __init__(self, log: Log, sets: list[FilterSet], count: int | None) -> None:
+        self.log = log
+        self.errors_hidden = 0
+        self._sets = sets
+        self._left = count
+
+    def __iter__(self) -> Iterator[RawFrame]:
+        for frame in self.log:
+            if not any(one.passes(frame) for one in self._sets):
+                self.errors_hidden += frame.is_error and not any(one.error_mask for one in self._sets)
+                continue
+            yield frame
+            if self._left is not None:
+                self._left -= 1
+                if self._left <= 0:
+                    return
+
+
+def _look(args: argparse.Namespace) -> Look:
+    return Look(
+        Stamp(args.stamp),
+        args.log_format,
+        args.colour,
+        args.extra,
+        args.ascii,
+        args.swap,
+        args.binary,
+        args.errors,
+    )
+
+
+def _decode(args: argparse.Namespace, chosen: _Chosen) -> None:
+    screen = Screen(Look(Stamp(args.stamp or "a"), colour=args.colour, errors=True))
+    lines: DbcLines | MessageLines
+    if args.dbc is not None:
+        lines = DbcLines(_read_dbc(args.dbc), screen)
+    else:
+        site = site_of(args)
+        lines = MessageLines(site, codecs_of(site), screen)
+    _print_all(line for frame in chosen for line in lines.of(frame))
+    tell_faults(chosen.log)
+    for line in lines.report():
+        print(f"{chosen.log.name}: {line}", file=sys.stderr)
+
+
+def _read_dbc(path: Path) -> AnyDbc:
+    try:
+        dbc = AnyDbc(path.read_bytes().decode("utf-8-sig", "replace"))
+    except OSError as error:
+        raise TraceError(f"{path}: cannot be read ({error.strerror}); name an existing DBC") from error
+    except AnyDbcError as error:
+        raise TraceError(f"{path}: not a DBC ({error})") from error
+    if dbc.warning:
+        print(f"{path}: {dbc.warning}", file=sys.stderr)
+    return dbc
+
+
+def _write_file(chosen: _Chosen) -> None:
+    file: TextIO | None = None
+    try:
+        for frame in chosen:
+            if file is None:
+                path = Path(time_of_name(frame.time_us))
+                file = path.open("w", encoding="utf-8", newline="\n")
+                print(f"{path}: written", file=sys.stderr)
+            file.write(f"{log_line(frame)}\n")
+    except OSError as error:
+        raise TraceError(f"candump log in this directory: cannot be written ({error.strerror})") from error
+    finally:
+        if file is not None:
+            file.close()
+    tell_faults(chosen.log)
+
+
+def _print_all(lines: Iterator[str]) -> None:
+    """To standard output; at once where a person or a pipe waits for each line of a live bus."""
+    out = sys.stdout
+    for line in lines:
+        out.write(f"{line}\n")
+    out.flush()

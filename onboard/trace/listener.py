@@ -1,0 +1,85 @@
+"""All messages of a log, whichever bus they were on: every channel is a listener of its own with both contracts."""
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from onboard.core.codes import Reason
+from onboard.core.messages import Message
+from onboard.trace.raw import RawFrame
+from onboard.wire.codec import Codecs
+from onboard.wire.decoder import Decoder
+
+#: Channels of a log that are told apart; a name more is taken for one of them.
+MOST_CHANNELS = 300
+
+
+class Heard(NamedTuple):
+    """One frame and what it came to: the message that it completes, or why it came to none; neither for a part."""
+
+    frame: RawFrame
+    message: Message | None
+    reason: Reason | None
+    is_fleet: bool
+
+
+class Said(NamedTuple):
+    """One whole message: time in us of the log, channel, and whether it was of the fleet bus's contract."""
+
+    time_us: int
+    channel: str
+    message: Message
+    is_fleet: bool
+
+
+class Listener:
+    """Decodes frame after frame. ``unknown`` counts data frames of no contract, by channel and identifier."""
+
+    def __init__(self, codecs: Codecs) -> None:
+        self.codecs = codecs
+        self.drops: Counter[Reason] = Counter()
+        self.others: Counter[str] = Counter()
+        self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
+
+    def hear(self, frame: RawFrame) -> Heard:
+        """Take up one frame. Never raises, whatever the frame."""
+        classic = frame.classic()
+        if classic is None or classic.is_error or classic.is_remote:
+            kind = "CAN FD frames" if classic is None else "error frames" if classic.is_error else "remote frames"
+            self.others[kind] += 1
+            return Heard(frame, None, None, False)
+        fleet, device = self._decoders_of(frame.channel)
+        is_fleet = self.codecs.fleet.name_of(classic) is not None
+        decoder = fleet if is_fleet else device
+        message = decoder.feed(classic, frame.time_us)
+        reason = None
+        if decoder.drops:
+            reason = next(iter(decoder.drops))
+            self.drops.update(decoder.drops)
+            decoder.drops.clear()
+        return Heard(frame, message, reason, is_fleet)
+
+    def messages(self, frames: Iterable[RawFrame]) -> Iterator[Said]:
+        """Whole messages only, in the order of the log."""
+        for frame in frames:
+            heard = self.hear(frame)
+            if heard.message is not None:
+                yield Said(frame.time_us, frame.channel, heard.message, heard.is_fleet)
+
+    def lines(self) -> list[str]:
+        """What came to nothing, one line for each reason."""
+        words = [f"{kind}: {count}" for kind, count in sorted(self.others.items())]
+        words += [
+            f"frames that are no message ({reason.name.lower().replace('_', ' ')}): {count}"
+            for reason, count in sorted(self.drops.items())
+        ]
+        unfinished = sum(decoder.unfinished for pair in self._decoders.values() for decoder in pair)
+        return words + ([f"sets that were not whole at the end: {unfinished}"] if unfinished else [])
+
+    def _decoders_of(self, channel: str) -> tuple[Decoder, Decoder]:
+        found = self._decoders.get(channel)
+        if found is None:
+            if len(self._decoders) >= MOST_CHANNELS:
+                return next(iter(self._decoders.values()))
+            found = self._decoders[channel] = (Decoder(self.codecs.fleet), Decoder(self.codecs.device))
+        return found

@@ -1,0 +1,70 @@
+"""The graph under faults drawn by seed: every order is done all the same, and no checker finds anything."""
+
+import pytest
+
+from bus_sim.campaign.profiles import draw_faults
+from bus_sim.faults.injection import Injection
+from bus_sim.systems.graph.plant import make_plant
+from bus_sim.systems.registry import SystemOptions
+from bus_sim.systems.session import play
+from onboard.core.messages import Message
+from onboard.kinds.graph.messages import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, RobotMode, TurnSignal
+from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.graph import RULES
+from tests.graph.sites import busy_orders, hall, made
+
+SITE = made(hall(), (0, 4, 8), busy_orders(hall(), 5, 7))
+#: Faults are drawn for a day; here they strike while the orders are carried out.
+BEGIN_S, SHARE = 12.0, 0.1
+
+
+def _faults(seed: int) -> tuple[Injection, ...]:
+    found = []
+    for fault in draw_faults(("bus", "crash")[seed % 2], seed, SITE):
+        given = dict(fault.given)
+        at_s = given["at_s"]
+        assert not isinstance(at_s, str)
+        given["at_s"] = round(BEGIN_S + (at_s - 20) * SHARE, 6)
+        found.append(Injection(fault.kind, given))
+    return tuple(found)
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_the_graph_under_faults(seed: int) -> None:
+    faults = _faults(seed)
+    played = play(SITE, SystemOptions(seed=seed, limit_s=900, faults=faults), make_plant)
+    assert played.plant.violations == [], [str(fault) for fault in faults]
+    assert played.halted == []
+    assert played.is_over, [str(fault) for fault in faults]
+    verdict = _verdict(played.messages, disturbed=True)
+    assert verdict.is_good, verdict.lines()
+
+
+def _verdict(messages: list[tuple[int, Message]], *, disturbed: bool = False) -> Verdict:
+    checks = Checks(SITE, disturbed=disturbed, rules=RULES)
+    for time_us, message in messages:
+        checks.feed_message(time_us, message)
+    return checks.finish()
+
+
+def _at(robot: int, behind: int, node: int) -> RobotAt:
+    return RobotAt(robot, behind, node, True, RobotMode.DRIVING, 255, 255, 255, node)
+
+
+@pytest.mark.parametrize(
+    ("rule", "said"),
+    [
+        ("one-an-edge", [_at(21, 0, 1), _at(22, 1, 0)]),
+        ("one-an-edge", [_at(21, 0, 8)]),
+        ("no-turning-back", [_at(21, 0, 1), _at(21, 1, 0)]),
+        ("agents-of-nodes", [EdgeNotice(2, 0, 1, EdgeState.FREE, 0)]),
+        ("grants-are-told", [NodeAnswer(1, 21, 0, NodeVerdict.STOP, 1, 0)]),
+        (
+            "grants-are-told",
+            [TurnSignal(21, 0, 255, 1), NodeAnswer(1, 21, 0, NodeVerdict.GO, 1, 1), *(_at(22, 4, 5),) * 4],
+        ),
+    ],
+)
+def test_each_checker_finds_what_it_is_for(rule: str, said: list[Message]) -> None:
+    verdict = _verdict([(1_000_000 * number, one) for number, one in enumerate(said, 1)])
+    assert verdict.counts[rule] == 1, verdict.lines()

@@ -1,0 +1,88 @@
+"""A whole day without frames: nobody meets, every task is done by somebody, and sooner than by Token Passing."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+import bus_sim
+from bus_sim.importers.command import import_files
+from bus_sim.importers.draft import site_text
+from bus_sim.importers.mapf import Wanted
+from bus_sim.systems.mapd.published import TOKEN_PASSING
+from bus_sim.systems.mapd.steps import Day
+from onboard.config.site import parse_site
+from onboard.kinds.mapd.auction import Offer, Rule, Task, cost, winners
+from onboard.kinds.mapd.floor import grid_floor
+from onboard.kinds.mapd.site import Mapd
+
+DATA = Path(bus_sim.__file__).parent / "data" / "mapd"
+
+
+def kiva(robots: int, rate: str) -> Mapd:
+    draft = import_files([DATA / f"kiva-{robots}-500-5.map", DATA / f"kiva-{rate}.task"], Wanted())
+    site = parse_site(site_text(draft), "kiva.toml")
+    assert isinstance(site, Mapd)
+    return site
+
+
+def played(site: Mapd, tasks: Sequence[Task] | None = None) -> Day:
+    return Day(site.floor, list(site.homes.values()), site.rests, site.tasks if tasks is None else tasks).run()
+
+
+def judge(site: Mapd, day: Day, tasks: Sequence[Task]) -> None:
+    """From where the robots stood alone."""
+    width = len(site.rows[0])
+    for step, (before, now) in enumerate(pairwise(day.history), start=1):
+        assert len(set(now)) == len(now), f"two in one cell at step {step}"
+        moves = {(was, cell) for was, cell in zip(before, now, strict=True) if was != cell}
+        assert not {(cell, was) for was, cell in moves} & moves, f"a swap at step {step}"
+        for was, cell in moves:
+            assert abs(cell - was) == width or (abs(cell - was) == 1 and cell // width == was // width)
+            assert site.rows[cell // width][cell % width] != "@"
+    for task in tasks:
+        served = day.served[task.number]
+        robot = day.history[served].index(task.delivery)
+        assert any(day.history[step][robot] == task.pickup for step in range(task.release, served + 1)), task
+
+
+@pytest.mark.parametrize(("robots", "rate"), [(10, "0.5"), (30, "10")])
+def test_p59_a_whole_file_is_served_sooner_than_by_token_passing(robots: int, rate: str) -> None:
+    site = kiva(robots, rate)
+    day = played(site)
+    assert len(day.served) == 500
+    assert day.service_time <= TOKEN_PASSING[rate, robots]
+    judge(site, day, site.tasks)
+
+
+def test_thirty_robots_serve_a_trickle_of_tasks() -> None:
+    site = kiva(30, "2")
+    tasks = site.tasks[:60]
+    day = played(site, tasks)
+    judge(site, day, tasks)
+
+
+def test_the_lowest_bid_of_all_wins_first_and_its_robot_falls_silent() -> None:
+    floor = grid_floor(["........"])
+    tasks = [Task(1, 0, 3, 4), Task(2, 0, 6, 7)]
+    won = winners(floor, Rule(), [Offer(11, 0, 0), Offer(12, 4, 0)], tasks)
+    assert {robot: task.number for robot, (task, _) in won.items()} == {12: 1, 11: 2}
+
+
+def test_short_work_comes_before_long_work_equally_far() -> None:
+    floor = grid_floor(["........."])
+    near, far = Task(1, 0, 3, 8), Task(2, 0, 5, 4)
+    offer = Offer(11, 4, 0)
+    assert cost(floor, Rule(), offer, far) == 150
+    assert cost(floor, Rule(), offer, near) == 350
+
+
+def test_who_still_carries_bids_from_where_and_when_it_will_be_free() -> None:
+    floor = grid_floor(["........."])
+    assert cost(floor, Rule(), Offer(11, 4, 6), Task(1, 0, 5, 4)) == 750
+
+
+def test_a_task_that_nobody_can_reach_gets_no_bid() -> None:
+    floor = grid_floor(["..@.."])
+    assert cost(floor, Rule(), Offer(11, 0, 0), Task(1, 0, 3, 4)) is None

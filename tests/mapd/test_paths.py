@@ -1,0 +1,146 @@
+"""Never two in one cell or one zone, no swaps; following allowed; the earliest way, against a search of its own."""
+
+import random
+
+import pytest
+
+from onboard.kinds.mapd.floor import Floor, Line, flood, grid_floor, lasting_rests, network_floor
+from onboard.kinds.mapd.paths import Path, Paths
+from onboard.kinds.mapd.search import find_path
+
+ROW = grid_floor(["....."])
+
+
+def paths_of(floor: Floor, *paths: Path) -> Paths:
+    found = Paths(floor.resources)
+    for robot, path in enumerate(paths):
+        found.put(robot, path)
+    return found
+
+
+def test_two_robots_cannot_be_in_one_cell() -> None:
+    others = paths_of(ROW, Path(0, (2, 1)))
+    assert not others.may_move(0, 1, 0)
+    with pytest.raises(ValueError, match="robot 1 meets robot 0 in cell 1 at step 1"):
+        others.put(1, Path(0, (0, 1)))
+
+
+def test_two_robots_cannot_change_places() -> None:
+    others = paths_of(ROW, Path(0, (2, 1, 0)))
+    assert not others.may_move(1, 2, 0)
+
+
+def test_one_may_follow_into_the_cell_that_another_leaves() -> None:
+    others = paths_of(ROW, Path(0, (2, 3)))
+    assert others.may_move(1, 2, 0)
+    others.put(1, Path(0, (1, 2)))
+
+
+def test_nobody_passes_one_who_stays_nor_stays_where_another_will_pass() -> None:
+    others = paths_of(ROW, Path(0, (4, 3)))
+    assert not others.may_move(2, 3, 7)
+    assert not paths_of(ROW, Path(0, (0, 1, 2))).may_rest(1, 0)
+    assert paths_of(ROW, Path(0, (0, 1, 2))).may_rest(1, 2)
+
+
+def test_a_path_taken_out_leaves_nothing_behind() -> None:
+    others = paths_of(ROW, Path(0, (0, 1, 2)))
+    others.take(0)
+    assert others.may_rest(2, 0)
+    assert others.holder(1, 1) is None
+
+
+def test_a_zone_takes_one_robot_at_a_time() -> None:
+    floor = network_floor(["A", "B", "C"], [Line("A", "B", 3), Line("B", "C", 1)], [["A>B", "B"]])
+    first = [floor.names.index(name) for name in ("A", "A>B/1", "A>B/2", "B", "C")]
+    others = paths_of(floor, Path(0, tuple(first)))
+    assert not others.may_move(first[4], first[3], 1)
+    assert others.may_move(first[4], first[3], 4)
+
+
+def test_a_one_way_line_is_not_passed_backwards() -> None:
+    floor = network_floor(["A", "B"], [Line("A", "B", 2, one_way=True)], [])
+    assert find_path(floor, Paths(floor.resources), 1, 0, (0,), frozenset([0])) is None
+    way = find_path(floor, Paths(floor.resources), 0, 0, (1,), frozenset([1]))
+    assert way is not None
+    assert way.cells == (0, 2, 1)
+
+
+def test_homes_that_would_shut_others_in_are_not_lasting() -> None:
+    assert lasting_rests(ROW, [2], [0, 4]) == frozenset()
+    assert lasting_rests(ROW, [0, 4], [1, 3]) == {0, 4}
+    bay = grid_floor(["...", "@.@"])
+    assert lasting_rests(bay, [4, 1], [0, 2]) == {4}
+
+
+def earliest(floor: Floor, others: Paths, cell: int, goals: tuple[int, ...], rest: int) -> int | None:
+    """The earliest arrival at the last goal, by breadth first over all (cell, goals passed) that still come to rest."""
+    limit = others.horizon + 3 * floor.size
+    layers: list[set[tuple[int, int]]] = [{(cell, int(cell == goals[0]))}]
+    for step in range(limit):
+        found = set()
+        for at, leg in layers[-1]:
+            for to in (*floor.ways[at], at):
+                taken = others.holder(to, step + 1)
+                swap = others.holder(to, step)
+                swaps = swap is not None and to != at and others.holder(at, step + 1) == swap
+                if taken is None and not swaps:
+                    found.add((to, leg + 1 if leg < len(goals) and goals[leg] == to else leg))
+        layers.append(found)
+    # Backwards: from which states can one still come to rest?
+    good = {state for state in layers[limit] if state == (rest, len(goals))}
+    best = None
+    for step in range(limit, -1, -1):
+        if any(state[1] == len(goals) for state in good):
+            best = step
+        if step == 0:
+            break
+        before = set()
+        for at, leg in layers[step - 1]:
+            for to in (*floor.ways[at], at):
+                after = (to, leg + 1 if leg < len(goals) and goals[leg] == to else leg)
+                taken, swap = others.holder(to, step), others.holder(to, step - 1)
+                swaps = swap is not None and to != at and others.holder(at, step) == swap
+                if after in good and taken is None and not swaps:
+                    before.add((at, leg))
+        good = before
+    return best
+
+
+def test_p59_the_search_is_as_early_as_an_exhaustive_one() -> None:
+    rng = random.Random(5)
+    compared = 0
+    for _ in range(60):
+        rows = ["".join("." if rng.random() < 0.8 else "@" for _ in range(4)) for _ in range(4)]
+        floor = grid_floor(rows)
+        free = [cell for cell in range(16) if rows[cell // 4][cell % 4] == "."]
+        if len(free) < 6:
+            continue
+        others = Paths(floor.resources)
+        for robot in range(2):
+            walk = [rng.choice(free)]
+            for _ in range(6):
+                walk.append(rng.choice([*floor.ways[walk[-1]], walk[-1]]))
+            try:
+                others.put(robot, Path(0, tuple(walk)))
+            except ValueError:
+                continue
+        start, first, second, rest = rng.sample(free, 4)
+        if others.holder(start, 0) is not None:
+            continue
+        path = find_path(floor, others, start, 0, (first, second), frozenset([rest]))
+        wanted = earliest(floor, others, start, (first, second), rest)
+        if path is None:
+            assert wanted is None or others.holder(rest, wanted + 50) is not None
+            continue
+        picked = next(step for step, cell in path.steps() if cell == first)
+        assert next(step for step, cell in path.steps() if cell == second and step >= picked) == wanted
+        others.put(9, path)
+        compared += 1
+    assert compared >= 15
+
+
+def test_steps_are_those_of_the_free_floor() -> None:
+    floor = grid_floor(["..@", "@..", "..."])
+    assert floor.steps_to(0)[8] == 4
+    assert flood(floor.ways, [0])[2] > 1000

@@ -1,0 +1,207 @@
+"""Making plans (rows M21, M23 to M27) and telling them, on the shipped network and on that of Fig. 3."""
+
+from dataclasses import replace
+from itertools import permutations, product
+
+from bus_sim.sites import find_site
+from bus_sim.systems.terminal.table import plan_table
+from onboard.core.codes import Criterion, KindCode, Operation
+from onboard.core.messages import CallForProposals, Reference
+from onboard.core.mirror import Mirror
+from onboard.kinds.terminal.generation import VehicleGeneration
+from onboard.kinds.terminal.messages import Action, MissionKey, Verb
+from onboard.kinds.terminal.mirror import TerminalMirror
+from onboard.kinds.terminal.missions import Orders
+from onboard.kinds.terminal.plan import Plan, PlanReader, Step, to_frames
+from onboard.kinds.terminal.search import Job, Search
+from onboard.kinds.terminal.site import StationKind
+from onboard.kinds.terminal.traffic import Traffic
+from onboard.kinds.terminal.vehicle import terminal
+from tests.terminal.fig3 import A1, PRINTED, S1, S2, fig3, plan_of
+
+SITE = terminal(find_site("terminal"))
+BY_NAME = {name: entity.number for name, entity in SITE.by_name.items()}
+SECOND = 1_000_000
+TABLE = """\
+Loading Task   GOTO Area 1         Lane 3      [10 40]
+               GOTO Lane 3         Crossing 1  [40 50]
+               GOTO Crossing 1     Lane 2      [50 55]
+               GOTO Lane 2         Area 4      [55 67]
+               GOTO Area 4         Station 2   [67 77]
+               DOCK Station 2                  [77 79]
+               PICK UP Box B3                  [79 81]
+               UNDOCK Station 2                [81 83]
+Unloading Task GOTO Area 4         Lane 11     [83 93]
+               GOTO Lane 11        Crossing 1  [93 113]
+               GOTO Crossing 1     Area 2      [113 119]
+               GOTO Area 2         Station 1   [119 125]
+               DOCK Station 1                  [125 127]
+               PUTDOWN Box B3                  [127 129]
+               UNDOCK Station 1                [129 131]"""
+
+
+def mirror(node: int = 11) -> TerminalMirror:
+    return TerminalMirror(SITE, node, Mirror(SITE, node))
+
+
+def box(name: str) -> int:
+    return next(number for number, one in enumerate(SITE.boxes, 1) if one.name == name)
+
+
+def plan(picture: TerminalMirror, owner: int, name: str, target: str, *, now: int = 0) -> Plan:
+    """The best plan of a vehicle that stands idle, taken up by the picture."""
+    job = Job(box(name), Reference(1, box(name)), picture.station_of(box(name)), BY_NAME[target])
+    search = Search(SITE, picture.traffic, owner, now, picture.long_blocked(now))
+    found = search.best(picture.where[owner], now, job, version=1)
+    assert found is not None
+    picture.take_up(found.plan, now)
+    return found.plan
+
+
+def call(name: str, target: str) -> CallForProposals:
+    source = SITE.boxes[box(name) - 1].station
+    return CallForProposals(
+        1, 1, Reference(1, 1), Operation.TRANSPORT, KindCode.VEHICLE, Criterion.FINISH_TIME, 1, 0, 1000,
+        source, BY_NAME[target], SITE.box(box(name)), 0,
+    )  # fmt: skip
+
+
+def entities(found: Plan) -> list[str]:
+    return [SITE.entities[step.entity].name for step in found.steps]
+
+
+def test_m10_the_plan_table_prints_as_in_the_paper() -> None:
+    site = fig3()
+    traffic = Traffic(site)
+    traffic.take_up(plan_of(site, 11), 10)
+    assert "\n".join(line.rstrip() for line in plan_table(site, traffic, 11, 10, tick=1)) == TABLE
+
+
+def test_m09_the_search_makes_the_printed_plan() -> None:
+    site = fig3()
+    search = Search(site, Traffic(site), 11, 10)
+    found = search.best(A1, 10, Job(3, Reference(1, 1), S2, S1), version=1)
+    assert found is not None and not found.pushes
+    steps = [(step.action, step.entity, step.end) for step in found.plan.steps]
+    assert steps == [(action, entity, end) for action, entity, _, end in PRINTED]
+
+
+def test_m21_m25_of_several_routes_the_one_that_ends_first_is_taken() -> None:
+    """Alone by L11; with L11 blocked for long, or taken by others, by L8."""
+    picture = mirror()
+    alone = plan(picture, 14, "B4", "S1")
+    assert "L11" in entities(alone) and "L8" not in entities(alone)
+    blocked = mirror()
+    blocked.traffic.blocked[BY_NAME["L11"]] = -SITE.patience_us
+    round_about = plan(blocked, 14, "B4", "S1")
+    assert "L8" in entities(round_about) and "L11" not in entities(round_about)
+    assert alone.end < round_about.end
+    crowded = mirror()
+    stay = Step(Action.GOTO, BY_NAME["C1"], 300 * SECOND, 301 * SECOND)
+    crowded.take_up(Plan(11, 1, 0, (Step(Action.GOTO, BY_NAME["A2"], SECOND, SECOND), stay), ()), 0)
+    assert "L8" in entities(plan(crowded, 14, "B4", "S1"))
+
+
+def test_m21_a_plan_in_the_gaps_delays_nobody() -> None:
+    picture = mirror()
+    ends = {}
+    for owner, name, target in ((14, "B4", "S10"), (13, "B7", "S10"), (11, "B14", "S1"), (12, "B3", "S4")):
+        found = plan(picture, owner, name, target)
+        ends[owner] = found.end
+        assert {one: picture.traffic.end_of(one, 0) for one in ends} == ends
+
+
+def test_m23_only_a_box_with_nothing_above_it_is_called_for() -> None:
+    picture, orders = mirror(1), Orders(SITE, 1)
+    wanted = [box("B3"), box("B4")]
+    for one in wanted:
+        assert orders.key(MissionKey(1, 1, Verb.TRANSHIP, one, 0, 0, BY_NAME["S1"], 0, urgent=False)) is None
+    assert orders.key(MissionKey(1, 1, Verb.END, 0, 0, 0, BY_NAME["S1"], 0, urgent=False)) is not None
+    first = orders.next(picture, set())
+    assert first is not None and first.box == box("B4"), "B4 stands on B3"
+    assert orders.next(picture, {first.box}) is None
+    plan(picture, 14, "B4", "S1")
+    second = orders.next(picture, {first.box})
+    assert second is not None and second.box == box("B3"), "B4 is in a plan"
+
+
+def test_m02_in_a_stacker_every_box_can_be_had() -> None:
+    picture = mirror()
+    assert picture.above(box("B1")) == [box("B2"), box("B3"), box("B4")]
+    assert picture.above(box("B11")) == []
+    assert [SITE.by_name[name].station for name in ("S2", "S5")] == [StationKind.STACK, StationKind.STACKER]
+
+
+def test_m24_only_robots_that_are_free_before_the_horizon_bid() -> None:
+    picture = mirror(14)
+    generation = VehicleGeneration(SITE, SITE.machines[14], picture)
+    asked = call("B14", "S1")
+    assert generation.lower_bound(asked, 0) is not None and generation.estimate(asked, 0) is not None
+    found = plan(picture, 14, "B4", "S10")
+    assert generation.lower_bound(asked, 0) is None, "its plan ends after T + delta T"
+    for number in range(8):
+        picture.traffic.report(14, 1, number, found.steps[number].end)
+    assert generation.lower_bound(asked, found.end - SITE.horizon_us) is not None
+
+
+def test_m24_the_bid_is_the_end_of_a_plan_behind_the_one_in_hand() -> None:
+    picture = mirror(14)
+    generation = VehicleGeneration(SITE, SITE.machines[14], picture)
+    before = plan(picture, 14, "B4", "S1")
+    now = before.end - 20 * SECOND
+    for number in range(len(before.steps) - 3):
+        picture.traffic.report(14, 1, number, before.steps[number].end)
+    bid = generation.estimate(call("B14", "S1"), now)
+    assert bid is not None and bid.cost * 1000 > before.end
+
+
+def test_m26_one_box_after_the_other_is_near_the_best_order_of_all() -> None:
+    """Not optimal on purpose: two robots, four boxes, each to the robot that is done first.
+
+    The best of all orders and assignments, planned by the same search, is an eighth shorter.
+    """
+    boxes, owners = [("B4", "S1"), ("B7", "S4"), ("B14", "S1"), ("B13", "S10")], (13, 14)
+
+    def last_end(order: tuple[int, ...], who: tuple[int, ...] | None) -> int:
+        picture = mirror()
+        for position, number in enumerate(order):
+            name, target = boxes[number]
+            job = Job(box(name), Reference(1, number + 1), picture.station_of(box(name)), BY_NAME[target])
+            found = []
+            for owner in owners if who is None else (who[position],):
+                vehicle = VehicleGeneration(SITE, SITE.machines[owner], replace_node(picture, owner))
+                one = vehicle.plan(job, 0, version=position + 1)
+                if one is not None:
+                    found.append(one.plan)
+            best = min(found, key=lambda one: one.end, default=None)
+            if best is None:
+                return 1 << 60
+            picture.take_up(best, 0)
+        return max(picture.traffic.end_of(owner, 0) for owner in owners)
+
+    greedy = last_end((0, 1, 2, 3), None)
+    best = min(last_end(order, who) for order in permutations(range(4)) for who in product(owners, repeat=4))
+    assert (greedy, best) == (207 * SECOND, 184 * SECOND)
+
+
+def replace_node(picture: TerminalMirror, node: int) -> TerminalMirror:
+    """The same picture in another machine's hands."""
+    other = mirror(node)
+    other.traffic, other.where, other.standing = picture.traffic, picture.where, picture.standing
+    return other
+
+
+def test_a_plan_is_read_as_it_was_told_and_inert_while_a_frame_is_missing() -> None:
+    picture = mirror()
+    told = plan(picture, 14, "B4", "S1", now=5 * SECOND)
+    frames = to_frames(told)
+    for missing in range(1, len(frames)):
+        reader = PlanReader(SITE)
+        assert not [one for n, one in enumerate(frames) if n != missing and reader.feed(one, 0) is not None]  # type: ignore[arg-type]  # frames of a plan
+    reader = PlanReader(SITE)
+    read = [reader.feed(one, 0) for one in frames][-1]  # type: ignore[arg-type]  # frames of a plan
+    assert read is not None
+    assert read == replace(told, steps=read.steps)
+    assert [(one.action, one.entity, one.end, one.after) for one in read.steps] == [
+        (one.action, one.entity, one.end, one.after) for one in told.steps
+    ]

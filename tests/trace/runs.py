@@ -1,0 +1,35 @@
+"""Logs of short runs, made once for all tests that look at them."""
+
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+from bus_sim.cli import main
+from bus_sim.sites import find_site
+from onboard.core.messages import Message
+from onboard.trace.listener import Listener, Said
+from onboard.trace.readers.open_log import Log
+from onboard.wire.codec import codecs
+
+SITE_FILE = Path(__file__).parents[2] / "bus_sim" / "sites" / "small.toml"
+SITE = find_site("small")
+
+
+@cache
+def run_log(*words: str, stay_s: int = 60) -> Path:
+    """The log, device buses included, of one car that comes to the small site and is fetched, if faults let it."""
+    path = Path(mkdtemp(prefix="trace-")) / "run.log"
+    command = ["run", "small", "--one-car", str(stay_s), "--speed", "max", "--trace", str(path), "--devices", *words]
+    assert main(command) in (0, 1)
+    return path
+
+
+def fleet_of(path: Path) -> list[Said]:
+    """All messages of the fleet bus."""
+    with Log(str(path)) as log:
+        return [said for said in Listener(codecs("", ())).messages(log) if said.is_fleet]
+
+
+def first(said: list[Said], kind: type[Message]) -> Said:
+    """The first message of a kind."""
+    return next(one for one in said if isinstance(one.message, kind))

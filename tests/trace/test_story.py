@@ -1,0 +1,104 @@
+"""Calls and customers' stories told from a log: what a run did is what they say, and planted causes are named."""
+
+import pytest
+
+from onboard.core.codes import TaskPhase
+from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.trace.cli import main
+from onboard.trace.story.why import TaskStory, Why
+from tests.trace.runs import SITE, SITE_FILE, first, fleet_of, run_log
+
+PARK, FETCH = Reference(1, 1), Reference(1, 2)
+
+
+def _story(*words: str, task: Reference = PARK) -> TaskStory:
+    why = Why(SITE)
+    for said in fleet_of(run_log(*words)):
+        why.feed(said.message, said.time_us)
+    why.finish()
+    return why.tasks[task]
+
+
+def _spent_s(story: TaskStory, node: int, word: str) -> float:
+    """Seconds of the story that are put down to a machine for a cause with this word."""
+    return sum(one.length_us for one in story.parts if one.cause.whom == node and word in one.cause.what) / 1e6
+
+
+@pytest.mark.parametrize("task", [PARK, FETCH])
+def test_the_parts_of_a_story_sum_to_the_customers_waiting_time(task: Reference) -> None:
+    story = _story(task=task)
+    said = [one for one in fleet_of(run_log()) if getattr(one.message, "task", None) == task]
+    called_us = next(one.time_us for one in said if isinstance(one.message, CallForProposals))
+    done_us = next(
+        one.time_us for one in said if isinstance(one.message, TaskReport) and one.message.phase is TaskPhase.DONE
+    )
+    assert (story.begin_us, story.end_us) == (called_us, done_us)
+    assert sum(part.length_us for part in story.parts) == done_us - called_us == story.waited_us
+    assert all(one.end_us == two.begin_us for one, two in zip(story.parts, story.parts[1:], strict=False))
+    assert story.parts[0].begin_us == called_us
+
+
+def test_an_undisturbed_story_names_the_handling_the_way_and_the_lift() -> None:
+    story = _story()
+    assert _spent_s(story, 11, "takes the car at IOC1") > 15
+    assert _spent_s(story, 11, "leaves the car") > 15
+    assert _spent_s(story, 11, "drives") > 10
+    assert _spent_s(story, 5, "carries the robot") > 3
+    assert _spent_s(story, 1, "call open") == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("fault", "node", "word", "at_least_s"),
+    [
+        ("crash:target=MR1,at_s=30", 11, "started anew", 9),
+        ("crash:target=MR1,at_s=30,restart=no", 11, "silent", 12),
+        ("pause:target=MR1,at_s=40,for_s=30", 11, "silent", 12),
+        ("actuator_stuck:target=ER1,at_s=12,for_s=60", 5, "is not ready", 45),
+    ],
+)
+def test_a_planted_cause_is_found(fault: str, node: int, word: str, at_least_s: float) -> None:
+    plain, story = _story(), _story("--for", "150", "--fault", fault)
+    assert _spent_s(story, node, word) - _spent_s(plain, node, word) >= at_least_s
+    assert sum(part.length_us for part in story.parts) == story.waited_us
+
+
+def test_calls_are_told_with_bids_winner_promise_and_finish(capsys: pytest.CaptureFixture[str]) -> None:
+    said = fleet_of(run_log())
+    start_us = min(one.time_us for one in said)
+    assert main(["calls", str(run_log()), "--site", str(SITE_FILE), "--task", "IOC1/1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+
+    def at(kind: type[CallForProposals] | type[Bid] | type[Award]) -> float:
+        return (first(said, kind).time_us - start_us) / 1e6
+
+    def moment(line: str) -> float:
+        return float(line.split(maxsplit=1)[0])
+
+    assert "IOC1 call" in lines[0] and "park car IOC1/1, task IOC1/1, IOC1 to anywhere" in lines[0]
+    assert moment(lines[0]) == pytest.approx(at(CallForProposals), abs=0.01)
+    assert "MR1 bids" in lines[1] and moment(lines[1]) == pytest.approx(at(Bid), abs=0.01)
+    assert "awarded to MR1; promised" in lines[2] and moment(lines[2]) == pytest.approx(at(Award), abs=0.01)
+    done_us = next(
+        one.time_us for one in said if isinstance(one.message, TaskReport) and one.message.phase is TaskPhase.DONE
+    )
+    finished = float(lines[2].partition("finished ")[2].split()[0])
+    assert finished == pytest.approx((done_us - start_us) / 1e6, abs=0.01)
+    assert sum("ride car" in line for line in lines) == 2
+    assert lines[-1] == "3 calls, 3 bids"
+
+
+def test_why_prints_the_parts_and_their_sum(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(run_log()), "IOC1/2", "--site", str(SITE_FILE)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    waited = lines[0].rpartition("waited ")[2]
+    assert lines[0].startswith("task IOC1/2: retrieve, called by IOC1 at") and ", served; " in lines[0]
+    assert " ".join(lines[-1].split()) == f"sum {waited}"
+    assert main(["why", str(run_log()), "--site", str(SITE_FILE)]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["IOC1/2", "IOC1/1"]
+
+
+@pytest.mark.parametrize(("task", "said"), [("IOC1/9", "no task IOC1/9 in it"), ("XY/1", "write CALLER/NUMBER")])
+def test_a_task_that_is_not_there_is_one_clear_line(task: str, said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["why", str(run_log()), task, "--site", str(SITE_FILE)]) == 2
+    told = capsys.readouterr().err
+    assert said in told and told.count("\n") == 1

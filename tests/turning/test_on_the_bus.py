@@ -1,0 +1,186 @@
+"""Three lathes over CAN: bids in money, a known winner, its program run by the control (rows P21, P24 to P27, P59)."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from bus_sim.campaign.profiles import draw_faults
+from bus_sim.faults.injection import Injection
+from bus_sim.run import BusRun
+from bus_sim.sites import find_site
+from bus_sim.systems.registry import SystemOptions
+from bus_sim.systems.session import Played, play
+from bus_sim.systems.turning.nc import ProgramError, run_program
+from bus_sim.systems.turning.plant import TurningPlant, make_plant
+from bus_sim.systems.turning.show import board
+from onboard.core.codes import Criterion, KindCode, Operation
+from onboard.core.holon import Holon
+from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.kinds.turning.generation import LatheGeneration
+from onboard.kinds.turning.lathe import Job, LatheState
+from onboard.kinds.turning.machine import LatheMachine
+from onboard.kinds.turning.messages import BillBar, BillCutting, JobResult, LathePhase, LatheProgress, TurningOrder
+from onboard.kinds.turning.process import generate
+from onboard.kinds.turning.site import Turning, Wanted
+from onboard.trace.check.checks import Checks, Verdict
+from onboard.trace.check.turning import RULES
+
+
+def _site(*orders: Wanted) -> Turning:
+    site = find_site("turning")
+    assert isinstance(site, Turning)
+    return replace(site, orders=orders or site.orders)
+
+
+def _play(site: Turning, prepare: Callable[[BusRun], None] | None = None, **options: object) -> Played:
+    return play(site, SystemOptions(limit_s=20_000, **options), make_plant, prepare=prepare)  # type: ignore[arg-type]  # as given
+
+
+def _plant(played: Played) -> TurningPlant:
+    assert isinstance(played.plant, TurningPlant)
+    return played.plant
+
+
+def _sound(played: Played) -> None:
+    assert played.plant.violations == [] and played.halted == [] and played.is_over
+
+
+def _verdict(site: Turning, messages: list[tuple[int, Message]], *, disturbed: bool = False) -> Verdict:
+    checks = Checks(site, disturbed=disturbed, rules=RULES)
+    for time_us, message in messages:
+        checks.feed_message(time_us, message)
+    return checks.finish()
+
+
+@pytest.fixture(scope="module")
+def shipped() -> Played:
+    """The shipped site, once."""
+    return _play(_site())
+
+
+def test_p27_three_lathes_and_the_winner_that_is_known(shipped: Played) -> None:
+    """The cheapest by the five terms worked out here wins: thin pins L3, the shaft L2, only L1 holds the flange."""
+    _sound(shipped)
+    site = _site()
+    entries = _plant(shipped).entries
+    assert [(entry.winner, entry.result) for entry in entries] == [(node, JobResult.DONE) for node in (3, 2, 1, 3)]
+    calls = {one.task.number: one for _, one in shipped.messages if isinstance(one, CallForProposals)}
+    assert {(one.operation, one.kind, one.criterion) for one in calls.values()} == {
+        (Operation.MACHINE, KindCode.LATHE, Criterion.MONEY)
+    }
+    for number in (1, 2, 3):
+        job = site.orders[number - 1].job
+        made = {
+            node: generate(job, site.drawings[job.drawing], site.materials[job.material], lathe, LatheState())
+            for node, lathe in site.lathes.items()
+        }
+        cents = {node: one.bill.total_cents for node, one in made.items() if one is not None}
+        assert min(cents, key=cents.__getitem__) == entries[number - 1].winner
+        assert entries[number - 1].total_ct == min(cents.values())
+
+
+def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipped: Played) -> None:
+    plant = _plant(shipped)
+    assert set(plant.programs) == {(3, 1), (2, 2), (1, 3)}
+    assert set(plant.errors_mm) == {1, 2, 3} and max(plant.errors_mm.values()) <= 0.01
+    assert [device.made for device in plant.devices.values()] == [{3: 1}, {2: 4}, {1: 11}]
+    phases = [one.lathe_phase for _, one in shipped.messages if isinstance(one, LatheProgress) and one.sender == 2]
+    assert list(dict.fromkeys(phases)) == list(LathePhase)
+    assert run_program(plant.programs[2, 2]).tool_changes == 3
+    with pytest.raises(ProgramError, match="no M30"):
+        run_program(plant.programs[2, 2].replace("M30", "M0"))
+
+
+def test_p26_the_five_terms_are_on_the_bus_and_sum_to_the_bid(shipped: Played) -> None:
+    verdict = _verdict(_site(), shipped.messages)
+    assert verdict.is_good, verdict.lines()
+    assert all(verdict.seen[rule.name] for rule in RULES)
+    bids = [one for _, one in shipped.messages if isinstance(one, Bid)]
+    bars = [one for _, one in shipped.messages if isinstance(one, BillBar)]
+    assert [(one.sender, one.total_ct) for one in bars] == [(one.sender, one.cost) for one in bids]
+
+
+def test_p24_a_worn_edge_changes_the_bid_and_here_the_winner() -> None:
+    """The sensor of L2's roughing edge decides between it and an L1 that is almost as cheap."""
+    site = _site(Wanted(0, Job(2, 1, 45, 1)))
+    site = replace(site, lathes={**site.lathes, 1: replace(site.lathes[1], hourly_eur=49.0)})
+
+    def worn(run: BusRun) -> None:
+        assert isinstance(run.plant, TurningPlant)
+        run.plant.devices[2].used_min[1] = 19.95
+
+    winners = []
+    for prepare in (None, worn):
+        played = _play(site, prepare)
+        _sound(played)
+        winners.append(_plant(played).entries[0].winner)
+    assert winners == [2, 1]
+
+
+def test_p24_edges_are_changed_before_they_are_worn_out() -> None:
+    played = _play(_site(Wanted(0, Job(2, 1, 45, 60))))
+    _sound(played)
+    plant = _plant(played)
+    assert plant.entries[0].result is JobResult.DONE and sum(one.edges_changed for one in plant.devices.values()) >= 1
+
+
+def test_p21_a_lathe_looks_at_no_other_machine(shipped: Played) -> None:
+    """What the others do, and the mirror of it, changes nothing: a lathe alone bids what it bid beside the others."""
+    site = _site()
+    alone = LatheGeneration(site, site.machines[3])
+    order = next(one for _, one in shipped.messages if isinstance(one, TurningOrder))
+    call = next(one for _, one in shipped.messages if isinstance(one, CallForProposals))
+    alone.hear(order)
+    bid = next(one for _, one in shipped.messages if isinstance(one, Bid) and one.sender == 3)
+    assert alone.lower_bound(call, 0) == alone.lower_bound(call, 10**9) == bid.cost
+    found = alone.estimate(call, 0)
+    assert found is not None and found.cost == bid.cost and found.itinerary is None
+
+
+def test_p59_the_same_holon_drives_lathes(shipped: Played) -> None:
+    controllers = shipped.run.controllers
+    assert {type(one.holon) for one in controllers.values()} == {Holon}
+    assert {type(one.holon.behaviour) for node, one in controllers.items() if node != 9} == {LatheMachine}
+    assert "order 2: 4 x shaft: DONE L2" in board(_plant(shipped))
+
+
+def test_what_no_lathe_can_make_is_refused() -> None:
+    # A bar of 300 mm is in nobody's jaws.
+    played = _play(_site(Wanted(0, Job(3, 1, 300, 1))))
+    _sound(played)
+    assert [one.result for one in _plant(played).entries] == [JobResult.REFUSED]
+    assert not any(isinstance(one, Bid) for _, one in played.messages)
+
+
+def test_each_checker_finds_what_it_is_for() -> None:
+    site, task = _site(), Reference(9, 1)
+    broken: dict[str, list[Message]] = {
+        "bills-add-up": [BillCutting(1, 9, 1, 100, 0), BillBar(1, 9, 1, 50, 900)],
+        "one-lathe": [TaskReport(1, task, 1, 0, 0), TaskReport(2, task, 1, 0, 0)],  # type: ignore[arg-type]  # as numbers
+    }
+    from onboard.kinds.turning.messages import BillWaiting
+
+    broken["bills-add-up"].insert(1, BillWaiting(1, 9, 1, 10, 10))
+    for name, messages in broken.items():
+        verdict = _verdict(site, [(1_000_000 * number, one) for number, one in enumerate(messages, 1)])
+        assert verdict.counts[name] == 1, name
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_the_turning_cell_under_faults(seed: int) -> None:
+    site = _site(Wanted(0, Job(1, 2, 14, 2)), Wanted(5_000, Job(2, 1, 45, 1)), Wanted(20_000, Job(1, 1, 16, 2)))
+    faults = []
+    for fault in draw_faults(("bus", "crash")[seed % 2], seed, site):
+        at_s = fault.given["at_s"]
+        assert not isinstance(at_s, str)
+        # Half of them strike while calls are open, half over the whole of the work.
+        share = 0.03 if seed % 4 < 2 else 0.8
+        faults.append(Injection(fault.kind, {**fault.given, "at_s": round(10 + (at_s - 20) * share, 6)}))
+    played = _play(site, seed=seed, faults=tuple(faults))
+    assert played.plant.violations == [] and played.halted == []
+    assert played.is_over, [str(fault) for fault in faults]
+    assert all(entry.result is JobResult.DONE for entry in _plant(played).entries)
+    verdict = _verdict(site, played.messages, disturbed=True)
+    assert verdict.is_good, verdict.lines()
+    assert any(isinstance(one, Award) for _, one in played.messages)
