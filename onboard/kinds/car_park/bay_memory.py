@@ -48,7 +48,7 @@ def job_over_record() -> Record:
     return Record({"record": "job_over"})
 
 
-def next_number(last: int, fleet: Fleet) -> int:
+def next_reference(last: int, fleet: Fleet) -> Reference:
     """The next number of a car or task of this node; one under which a token was ever heard of is passed over.
 
     It goes to the journal before its token: whatever happens between the two writes, it is never used again.
@@ -57,7 +57,7 @@ def next_number(last: int, fleet: Fleet) -> int:
         last = successor(last, 16)
         if car_token(fleet.node_id, last) not in fleet.tokens.seen:
             break
-    return last
+    return Reference(fleet.node_id, last)
 
 
 @dataclass

@@ -52,7 +52,7 @@ from onboard.kinds.car_park.bay_memory import (
     car_record,
     job_over_record,
     job_record,
-    next_number,
+    next_reference,
     ticket_record,
 )
 from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
@@ -368,11 +368,12 @@ class Compartment:
             return [self._desk(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
         if not self.fleet.mirror.free_places():
             return [self._desk(DeskText.FULL, Reference(0, 0))]
-        car = self._next_reference()
+        car = next_reference(self._number, self.fleet)
+        self._number = car.number
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
         number = Record({"record": "number", "number": self._number})
-        effects: list[Effect] = [number, *self.fleet.tokens.create(car_token(*car))]
-        effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
+        job = job_record(car, Operation.PARK, car, bay.wheelbase_mm)
+        effects: list[Effect] = [number, *self.fleet.tokens.create(car_token(*car)), job]
         effects += self._state_car(car, self.station.number, bay.wheelbase_mm)
         effects.append(self._desk(DeskText.TAKE_TICKET, car))
         effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
@@ -397,15 +398,12 @@ class Compartment:
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         car = self.tickets.popleft()
-        task = self._next_reference()
+        task = next_reference(self._number, self.fleet)
+        self._number = task.number
         self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
         job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
         return [Record({"record": "number", "number": self._number}), job, *self._fetch(self.job, now_us)]
-
-    def _next_reference(self) -> Reference:
-        self._number = next_number(self._number, self.fleet)
-        return Reference(self.fleet.node_id, self._number)
 
     def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
         where = self._place_of(job.car)
