@@ -72,6 +72,11 @@ class Controller:
             await self.ports.device_bus.close()
         await self.ports.journal.close()
 
+    @property
+    def is_idle(self) -> bool:
+        """Whether no journal write is under way, so that a frame is taken up at once."""
+        return self._writing is None and not self._inbox
+
     def wire_drops(self) -> Counter[Reason]:
         """Frames of both buses that came to nothing below the holon, by reason."""
         return self._decoders[0].drops + self._decoders[1].drops + self._queue_drops

@@ -63,6 +63,11 @@ def genesis_holder(site: Site, key: TokenKey) -> int:
     return site.stewards.get(key.number >> 8, 0)
 
 
+def may_exist(site: Site, key: TokenKey) -> bool:
+    """Whether the site has such a token, so that no frame can fill the book with what nobody ever made."""
+    return genesis_holder(site, key) in site.machines
+
+
 class Claim(NamedTuple):
     """What a request says beside the token.
 

@@ -4,6 +4,7 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 (rows P21, P22). A new kind is a new ``Behaviour``; no protocol code changes for it.
 """
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
@@ -28,6 +29,8 @@ class Fleet:
     mirror: Mirror
     negotiation: Negotiation
     entries: tuple[Mapping[str, str | int], ...] = ()
+    #: Input that came to nothing, by reason: the holon's own count.
+    drops: Counter[Reason] = field(default_factory=Counter)
     petitions: Petitions = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
     admissions: int = 0

@@ -15,6 +15,8 @@ FAR_US = 100_000
 SAME_US = 20_000
 #: Sync messages missed before the clock counts as lost.
 MISSED_LIMIT = 4
+#: Bus time on the wire has 48 bits of microseconds: 8.9 years.
+BUS_TIME_MODULUS = 1 << 48
 
 
 @dataclass

@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from onboard.core.authority import Claim, TokenBook, TokenKey, genesis_holder
+from onboard.core.authority import Claim, TokenBook, TokenKey, may_exist
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
-from onboard.core.bus_time import BusClock
+from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
@@ -48,8 +48,6 @@ ASK_AGAIN_US = 1_000_000
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
 _OF_FOREIGNERS = (EmergencyStop, Heartbeat, Progress)
-#: Bus time on the wire has 48 bits of microseconds: 8.9 years.
-BUS_TIME_MODULUS = 1 << 48
 
 
 class Holon:
@@ -96,7 +94,7 @@ class Holon:
             boot=boot,
             slot=slot_of(site, machine.node_id),
         )
-        self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries)
+        self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self.tokens.claim = self._claim
         self._asked_again_us: dict[int, int] = {}
@@ -105,7 +103,7 @@ class Holon:
         self._mismatches: Counter[int] = Counter()
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
-        # Each handler takes exactly the message class that it is listed under; Any is what a dispatch table costs.
+        # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             TokenRequest: self._on_token_request,
             TokenGrant: self._on_token_grant,
@@ -298,7 +296,7 @@ class Holon:
 
     def _on_token_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         key = TokenKey(grant.token_kind, grant.token)
-        if genesis_holder(self.site, key) == NOBODY:
+        if not may_exist(self.site, key):
             self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         if self.tokens.is_news(key, grant.version):
@@ -306,13 +304,17 @@ class Holon:
                 self.mirror.order.on_return(grant.sender, Segment(key.number >> 8, key.number & 0xFF))
             self.fleet.petitions.close(key, grant.holder)
         effects = self.tokens.on_grant(grant, now_us)
-        if not self.tokens.holds(key):
-            return effects
-        self.fleet.petitions.returned(key, now_us)
-        return effects + self._serve_petitions(now_us)
+        if self.tokens.holds(key):
+            self.fleet.petitions.returned(key, now_us)
+            effects += self._serve_petitions(now_us)
+        return effects
 
     def _on_token_held(self, statement: TokenHeld, now_us: int) -> list[Effect]:
-        self.fleet.petitions.close(TokenKey(statement.token_kind, statement.token), statement.sender)
+        key = TokenKey(statement.token_kind, statement.token)
+        if not may_exist(self.site, key):
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
+        self.fleet.petitions.close(key, statement.sender)
         return self.tokens.on_held(statement)
 
     def _on_token_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
@@ -320,8 +322,8 @@ class Holon:
         return []
 
     def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
-        if isinstance(message, CallForProposals) and self._may_not_bid(now_us) is not Reason.NONE:
-            self.drops[self._may_not_bid(now_us)] += 1
+        if isinstance(message, CallForProposals) and (why := self._may_not_bid(now_us)) is not Reason.NONE:
+            self.drops[why] += 1
             return []
         return self._carry_out(self.negotiation.receive(message, now_us), now_us)
 

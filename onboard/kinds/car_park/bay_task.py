@@ -3,10 +3,22 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from onboard.core.codes import CallResult, Criterion, DeskInput, KindCode, Operation, OperatorAction, Reason, TaskPhase
+from onboard.core.codes import (
+    CallResult,
+    Criterion,
+    DeskInput,
+    DeskText,
+    KindCode,
+    Operation,
+    OperatorAction,
+    Reason,
+    TaskPhase,
+)
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Reference, TaskReport
+from onboard.core.messages import Award, BayState, Reference, TaskReport
+from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms
+from onboard.kinds.car_park.site import CarLimits
 
 #: A call that nobody could serve is made again after this, us. Ours.
 RETRY_US = 30_000_000
@@ -76,3 +88,15 @@ def withdrawal(node: int, report: TaskReport) -> list[Effect]:
     if report.task.origin != node or report.phase not in (TaskPhase.AWARDED, TaskPhase.STARTED):
         return []
     return [Send(Award(node, 0, 0, report.task, 0, CallResult.WITHDRAWN, Reason.CANCELLED))]
+
+
+def fits(bay: BayState, limits: CarLimits) -> bool:
+    """Whether the car in the bay is one that the park takes (row P33)."""
+    small = bay.length_mm <= limits.max_length_mm and bay.height_mm <= limits.max_height_mm
+    grips = limits.min_wheelbase_mm <= bay.wheelbase_mm <= limits.max_wheelbase_mm
+    return small and grips and bay.load_kg <= limits.max_load_kg
+
+
+def refusal_text(mirror: Mirror) -> DeskText:
+    """What a customer is told whom nobody can serve; that nobody can although there is room is not called full."""
+    return DeskText.OUT_OF_ORDER if mirror.free_places() else DeskText.FULL

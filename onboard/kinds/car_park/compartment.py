@@ -46,12 +46,14 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site, Station
+from onboard.kinds.car_park import bay_task
 from onboard.kinds.car_park.bay_generation import BayGeneration
 from onboard.kinds.car_park.bay_memory import (
     BayMemory,
     car_record,
     job_over_record,
     job_record,
+    next_reference,
     ticket_record,
 )
 from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
@@ -361,14 +363,12 @@ class Compartment:
         bay, limits = self.bay, car_park(self.fleet.site).cars
         if not bay.load_kg:
             return []
-        too_large = bay.length_mm > limits.max_length_mm or bay.height_mm > limits.max_height_mm
-        odd = not limits.min_wheelbase_mm <= bay.wheelbase_mm <= limits.max_wheelbase_mm
-        if too_large or odd or bay.load_kg > limits.max_load_kg:
+        if not bay_task.fits(bay, limits):
             return [self._desk(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
         if not self.fleet.mirror.free_places():
             return [self._desk(DeskText.FULL, Reference(0, 0))]
-        self._number = successor(self._number, 16)
-        car = Reference(self.fleet.node_id, self._number)
+        car = next_reference(self._number, self.fleet)
+        self._number = car.number
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
         # The number first: one that is not used is no harm, one used twice would be.
         effects: list[Effect] = [Record({"record": "number", "number": self._number})]
@@ -398,8 +398,8 @@ class Compartment:
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         car = self.tickets.popleft()
-        self._number = successor(self._number, 16)
-        task = Reference(self.fleet.node_id, self._number)
+        task = next_reference(self._number, self.fleet)
+        self._number = task.number
         self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
         job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
@@ -463,8 +463,7 @@ class Compartment:
         effects: list[Effect] = [
             Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
             *self._state_car(job.car, OUTSIDE, job.wheelbase_mm),
-            # Nobody can although there is room: that is another word than full.
-            self._desk(DeskText.OUT_OF_ORDER if self.fleet.mirror.free_places() else DeskText.FULL, job.car),
+            self._desk(bay_task.refusal_text(self.fleet.mirror), job.car),
         ]
         return effects + self._to_free()
 

@@ -36,6 +36,8 @@ from onboard.kinds.car_park.stewardship import Stewardship
 
 #: The platform stands at a floor's mark within this, mm (fine sensor, dbc/device.dbc).
 MARK_TOLERANCE_MM = 5
+#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
+OFF_LIMIT_MM = 20_000
 
 
 class LiftPhase(Enum):
@@ -137,6 +139,9 @@ class Lift:
             self.platform = message
             return []
         if not isinstance(message, DriveState):
+            return []
+        if abs(message.position_mm - self._position_mm(self._nearest(message.position_mm))) > OFF_LIMIT_MM:
+            self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
         if self.drive is None:
             self._sequence = message.sequence
@@ -400,8 +405,11 @@ class Lift:
 
     def _index(self) -> int:
         assert self.drive is not None
+        return self._nearest(self.drive.position_mm)
+
+    def _nearest(self, position_mm: int) -> int:
         track = self.fleet.site.tracks[self.track]
-        index = (self.drive.position_mm + track.pitch_mm // 2) // track.pitch_mm + 1
+        index = (position_mm + track.pitch_mm // 2) // track.pitch_mm + 1
         return max(1, min(track.length, index))
 
     def _stands_at(self, index: int) -> bool:

@@ -130,7 +130,8 @@ class Robot:
         """Drive and shuttle states."""
         if isinstance(message, DriveState):
             effects = self.carriage.sense(message, now_us, self.program.version, self.program.current)
-            if self.program.standing is None and message.mode is DriveMode.STANDING:
+            is_known = self.carriage.sensed is not None
+            if is_known and self.program.standing is None and message.mode is DriveMode.STANDING:
                 effects += self._find_place(now_us)
             return effects
         if isinstance(message, ShuttleState):

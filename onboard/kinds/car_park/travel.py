@@ -30,6 +30,8 @@ LOOKAHEAD_US = 3_000_000
 ORDER_PATIENCE_US = 5_000_000
 #: A machine stands at a segment's centre within this, mm (fine sensor, dbc/device.dbc).
 MARK_TOLERANCE_MM = 5
+#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
+OFF_LIMIT_MM = 20_000
 
 
 @dataclass
@@ -151,6 +153,11 @@ class Carriage:
 
     def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
+        if not state.across:
+            off_mm = state.position_mm - self.axis.position_mm(self.axis.index_at(state.position_mm))
+            if abs(off_mm) > OFF_LIMIT_MM:
+                self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+                return []
         self.stall.sensed(state.position_mm, now_us)
         before = self.sensed
         if before is None:
