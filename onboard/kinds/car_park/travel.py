@@ -65,9 +65,12 @@ class Carriage:
     @property
     def axis(self) -> TrackAxis:
         """The alley that the carrier is on, or the spur that it is in, turns into or comes out of."""
-        if self.track not in self._axes:
-            self._axes[self.track] = TrackAxis(self.fleet.site, self.track)
-        return self._axes[self.track]
+        return self._axis_of(self.track)
+
+    def _axis_of(self, track: int) -> TrackAxis:
+        if track not in self._axes:
+            self._axes[track] = TrackAxis(self.fleet.site, track)
+        return self._axes[track]
 
     @property
     def standing_at(self) -> Segment | None:
@@ -153,11 +156,9 @@ class Carriage:
 
     def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
         """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
-        if not state.across:
-            off_mm = state.position_mm - self.axis.position_mm(self.axis.index_at(state.position_mm))
-            if abs(off_mm) > OFF_LIMIT_MM:
-                self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-                return []
+        if self._is_far_off(state):
+            self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
         self.stall.sensed(state.position_mm, now_us)
         before = self.sensed
         if before is None:
@@ -171,6 +172,12 @@ class Carriage:
         if here == self._reported and not started_or_stopped:
             return []
         return self.statement(itinerary_version, leg)
+
+    def _is_far_off(self, state: DriveState) -> bool:
+        # One that has turned back out of a spur speaks of the alley's marks already.
+        mouth = self.axis.mouth
+        axis = self.axis if mouth is None or state.across else self._axis_of(mouth.track)
+        return abs(state.position_mm - axis.position_mm(axis.index_at(state.position_mm))) > OFF_LIMIT_MM
 
     def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
         """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known."""
