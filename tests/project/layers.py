@@ -94,7 +94,7 @@ LAYERS: dict[str, Layer] = {
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
-        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.trace", "onboard.web", "onboard.wire")
     ),
     "onboard": Layer(
         (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
