@@ -213,10 +213,11 @@ class SiteView:
             return
         record.result, record.winner, record.reason = award.result, award.winner, award.reason
         self.calls_closed[award.result] += 1
-        task = self.tasks.get(record.call.task)
-        if task is not None and award.result is CallResult.WITHDRAWN and record.call.operation is task.operation:
+        self.open_task(record.call.task, record.call.operation, record.opened_us)
+        task = self.tasks[record.call.task]
+        if award.result is CallResult.WITHDRAWN and record.call.operation is task.operation:
             task.is_withdrawn = True
-        if award.result is CallResult.AWARDED and task is not None:
+        if award.result is CallResult.AWARDED:
             if record.call.operation is not task.operation:
                 self.say(time_us, f"{self.name(award.winner)} takes {self.name(award.sender)} along")
                 return
@@ -241,7 +242,7 @@ class SiteView:
             return
         if report.phase is TaskPhase.DONE:
             self.done += 1
-            self.done_us += time_us - task.phase_us[TaskPhase.OPEN]
+            self.done_us += time_us - task.phase_us.get(TaskPhase.OPEN, time_us)
             self.parked += task.operation is Operation.PARK
             self.fetched += task.operation is Operation.RETRIEVE
         where = self._station(report.station)

@@ -52,17 +52,20 @@ class LivePicture:
 
     # --- in ----------------------------------------------------------------------------------------------------
 
-    def count_frame(self, frame: Frame) -> None:
-        """One frame of the fleet bus, of any sender, for the load: stuff bits and gaps between frames are in it."""
+    def count_frame(self, frame: Frame | None = None) -> None:
+        """One frame of the fleet bus, of any sender, for the load: stuff bits and gaps between frames are in it.
+
+        Without it, for who asks for no load, it is counted only.
+        """
         self._frames += 1
-        self._bits += frame_bits(frame)
+        if frame is not None:
+            self._bits += frame_bits(frame)
 
     def feed(self, message: Message, time_us: int) -> None:
         """One message of the fleet bus."""
         self.view.feed(message, time_us)
         self.scene.feed(message, time_us)
-        if self.is_car_park:
-            self.indicators.feed(message, time_us)
+        self.indicators.feed(message, time_us)
         match message:
             case Heartbeat():
                 self._heard[message.sender] = time_us
@@ -122,7 +125,7 @@ class LivePicture:
             "now_us": view.now_us,
             "machines": {node: self._machine(node) for node in self.site.machines},
             **self.scene.marks(view.now_us),
-            "calls": [self._call(record) for record in list(view.calls.values())[-CALLS_SHOWN:]],
+            "calls": [self.call(record) for record in list(view.calls.values())[-CALLS_SHOWN:]],
             "tasks": self._open_tasks(),
             "events": [[time_us, text] for time_us, text in list(view.events)[-EVENTS_SHOWN:]],
             "figures": {**ends, "calls": view.calls_opened, "bids": view.bids},
@@ -157,14 +160,16 @@ class LivePicture:
             return "silent"
         return self.view.states[node].name.lower()
 
-    def _call(self, record: CallRecord) -> dict[str, Any]:
+    def call(self, record: CallRecord) -> dict[str, Any]:
+        """One call with its bids; times in us of the log."""
         call, view = record.call, self.view
         return {
             "id": f"{call.sender}.{call.call}",
             "by": view.name(call.sender),
             "what": call.operation.name.lower().replace("_", " "),
             "task": f"{call.task.origin}.{call.task.number}",
-            "car": self.scene.thing(call.car) if call.car.number else None,
+            "car": f"{call.car.origin}.{call.car.number}" if call.car.number else None,
+            "thing": self.scene.thing(call.car) if call.car.number else None,
             "from": self.scene.place(call.from_station),
             "to": self.scene.place(call.to_station),
             "opened_us": record.opened_us,

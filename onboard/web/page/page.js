@@ -149,7 +149,7 @@ function showCalls() {
     line.onkeydown = (event) => event.key === "Enter" && chooseCall(call.id);
     const when = document.createElement("time");
     when.textContent = clock(call.opened_us);
-    line.replaceChildren(when, `${call.by}: ${call.what}${call.car ? ` ${call.car}` : ""} `);
+    line.replaceChildren(when, `${call.by}: ${call.what}${call.thing ? ` ${call.thing}` : ""} `);
     const best = call.bids.at(-1);
     for (const bid of call.bids) {
       const word = document.createElement("span");
@@ -274,7 +274,7 @@ function machineLines() {
 function callLines() {
   const call = state.snapshot.calls.find((one) => one.id === state.call);
   if (!call) return ["this call is long over"];
-  const lines = [`call ${call.id} of ${call.by}: ${call.what}${call.car ? ` ${call.car}` : ""}, from ${call.from} to ${call.to}`, `opened ${clock(call.opened_us)}${call.deadline_us ? `, deadline ${clock(call.deadline_us)}` : ""}${call.attempt > 1 ? `, attempt ${call.attempt}` : ""}`];
+  const lines = [`call ${call.id} of ${call.by}: ${call.what}${call.thing ? ` ${call.thing}` : ""}, from ${call.from} to ${call.to}`, `opened ${clock(call.opened_us)}${call.deadline_us ? `, deadline ${clock(call.deadline_us)}` : ""}${call.attempt > 1 ? `, attempt ${call.attempt}` : ""}`];
   for (const bid of call.bids) lines.push(`${bid.by} bids ${cost(call, bid)} after ${((bid.at_us - call.opened_us) / 1e3).toFixed(0)} ms`);
   lines.push(call.result ? (call.won ? `won by ${call.winner}: the best bid heard` : `ended: ${call.result}`) : "open");
   return lines;
