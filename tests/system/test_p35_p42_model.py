@@ -10,7 +10,8 @@ from onboard.config.site import parse_site
 from onboard.core.codes import Grade, LegAction, MachineState, Operation, Side, TaskPhase
 from onboard.core.messages import CallForProposals, Heartbeat, Itinerary, TaskReport
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Station
+from onboard.core.site import Site, Station
+from tests.config.support import ROOT, changed
 from tests.system.scene import Scene, play, stays
 
 SMALL = find_site("small")
@@ -67,40 +68,12 @@ def test_p35_the_model_holds_cars_plans_and_where_all_machines_are(restarted: Sc
             assert (seen.track, seen.index) == world.standing_position(node)
 
 
-#: Two compartments side by side; p(1,7) is the nearest place for both.
-NARROW = """
-[site]
-name = "narrow"
-[floors]
-count = 3
-positions = 10
-sides = ["near"]
-without = ["p(1,1)", "p(1,2)", "p(1,3)", "p(1,4)"]
-[[compartments]]
-name = "IOC1"
-node = 1
-at = "p(1,5)"
-[[compartments]]
-name = "IOC2"
-node = 2
-at = "p(1,6)"
-[[lifts]]
-name = "ER1"
-node = 5
-end = "left"
-[[lifts]]
-name = "ER2"
-node = 6
-end = "right"
-[[robots]]
-name = "MR1"
-node = 11
-home = "p(2,3)"
-[[robots]]
-name = "MR2"
-node = 12
-home = "p(3,8)"
-"""
+def narrow() -> Site:
+    """The small site with a second compartment beside the first; p(1,7) is the nearest place that both have left."""
+    text = (ROOT / "bus_sim" / "sites" / "small.toml").read_text(encoding="utf-8")
+    gone = "".join(f'"p(1,{index})", ' for index in range(1, 5))
+    text = changed('sides = ["near", "far"]', f'sides = ["near"]\nwithout = [{gone}]', text)
+    return parse_site(text + '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n', "narrow.toml")
 
 
 def aims(itinerary: Itinerary) -> Station | None:
@@ -111,7 +84,7 @@ def aims(itinerary: Itinerary) -> Station | None:
 
 def test_p42_two_parkings_of_one_moment_never_come_to_one_place() -> None:
     """The bidder chooses the place: both bids aim at one, and the award that is first takes it."""
-    scene = play(parse_site(NARROW, "narrow.toml"), stays((2.9, None), (0, None)), extra_s=200)
+    scene = play(narrow(), stays((2.9, None), (0, None)), extra_s=200)
     calls = [(t, call) for t, call in scene.all(CallForProposals) if call.operation is Operation.PARK]
     assert calls[1][0] < from_bus_ms(calls[0][1].deadline_ms, calls[0][0]), "both are open at once"
     wished = [aims(plan) for _, plan in scene.all(Itinerary) if plan.grade is Grade.TENTATIVE]
