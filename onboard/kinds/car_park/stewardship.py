@@ -84,7 +84,8 @@ class Stewardship:
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
         effects: list[Effect] = []
-        for car in [car for car, winner in self.winners.items() if self._is_lost(winner, now_us)]:
+        lost = {winner for winner in self.fleet.mirror.obstacles.machines if self._is_lost(winner, now_us)}
+        for car in [car for car, winner in self.winners.items() if winner in lost] if lost else []:
             if car in self.tasks and self._is_untouched(car):
                 task, version = self.tasks[car]
                 effects += self.won(car, NOBODY, task, version)
@@ -110,7 +111,7 @@ class Stewardship:
         """When ``review`` has something to do, bus time in us; None where nobody is lost."""
         obstacles = self.fleet.mirror.obstacles.machines
         times = list(self._say_at_us.values())
-        for car, winner in self.winners.items():
+        for car, winner in self.winners.items() if obstacles else ():
             if winner in obstacles and car in self.tasks and self._is_untouched(car):
                 times.append(obstacles[winner].since_us + LOST_AFTER_US)
         return min(times, default=None)
