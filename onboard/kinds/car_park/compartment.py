@@ -323,7 +323,9 @@ class Compartment:
             # Whoever won meanwhile says so when asked, which every machine does at power-up.
             self.job.retry_at_us = now_us + SETTLING_US
         self._go(BayPhase.LOCKING)
-        return self._when_locking(now_us)
+        is_unsaid = operation is Operation.PARK and car not in self.fleet.mirror.cars
+        said = custody.state(self.fleet, car, self.station.number, wheelbase_mm) if is_unsaid else []
+        return said + self._when_locking(now_us)
 
     def _to_free(self) -> list[Effect]:
         over: list[Effect] = [job_over_record()] if self.job is not None else []
@@ -379,12 +381,15 @@ class Compartment:
         return [*effects, self._light(LightColour.RED)]
 
     def _when_locking(self, now_us: int) -> list[Effect]:
-        assert self.bay is not None
+        assert self.bay is not None and self.job is not None
         if self._is(DoorName.INPUT, DoorPosition.LOCKED):
             self._go(BayPhase.AWAITING)
             return self._when_awaiting(now_us)
         if self.bay.person_inside:
-            return []
+            # Who presses again has no ticket: the power failed before it was printed.
+            asked, self._key_pressed = self._key_pressed, False
+            is_new = self.job.operation is Operation.PARK
+            return [self._desk(DeskText.TAKE_TICKET, self.job.car)] if asked and is_new else []
         return self._door(DoorName.INPUT, DoorAction.CLOSE)
 
     def _when_reserving(self, now_us: int) -> list[Effect]:

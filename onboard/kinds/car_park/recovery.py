@@ -73,8 +73,10 @@ class Recovery:
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
     is_restart: bool = False
-    #: The last task whose car was left, and the number of its station: who asks for it is told so.
+    #: The last task whose car was left, and the number of its station: who asks for it is told so. Nobody may have
+    #: heard of it yet where the shuttle has done nothing since.
     last_done: tuple[Reference, int] | None = None
+    is_news: bool = False
     #: Where I have said that cars are.
     cars: dict[Reference, CarAt] = field(default_factory=dict)
     #: Under which version each task was taken on, where it is not the first.
@@ -99,12 +101,12 @@ class Recovery:
             case "forfeited":
                 self.forget(_task(entry))
             case "step":
-                self.phase = Phase(str(entry["phase"]))
+                self.phase, self.is_news = Phase(str(entry["phase"])), False
             case "handled":
                 self.works = [work for work in self.works if not _is(work, entry)]
                 self.phase = None
                 if entry["handling"] == Handling.LEAVE.value:
-                    self.last_done = _task(entry), int(entry.get("station", 0))
+                    self.last_done, self.is_news = (_task(entry), int(entry.get("station", 0))), True
             case "riding":
                 self.riding = (int(entry["lift"]), int(entry["board"]), int(entry["leave"]))
             case "floor":

@@ -327,10 +327,11 @@ class Robot:
         # Whoever has got one of them meanwhile, its initiator knows.
         mine = self._taken_on(self.recovery.works)
         if self.recovery.last_done is not None:
-            # The power may have failed before this was said, or heard.
             task, station = self.recovery.last_done
             self._done.append(task)
-            mine = [self._report(task, TaskPhase.DONE, station), *mine]
+            if self.recovery.is_news:
+                # The power may have failed before this was said, or heard.
+                mine = [self._report(task, TaskPhase.DONE, station), *mine]
         return self._publish(now_us) + mine
 
     def _recover(self, now_us: int) -> list[Effect]:
