@@ -115,6 +115,22 @@ class SiteView:
             return f"{self.name(message.sender)} waits for {where}{blocker}: {why}"
         return f"{where} is {'blocked' if isinstance(message, Blocked) else 'clear again'}: {why}"
 
+    def forget(self, keep: int) -> None:
+        """Let go of calls and tasks that are over but the newest ``keep`` of each: for who listens without end.
+
+        Of tasks no more than four times as many stay, whatever was heard of them.
+        """
+        closed = [key for key, record in self.calls.items() if record.result is not None]
+        for key in closed[: max(0, len(closed) - keep)]:
+            del self.calls[key]
+        over = [task for task, record in self.tasks.items() if record.phase in (TaskPhase.DONE, TaskPhase.REFUSED)]
+        called = {record.call.task for record in self.calls.values()}
+        for task in over[: max(0, len(over) - keep)]:
+            if task not in called:
+                del self.tasks[task]
+        for task in list(self.tasks)[: max(0, len(self.tasks) - 4 * keep)]:
+            del self.tasks[task]
+
     def places_taken(self) -> dict[int, Reference]:
         """Car by station number, for cars that stand at one."""
         return {station: car for car, station in self.cars.items() if station not in (ANY_STATION, OUTSIDE)}
@@ -159,7 +175,7 @@ class SiteView:
             return
         record.result, record.winner, record.reason = award.result, award.winner, award.reason
         self.calls_closed[award.result] += 1
-        task = self.tasks[record.call.task]
+        task = self.tasks.setdefault(record.call.task, TaskRecord(record.call.operation))
         if award.result is CallResult.AWARDED:
             if record.call.operation is not task.operation:
                 self._say(time_us, f"{self.name(award.winner)} takes {self.name(award.sender)} along")

@@ -160,7 +160,7 @@ class LivePicture:
             "now_us": view.now_us,
             "machines": {node: self._machine(node) for node in self.site.machines},
             "cars": {station: _car(car) for station, car in view.places_taken().items()},
-            "calls": [self._call(record) for record in list(view.calls.values())[-CALLS_SHOWN:]],
+            "calls": [self.call(record) for record in list(view.calls.values())[-CALLS_SHOWN:]],
             "tasks": self._open_tasks(),
             "events": [[time_us, text] for time_us, text in list(view.events)[-EVENTS_SHOWN:]],
             "figures": {"parked": view.parked, "fetched": view.fetched, "calls": view.calls_opened, "bids": view.bids},
@@ -220,7 +220,8 @@ class LivePicture:
             return []
         return sorted([number >> 8, number & 0xFF] for number, (_, holder) in self._tokens.items() if holder == node)
 
-    def _call(self, record: CallRecord) -> dict[str, Any]:
+    def call(self, record: CallRecord) -> dict[str, Any]:
+        """One call with its bids; times in us of the log."""
         call, view = record.call, self.view
         return {
             "id": f"{call.sender}.{call.call}",

@@ -96,6 +96,11 @@ LAYERS: dict[str, Layer] = {
     "onboard.web.cli": Layer(
         (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
     ),
+    # What is published is decided from the decoded bus alone; sessions, files and buses come in through ports.
+    "onboard.gateway": Layer(
+        (*CORE_TYPES, *SYSTEM_TYPES, "onboard.ports", "onboard.trace", "onboard.web.picture", "onboard.wire"),
+        not_stdlib=frozenset({"random", "socket", "threading", "time"}),
+    ),
     "onboard": Layer(
         (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
         not_stdlib=frozenset({"random", "threading", "time"}),
