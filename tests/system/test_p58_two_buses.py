@@ -165,12 +165,11 @@ async def on_the_simulated_bus() -> Stories:
     return await a_car_is_left(join)
 
 
-async def on_python_can() -> Stories:
-    run = next(_numbers)
+async def outside(settings: Callable[[str], BusSettings]) -> Stories:
     buses: list[Bus] = []
 
     async def join(name: str) -> Bus:
-        buses.append(await open_bus(BusSettings("virtual", f"p58-{name}-{run}")))
+        buses.append(await open_bus(settings(name)))
         return buses[-1]
 
     try:
@@ -178,6 +177,11 @@ async def on_python_can() -> Stories:
     finally:
         for bus in buses:
             await bus.close()
+
+
+async def on_python_can() -> Stories:
+    run = next(_numbers)
+    return await outside(lambda name: BusSettings("virtual", f"p58-{name}-{run}"))
 
 
 async def on_a_served_bus() -> Stories:
@@ -185,17 +189,9 @@ async def on_a_served_bus() -> Stories:
     media = {name: Medium(clock, name=name) for name in ("fleet", "device")}
     server = SocketcandServer(lambda channel, name: media[channel].attach(name), int, port=0)
     port = await server.start()
-    buses: list[Bus] = []
-
-    async def join(name: str) -> Bus:
-        buses.append(await open_bus(BusSettings("socketcand-asyncio", name, extra=(("port", port),))))
-        return buses[-1]
-
     try:
-        return await a_car_is_left(join)
+        return await outside(lambda name: BusSettings("socketcand-asyncio", name, extra=(("port", port),)))
     finally:
-        for bus in buses:
-            await bus.close()
         await server.close()
 
 
