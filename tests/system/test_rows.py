@@ -157,6 +157,22 @@ def test_p46_of_all_solutions_the_earliest_is_bid_though_another_place_is_nearer
     assert (works[-1].track, works[-1].to_index, works[-1].side) == far
 
 
+def test_p46_every_bid_on_the_bus_is_the_earliest_of_what_was_weighed_and_logged(pair: Scene) -> None:
+    """The log names each place that was worked out with its date, and counts those that could not be sooner."""
+    bids = [(t, bid) for t, bid in pair.all(Bid) if bid.sender == 12]
+    logged = [(t, text) for t, who, text in pair.simulation.log.lines if who == "MR2" and text.startswith("weighed: ")]
+    assert len(bids) == len(logged) == 4
+    weighed = []
+    for (bid_us, bid), (time_us, text) in zip(bids, logged, strict=True):
+        assert 0 <= bid_us - time_us < 5_000
+        dated, _, counts = text.removeprefix("weighed: ").partition("; ")
+        dates = {place: float(at_s) for place, at_s in (one.split(" at ") for one in dated.split(", "))}
+        assert round(min(dates.values()) * 1000) == bid.cost
+        others = sum(int(count.rpartition(" ")[2]) for count in counts.split("; "))
+        weighed.append(len(dates) + others)
+    assert weighed == [len(SITE.places), len(SITE.places) - 1, 1, 1], "all places but that of the other car"
+
+
 def test_p23_the_program_that_a_robot_prints_is_the_itinerary_that_it_sends(pair: Scene) -> None:
     """Step by step and to the millisecond: what is told of it in words, and the legs on the bus."""
     printed = [(t, text[9:].split("; ")) for t, who, text in pair.simulation.log.lines if text.startswith("program: [")]
