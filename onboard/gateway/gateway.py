@@ -69,6 +69,18 @@ class Gateway:
         self._inbox.append((frame, time_us))
         self._news.set()
 
+    def news(self) -> str:
+        """The sessions in one line: how many there are, why the others are not, and what was lost."""
+        links = list(self.links.values())
+        there = sum(link.is_connected for link in links)
+        lost = sum(link.counts.dropped for link in links)
+        waiting = len(self.reports.pending) if self.reports is not None else 0
+        parts = [f"broker: {there} of {len(links)} sessions"]
+        parts.append(next((link.trouble for link in links if link.trouble), ""))
+        parts.append(f"{lost} telemetry dropped" if lost else "")
+        parts.append(f"{waiting} reports wait" if waiting else "")
+        return "; ".join(part for part in parts if part)
+
     def stop(self) -> None:
         """End ``run``: links say goodbye."""
         self._stopping = True

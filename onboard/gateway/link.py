@@ -16,12 +16,13 @@ FIRST_WAIT_S, LAST_WAIT_S = 0.5, 15.0
 
 @dataclass
 class LinkCounts:
-    """Since the start: what the broker took, telemetry dropped, sessions opened, and sessions that broke."""
+    """Since the start: what the broker took, telemetry dropped, sessions opened and broken, disk writes failed."""
 
     published: int = 0
     dropped: int = 0
     opened: int = 0
     broken: int = 0
+    disk_errors: int = 0
 
 
 @dataclass
@@ -128,7 +129,10 @@ class Link:
         if self._reports is not None and self._reports.pending:
             name, report = next(iter(self._reports.pending.items()))
             await self._publish(session, report)
-            await self._reports.delivered(name)
+            try:
+                await self._reports.delivered(name)
+            except OSError:
+                self.counts.disk_errors += 1
             return True
         if not self._queue:
             return False

@@ -6,19 +6,17 @@ executor, so name look-up and TLS handshake hold nothing up; after that its sock
 """
 
 import asyncio
-import re
+import logging
+import socket
 import ssl
 from collections.abc import AsyncIterator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
-from dataclasses import dataclass
-from pathlib import Path
 
 import aiomqtt
 
+from onboard.io.broker_address import BrokerAddress
 from onboard.ports.broker import BrokerError, Publication
 
-#: Usual ports: without and with TLS (IANA).
-PORTS = {"mqtt": 1883, "mqtts": 8883}
 #: Without a sign of life a connection is given up after one and a half times this (MQTT 3.1.1, 3.1.2.10), s. Ours.
 KEEPALIVE_S = 10
 #: What the broker has not answered in this time counts as failed, s. Ours.
@@ -26,35 +24,10 @@ TIMEOUT_S = 5.0
 #: Orders that wait to be taken up; what comes beyond is counted and lost.
 MOST_WAITING = 256
 
-_ADDRESS = re.compile(r"(?P<scheme>mqtts?)://(?:(?P<user>[^@:/]+)@)?(?P<host>\[[^]]+\]|[^:/@]+)(?::(?P<port>\d+))?/?")
-
-
-@dataclass(frozen=True, slots=True)
-class BrokerAddress:
-    """Where the broker is and how one shows who one is; ``ca`` None trusts what the system trusts."""
-
-    host: str
-    port: int
-    tls: bool = False
-    user: str | None = None
-    password: str | None = None
-    ca: Path | None = None
-    certificate: Path | None = None
-    key: Path | None = None
-
-    def __str__(self) -> str:
-        return f"{'mqtts' if self.tls else 'mqtt'}://{self.host}:{self.port}"
-
-
-def parse_broker(text: str) -> BrokerAddress:
-    """``mqtt://[USER@]HOST[:PORT]``, or ``mqtts://`` with TLS. Raises ``ValueError`` with the remedy."""
-    found = _ADDRESS.fullmatch(text)
-    if found is None:
-        raise ValueError(f"{text}: not an address; write mqtt://HOST:PORT, or mqtts://HOST:PORT with TLS")
-    port = int(found["port"] or PORTS[found["scheme"]])
-    if not 0 < port < 65_536:
-        raise ValueError(f"{text}: port {port} is not from 1 to 65535")
-    return BrokerAddress(found["host"].strip("[]"), port, found["scheme"] == "mqtts", found["user"])
+#: paho tells errors that this file raises as well.
+_QUIET = logging.getLogger("onboard.mqtt")
+_QUIET.addHandler(logging.NullHandler())
+_QUIET.propagate = False
 
 
 class MqttBroker:
@@ -81,14 +54,18 @@ class MqttBroker:
         self, client: str, will: Publication | None, subscriptions: tuple[str, ...]
     ) -> AsyncIterator["MqttSession"]:
         session = MqttSession(self._client(client, will, keep=bool(subscriptions)))
+        _hear_out(session.client)
         try:
             async with session.client:
+                _hear_out(session.client)
                 for topic in subscriptions:
                     if _refused(await session.client.subscribe(topic, 1)):
                         raise BrokerError(f"{self.address}: may not read {topic}; grant it to {client}")
                 yield session
         except (aiomqtt.MqttError, OSError) as error:
             raise BrokerError(f"{self.address}: {error}") from error
+        finally:
+            _let_go(session.client)
 
     def _client(self, name: str, will: Publication | None, *, keep: bool) -> aiomqtt.Client:
         broker = self
@@ -114,6 +91,7 @@ class MqttBroker:
             timeout=self._timeout_s,
             tls_context=self._tls,
             queue_type=Waiting,
+            logger=_QUIET,
             max_queued_incoming_messages=MOST_WAITING,
         )
 
@@ -140,6 +118,24 @@ class MqttSession:
                 yield Publication(str(message.topic), message.payload, message.qos, bool(message.retain))
         except (aiomqtt.MqttError, OSError) as error:
             raise BrokerError(str(error)) from error
+
+
+def _let_go(client: aiomqtt.Client) -> None:
+    """Close what aiomqtt 2.5 leaves open where connecting has failed: the socket, and the task that looks after it."""
+    task, wire = client._misc_task, client._client.socket()  # noqa: SLF001  # there is no other way to them
+    if task is not None:
+        task.cancel()
+    if wire is not None and isinstance(wire, socket.socket) and wire.fileno() >= 0:
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(wire.fileno())
+        loop.remove_writer(wire.fileno())
+        wire.close()
+
+
+def _hear_out(client: aiomqtt.Client) -> None:
+    """Take the reason of a break off aiomqtt's hands: nobody may ask for it, and asyncio would complain."""
+    ended = client._disconnected  # noqa: SLF001  # there is no other way to it in 2.5
+    ended.add_done_callback(lambda future: future.cancelled() or future.exception())
 
 
 def _refused(codes: Sequence[object]) -> bool:
