@@ -7,11 +7,12 @@ import time
 from pathlib import Path
 
 from bus_sim.certify.certificate import ROWS, Certificate, certify, count_stuck, told
-from bus_sim.certify.counterexample import play_file, write_counterexample
+from bus_sim.certify.counterexample import play_file, play_on_bus, write_counterexample
 from bus_sim.certify.model import Model
 from bus_sim.certify.throughput import Pace, measure
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.graph.against_optimum import compare
+from bus_sim.systems.registry import SystemOptions
 from onboard.kinds.graph.network import Graph, complete, grid, ring
 from onboard.kinds.graph.rules import Rules
 from onboard.kinds.graph.site import FactoryGraph
@@ -53,6 +54,8 @@ def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
     parser.add_argument("--up-to", type=int, default=5, metavar="K", help="most robots to propose (default: 5)")
     parser.add_argument("--counterexample", type=Path, metavar="FILE", help="write it here, for bus-sim certify --play")
     parser.add_argument("--play", type=Path, metavar="FILE", help="play a counterexample step by step instead")
+    parser.add_argument("--bus", action="store_true", help="with --play: on the virtual bus, under --rules if given")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="with --play --bus: write a candump log")
     parser.add_argument(
         "--optimum",
         type=int,
@@ -68,6 +71,9 @@ def run_certify(args: argparse.Namespace) -> int:
         return _table()
     if args.optimum is not None:
         return _optimum(args.optimum)
+    if args.play is not None and args.bus:
+        rules = Rules(args.rules) if args.rules is not None else None
+        return play_on_bus(args.play, rules, SystemOptions(trace=args.trace, limit_s=3_600))
     if args.play is not None:
         return play_file(args.play)
     if args.site is None:
@@ -106,7 +112,7 @@ def _say(found: Certificate, what: str, file: Path | None, graph: Graph, rules: 
         print("\n".join(told(found.stuck)))
         if file is not None:
             write_counterexample(file, graph, rules, capacity, found.stuck)
-            print(f"written to {file}; play it: bus-sim certify --play {file}")
+            print(f"written to {file}; play it: bus-sim certify --play {file} [--bus [--rules edge-and-node]]")
 
 
 def _propose(graph: Graph, rules: Rules, capacity: int | None, most: int) -> None:

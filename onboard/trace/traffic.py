@@ -67,6 +67,10 @@ def _two(_: Numbers) -> int:
     return 2
 
 
+def _three(_: Numbers) -> int:
+    return 3
+
+
 def _second(_: Numbers) -> int:
     return _SECOND_US
 
@@ -120,7 +124,11 @@ _OPERATION = (
     Row("ItineraryHead", _ROBOT, _two, _window, "tentative with a bid, firm with its award, and a delay", _window),
     Row("ItineraryLeg", _ROBOT, lambda _: _MOST_LEGS, _window, "the most legs, of all these together", _window),
     Row(
-        "Progress", (KindCode.ROBOT, KindCode.LIFT), _two, lambda _: _SECOND_US // 2, "segments at top speed, and stops"
+        "Progress",
+        (KindCode.ROBOT, KindCode.LIFT),
+        _three,
+        lambda _: _SECOND_US // 2,
+        "segments at top speed; it stops, is at its place, and the next leg begins",
     ),
     Row("Blocked", _ALL, _one, _second, "a person or a sensor says so, once"),
     Row("Clear", _ALL, _one, _second, "the same"),

@@ -1,12 +1,17 @@
 """The graph under faults drawn by seed: every order is done all the same, and no checker finds anything."""
 
+from importlib.resources import files
+from pathlib import Path
+
 import pytest
 
 from bus_sim.campaign.profiles import draw_faults
+from bus_sim.cli import main as bus_sim
 from bus_sim.faults.injection import Injection
 from bus_sim.systems.graph.plant import make_plant
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play
+from onboard.cli import main as onboard
 from onboard.core.messages import Message
 from onboard.kinds.graph.messages import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, RobotMode, TurnSignal
 from onboard.trace.check.checks import Checks, Verdict
@@ -68,3 +73,12 @@ def _at(robot: int, behind: int, node: int) -> RobotAt:
 def test_each_checker_finds_what_it_is_for(rule: str, said: list[Message]) -> None:
     verdict = _verdict([(1_000_000 * number, one) for number, one in enumerate(said, 1)])
     assert verdict.counts[rule] == 1, verdict.lines()
+
+
+def test_a_log_of_a_graph_is_judged_by_the_rules_of_a_graph(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log, site = tmp_path / "graph.log", files("bus_sim") / "sites" / "graph.toml"
+    assert bus_sim(["run", "graph", "--trace", str(log)]) == 0
+    assert onboard(["trace", "check", str(log), "--site", str(site)]) == 0
+    said = capsys.readouterr().out
+    assert all(f"{rule.name} " in said for rule in RULES)
+    assert "held: every grant answers a signal" in said

@@ -31,6 +31,8 @@ class Body:
         self._plant = plant
         self._timers = plant.timers
         self._link = link
+        #: Whether the plant keeps it before the approach sensor (``GraphPlant.holds``).
+        self.is_held = False
         self._offset_mm = 0.0
         self._began_us: int | None = None
         self._sequence = 0
@@ -71,7 +73,7 @@ class Body:
         self._fresh_until_us = now_us + DRIVE_TIME_OUT_US
         self._order = message
         self._sequence = message.sequence
-        if self._began_us is None:
+        if self._began_us is None and not self.is_held:
             self._begin(message, now_us)
         self._watch()
 
@@ -108,7 +110,24 @@ class Body:
             self._pending.append(self._timers.call_at(when_us, self._at_sensor))
 
     def _at_sensor(self) -> None:
+        if self._plant.holds(self):
+            self._halt_here()
+            return
         self._link.send(ApproachSensor(self.machine.node_id, self.behind, self.node))
+
+    def go_on(self) -> None:
+        """The plant holds it no longer: past the sensor, if it was held there."""
+        if self.is_held:
+            self.is_held = False
+            self._link.send(ApproachSensor(self.machine.node_id, self.behind, self.node))
+            self._move(self._timers.now_us())
+            self._watch()
+
+    def _halt_here(self) -> None:
+        self.is_held = True
+        self._offset_mm, self._began_us = float(self.length_mm - self._plant.site.approach_mm), None
+        for timer in self._pending:
+            timer.cancel()
 
     def _at_end(self) -> None:
         """At the end of the edge: on, or into the node, or wait at the line."""

@@ -3,9 +3,10 @@
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
+from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
-from onboard.trace.check import cell, turning
+from onboard.trace.check import cell, graph, turning
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.checks import RULES, Checks
 from onboard.trace.check.rights import OneHolder
@@ -20,12 +21,14 @@ COMMON: tuple[type[Rule], ...] = (OneHolder, CallsClosed, BidsInTime, BidsGoDown
 SYSTEM_RULES: dict[str, tuple[type[Rule], ...]] = {
     "car-park": RULES,
     "cell": cell.RULES,
+    "graph": graph.RULES,
     "terminal": TERMINAL_RULES,
     "turning": turning.RULES,
 }
 #: What the systems add to the contracts of all.
 SYSTEM_MESSAGES: dict[str, tuple[type[Message], ...]] = {
     "cell": CELL_MESSAGES,
+    "graph": GRAPH_MESSAGES,
     "terminal": TERMINAL_MESSAGES,
     "turning": TURNING_MESSAGES,
 }
