@@ -43,9 +43,13 @@ class FleetTopics:
     def __init__(self, site: Site, settings: GatewaySettings) -> None:
         self.site = site
         self.picture = LivePicture(site)
-        self._settings = settings
+        self._epoch_us = settings.epoch_us
         self._words = Words(site)
         self._hour: int | None = None
+
+    def set_epoch(self, epoch_us: int) -> None:
+        """As of the publisher."""
+        self._epoch_us = epoch_us
 
     def feed(self, message: Message, now_us: int) -> Iterator[Told]:
         """Take up one message."""
@@ -185,7 +189,7 @@ class FleetTopics:
         return value
 
     def _wall_us(self, time_us: int) -> int:
-        return self._settings.epoch_us + time_us
+        return self._epoch_us + time_us
 
     def _at(self, time_us: int) -> str:
         return timestamp(self._wall_us(time_us))
