@@ -454,6 +454,7 @@ class Robot:
             effects.append(handled_record(step.work))
             if not taken:
                 self._done.append(step.work.call.task)
+                self.recovery.versions.pop(step.work.call.task, None)
             effects.append(self._report(step.work.call.task, phase, step.work.station.number))
         if step.action is LegAction.RIDE:
             floor = sill(self.fleet.site, step.track, step.to_index).track
