@@ -41,6 +41,26 @@ class Mapd(Site):
         """Where robots may stand for ever: homes first, then endpoints, as many as shut nobody in."""
         return lasting_rests(self.floor, [*self.homes.values(), *self.endpoints], self.endpoints)
 
+    @property
+    def step_us(self) -> int:
+        """How long a step takes at least, in us."""
+        return self.step_ms * 1000
+
+    @property
+    def bid_window_us(self) -> int:
+        """How long bids for a step may come, in us: two fifths of it. Ours."""
+        return self.step_us * 2 // 5
+
+    @property
+    def travel_us(self) -> int:
+        """How long a body takes to the next cell, in us: half a step. Ours."""
+        return self.step_us // 2
+
+    @cached_property
+    def desk(self) -> int:
+        """Node-ID of the order desk."""
+        return min(node for node, one in self.machines.items() if one.kind is KindCode.DESK)
+
     @cached_property
     def robots(self) -> tuple[int, ...]:
         """Node-IDs of the robots, lowest first."""
