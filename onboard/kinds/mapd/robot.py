@@ -213,7 +213,8 @@ class UnitRobot(Plain):
             task = self._served[0] if served else self.task
             self._said = StepState(self.fleet.node_id, self.step, body.cell, task, body.task != NO_TASK, served)
             self.knowledge.on_state(self._said)
-            self._ask_us = now_us + ASK_US
+            # The others may still be on their way, and the desk keeps to its pace.
+            self._ask_us = now_us + self.site.step_us + ASK_US
             effects.append(Send(self._said))
         missing = [*self.knowledge.behind(self.step), *self.knowledge.pathless()]
         if not missing and self.round is not None and self.round.step == self.step:
@@ -280,7 +281,7 @@ class UnitRobot(Plain):
         """Ask those who are missed, once everything else has been there for a while."""
         if self._ask_us is None or now_us < self._ask_us:
             return []
-        self._ask_us = now_us + ASK_US + (self.site.step_us if nodes == [self.site.desk] else 0)
+        self._ask_us = now_us + ASK_US
         others = [node for node in dict.fromkeys(nodes) if node != self.fleet.node_id]
         return [Send(SyncRequest(self.fleet.node_id, node)) for node in others[:ASK_AT_ONCE]]
 
