@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from onboard.core.effects import Actuate, Effect
 from onboard.core.serial import successor
-from onboard.kinds.mapd.messages import NO_TASK, CartAction, CartOrder, CartState
+from onboard.kinds.mapd.messages import CartAction, CartOrder, CartState
 
 #: An order that is not taken up is said again after this, us (dbc/mapd.dbc).
 ORDER_AGAIN_US = 500_000
@@ -40,14 +40,3 @@ class Cart:
         assert self._order is not None
         self.again_us = now_us + ORDER_AGAIN_US
         return [Actuate(self._order)]
-
-    def work_at(self, cell: int, task: int, pickup: int, delivery: int, step: int, now_us: int) -> list[Effect] | None:
-        """Load at the pick-up, unload at the delivery; None where there is nothing to do, [] while it is being done."""
-        assert self.state is not None
-        if task == NO_TASK or self.state.moving or self.state.cell != cell:
-            return None
-        if self.state.task == NO_TASK and cell == pickup:
-            return self.order(CartAction.LOAD, cell, task, step, now_us)
-        if self.state.task == task and cell == delivery:
-            return self.order(CartAction.UNLOAD, cell, task, step, now_us)
-        return None

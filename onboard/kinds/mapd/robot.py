@@ -218,7 +218,9 @@ class UnitRobot(Plain):
             effects.append(Send(self._said))
         missing = [*self.knowledge.behind(self.step), *self.knowledge.pathless()]
         if not missing and self.round is not None and self.round.step == self.step:
-            if len(self.knowledge.open_tasks) == self.round.open_tasks:
+            same = len(self.knowledge.open_tasks) == self.round.open_tasks
+            # Once the round is closed others may have gone on and picked up: the number is of no use any more.
+            if same or self.turns.is_complete or not self.round.bidding:
                 return effects + self._enter(Phase.BID if self.round.bidding else Phase.MOVE)
             asked = self._ask([self.site.desk], now_us)
             if asked:
@@ -254,9 +256,13 @@ class UnitRobot(Plain):
                 continue
             if robot != me:
                 return effects + self._ask([robot], now_us)
-            if missing := self.knowledge.pathless():
+            won = self.turns.takes(me)
+            missing = self.knowledge.pathless()
+            if won not in (NO_TASK, *self.knowledge.tasks):
+                missing.append(self.site.desk)
+            if missing:
                 return effects + self._ask(missing, now_us)
-            effects += self._plan(self.turns.takes(me))
+            effects += self._plan(won)
         return effects + self._enter(Phase.MOVE)
 
     def move(self, now_us: int) -> list[Effect]:

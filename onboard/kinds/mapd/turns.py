@@ -28,11 +28,6 @@ class Turns:
         """Robots that plan, first ones first."""
         return [award.robot for _, award in sorted(self.awards.items()) if award.robot]
 
-    def task_of(self, robot: int) -> int | None:
-        """What a robot has now: a task, ``NO_TASK``, or None where nothing has changed for it."""
-        return next((award.task for award in self.awards.values() if award.robot == robot), None)
-
     def takes(self, robot: int) -> int:
         """The task that a robot has won in this step, ``NO_TASK`` for none."""
-        task = self.task_of(robot)
-        return NO_TASK if task is None else task
+        return next((award.task for award in self.awards.values() if award.robot == robot), NO_TASK)
