@@ -314,19 +314,20 @@ def _faults(args: argparse.Namespace) -> list[AnyFault]:
 def _system_options(args: argparse.Namespace, site: Site) -> SystemOptions:
     """The options for a system that is no car park. Raises ``OptionError`` for one that only a car park has."""
     usual = build_parser().parse_args(["run"])
-    taken = {"command", "site", "seed", "speed", "limit_s", "trace", "devices", "json", "fault"}
+    taken = {"command", "site", "seed", "speed", "limit_s", "trace", "devices", "json", "fault", "web", "no_web"}
     for name, value in vars(args).items():
         if name not in taken and value != getattr(usual, name):
             option = f"--{name.removesuffix('_s').replace('_', '-')}"
             raise OptionError(f"{option}: only a car park has it, and {site.name} is a {site.system}; leave it out")
     return SystemOptions(
         seed=args.seed,
-        speed=_speed(args.speed),
+        speed=HAND_SPEED if args.speed is None and args.web is not None else _speed(args.speed),
         limit_s=args.limit_s,
         trace=args.trace,
         devices=args.devices,
         json=args.json,
         faults=tuple(_faults(args)),
+        web=_web(args),
     )
 
 

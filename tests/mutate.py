@@ -72,32 +72,34 @@ def _judge(row: Row, copies: Queue[Path]) -> str | None:
     whole = file.read_text(encoding="utf-8")
     try:
         file.write_text(whole.replace(row.mutation.old, row.mutation.new), encoding="utf-8")
-        status = _run(row.test, copy)
+        status, why = _run(row.test, copy)
     finally:
         file.write_text(whole, encoding="utf-8")
         copies.put(copy)
     verdict = "found" if status in (_FAILED, None) else f"SURVIVED (pytest's status {status})"
-    print(f"{row.name}  {verdict:8}  {row.mutation.file}  {row.test}", flush=True)
+    print(f"{row.name}  {verdict:8}  {row.mutation.file}  {row.test}\n     {why}", flush=True)
     return (
         None if status in (_FAILED, None) else f"{row.name}: {row.test} does not fail with the mutation of {file.name}"
     )
 
 
-def _run(test: str, copy: Path) -> int | None:
-    """Pytest's status; None after a time-out."""
+def _run(test: str, copy: Path) -> tuple[int | None, str]:
+    """Pytest's status, None after a time-out; and the first error that it tells, to judge by whether it is the one."""
     words = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
     try:
         run = subprocess.run(
             words,
             cwd=copy,
-            env={**os.environ, "PYTHONPATH": str(copy)},
+            env={**os.environ, "PYTHONPATH": str(copy), "COLUMNS": "200"},
             capture_output=True,
             check=False,
             timeout=LIMIT_S,
+            text=True,
         )
     except subprocess.TimeoutExpired:
-        return None
-    return run.returncode
+        return None, f"not over after {LIMIT_S} s"
+    told = [line[1:].strip() for line in run.stdout.splitlines() if line.startswith("E ")]
+    return run.returncode, next(iter(told), run.stdout.strip().rpartition("\n")[2])[:160]
 
 
 if __name__ == "__main__":

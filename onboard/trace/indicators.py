@@ -90,7 +90,8 @@ class FleetIndicators:
 
     def lines(self) -> list[str]:
         """The indicators as a person reads them."""
-        replans = ", ".join(f"{why} {count}" for why, count in self.replans.items()) or "none"
+        whys = ((count, *key.split(", ", 1)) for key, count in self.replans.items())
+        replans = ", ".join(f"{count} other {what} ({why})" for count, what, why in whys) or "none"
         slack = self.slack
         told = f"mean {slack.mean_s:+.1f} s   95 % at least {slack.p95_s:+.1f}   worst {slack.worst_s:+.1f}"
         text = [

@@ -123,9 +123,21 @@ def test_p43_mrlambda_waits_clearance_places_behind_mralpha_and_follows(clearanc
     ]
     waits = [leg for leg in route.legs if leg.action is LegAction.STAND and leg.track == 5]
     assert [leg.from_index for leg in waits] == [waits_at]
-    # Row P38: MRalpha still works at p(5,8) when it comes, and waiting for that beats every other way.
+    # MRalpha still works at p(5,8) when it comes.
     taken = alpha_plan(FAST).legs[4].end_ms * 1000
     assert waits[0].begin_us < taken < waits[0].end_us
+
+
+@pytest.mark.parametrize("clock", [FAST, REAL])
+def test_p38_waiting_for_mralpha_beats_every_way_around_it(clock: Clock) -> None:
+    """Whatever leads to the fifth floor by the right lift is over later, though it stands less."""
+    route = follow(clock, 4)
+    assert any(leg.action is LegAction.STAND and leg.track == 5 for leg in route.legs)
+    around = [
+        follow(clock, 4, *(place for ride in rides for place in (aboard(ride, ride.from_floor), aboard(ride, 5))))
+        for rides in ((Ride(RIGHT, 1, 5),), (Ride(LEFT, 1, 3), Ride(RIGHT, 3, 5)))
+    ]
+    assert route.finish_us + 2 * SECOND < min(one.finish_us for one in around)
 
 
 @pytest.mark.parametrize("clearance", [3, 4])

@@ -1,12 +1,14 @@
 """What the controllers of a run did with tokens and calls, as steps of the models. Nothing here judges them."""
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
 
 from onboard.core.authority import TokenBook, TokenKey, genesis_holder
+from onboard.core.codes import TokenKind
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import Bid, TokenGrant, TokenHeld
 from onboard.core.negotiation.initiator import Event as InitiatorEvent
@@ -25,6 +27,21 @@ _INITIATOR_STEPS = {
     InitiatorEvent.FORFEIT: "given_back()",
     InitiatorEvent.ABANDON: "abandon()",
 }
+
+
+def _memory(book: TokenBook, key: TokenKey, node: int) -> str:
+    """What a book remembers of a token, as the step that asks the model for the same."""
+    leaving = book.leaving[key].version if key in book.leaving else 0
+    at_first = key not in book.seen and genesis_holder(book.site, key) == book.node_id
+    holds = str(key in book.held or at_first).lower()
+    return f"expect({node}, {holds}, {book.seen.get(key, 0)}, {leaving})"
+
+
+def _is_about(key: TokenKey, entry: Mapping[str, str | int]) -> bool:
+    kinds = ("token_held", "token_given", "token_gone")
+    return entry.get("record") in kinds and (entry["kind"], entry["number"]) == (int(key.kind), key.number)
+
+
 _WAITING = (State.WAITING_BOUND, State.WAITING_COST, State.ASKING)
 Call = tuple[int, int]
 
@@ -35,6 +52,9 @@ class Recorder:
 
     tokens: dict[TokenKey, list[str]] = field(default_factory=dict)
     calls: dict[Call, list[str]] = field(default_factory=dict)
+    #: Which machine, by number, took each step of ``tokens``, and how often each token's machines crashed.
+    doers: dict[TokenKey, list[int]] = field(default_factory=dict)
+    crashes: Counter[TokenKey] = field(default_factory=Counter)
     nodes: dict[object, list[int]] = field(default_factory=dict)
     costs: dict[Call, dict[int, int]] = field(default_factory=dict)
     heard: dict[Call, set[tuple[int | str, int]]] = field(default_factory=dict)
@@ -50,6 +70,7 @@ class Recorder:
         """Listen to every token book and negotiation until the patch is undone."""
         for name in ("give", "on_grant", "on_held"):
             patch.setattr(TokenBook, name, self._token_listener(getattr(TokenBook, name)))
+        patch.setattr(TokenBook, "replay", self._restart_listener(TokenBook.replay))
         patch.setattr(Participant, "_fire", self._participant_listener(Participant._fire))
         patch.setattr(Initiator, "_fire", self._initiator_listener(Initiator._fire))
         patch.setattr(Participant, "on_bid", self._bid_listener(Participant.on_bid))
@@ -83,16 +104,49 @@ class Recorder:
         else:
             steps.append(f"learn({node}, {what.version}, {self.index(key, what.holder)})")
         for effect in effects:
-            if isinstance(effect, Record):
+            if isinstance(effect, Record) and str(effect.entry["record"]).startswith("token_"):
+                # Of what goes to the journal with a token, such as the place of a car, the model knows nothing.
                 name = str(effect.entry["record"]).removeprefix("token_")
                 steps.append(f"record_{name}({node})")
             elif isinstance(effect, Send) and isinstance(effect.message, TokenGrant):
                 steps.append(f"send_grant({node})")
             elif isinstance(effect, Send) and isinstance(effect.message, TokenHeld):
                 steps.append(f"state_held({node})")
-        leaving = book.leaving[key].version if key in book.leaving else 0
-        holds = str(key in book.held).lower()
-        steps.append(f"expect({node}, {holds}, {book.seen[key]}, {leaving})")
+        steps.append(_memory(book, key, node))
+        doers = self.doers.setdefault(key, [])
+        doers += [node] * (len(steps) - len(doers))
+
+    def _restart_listener(self, replay: Callable[..., None]) -> Callable[..., None]:
+        def listen(book: TokenBook, entries: Iterable[Mapping[str, str | int]]) -> None:
+            entries = list(entries)
+            replay(book, entries)
+            for key in self.tokens:
+                if book.node_id in self.nodes[key]:
+                    self._restarted(book, key, [one for one in entries if _is_about(key, one)])
+
+        return listen
+
+    def _restarted(self, book: TokenBook, key: TokenKey, entries: list[Mapping[str, str | int]]) -> None:
+        """Steps are noted when they are decided: what was not durable at the crash, and all after it, was not done.
+
+        Frames that would have followed the last durable record may have left or not; the model allows for both.
+        """
+        node = self.nodes[key].index(book.node_id)
+        # A car's first record is its creation, with which the model begins.
+        made = key.kind is TokenKind.CAR and any(
+            (one["record"], one["version"]) == ("token_held", 1) for one in entries
+        )
+        durable = len(entries) - made
+        done: list[tuple[int, str]] = []
+        records = 0
+        for doer, step in zip(self.doers[key], self.tokens[key], strict=True):
+            records += doer == node and step.startswith("record_")
+            if doer != node or records <= durable:
+                done.append((doer, step))
+        assert records >= durable, f"node {book.node_id} has journalled more of {key} than it decided"
+        done += [(node, f"crash({node})"), (node, f"restart({node})"), (node, _memory(book, key, node))]
+        self.doers[key], self.tokens[key] = [doer for doer, _ in done], [step for _, step in done]
+        self.crashes[key] += 1
 
     # --- calls -------------------------------------------------------------------------------------------------
 

@@ -8,7 +8,7 @@ from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.sites import find_site
 from onboard.core.negotiation import participant
 from tests.models.recorder import Call, Recorder
-from tests.models.spin import NEGOTIATION, first_refused
+from tests.models.refused import refused_calls
 from tests.system.scene import play, stays
 
 
@@ -19,16 +19,7 @@ def _refused(folder: Path, seed: int) -> tuple[int, dict[Call, str]]:
     with pytest.MonkeyPatch.context() as patch:
         recorder.attach(patch)
         play(find_site("small"), stays((0, 120)), seed=seed, limit_s=240, faults=faults, extra_s=0)
-    refused = {}
-    for call, steps in recorder.calls.items():
-        nodes, costs = recorder.nodes.get(call, [0]), recorder.costs.get(call, {})
-        # Lower cost, then lower node-ID; who did not bid comes last.
-        order = sorted(range(len(nodes)), key=lambda i: (i not in costs, costs.get(i, 0), nodes[i]))
-        begin = "; ".join(["begin()", *(f"rank[{i}] = {place}" for place, i in enumerate(order))])
-        step = first_refused(folder, NEGOTIATION, steps, begin, f"MACHINES={len(nodes)}", "LOSSES=200")
-        if step is not None:
-            refused[call] = step
-    return len(recorder.calls), refused
+    return len(recorder.calls), refused_calls(folder, recorder)
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

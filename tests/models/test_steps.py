@@ -7,10 +7,9 @@ import pytest
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.sites import find_site
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.codes import TokenKind
 from onboard.core.effects import Effect
 from tests.models.recorder import Recorder
-from tests.models.spin import TOKEN, first_refused
+from tests.models.refused import refused_tokens
 from tests.system.scene import play, stays
 
 
@@ -24,16 +23,7 @@ def _refused(folder: Path, seed: int) -> tuple[int, dict[TokenKey, str]]:
     with pytest.MonkeyPatch.context() as patch:
         recorder.attach(patch)
         play(find_site("small"), stays((0, 120)), seed=seed, limit_s=240, faults=faults, extra_s=0)
-    refused = {}
-    for key, steps in list(recorder.tokens.items())[:12]:
-        begin = "holds[0] = true; kept_holds[0] = true"
-        if key.kind is TokenKind.CAR:
-            # A car's token begins with version 1, all others without one.
-            begin += "; seen[0] = 1; kept_seen[0] = 1; stated[AT(1, 0)] = true"
-        sizes = (f"NODES={len(recorder.nodes[key])}", "VERSIONS=60")
-        step = first_refused(folder, TOKEN, steps, begin, *sizes)
-        if step is not None:
-            refused[key] = step
+    refused = refused_tokens(folder, recorder, most=12)
     return sum(map(len, recorder.tokens.values())), refused
 
 

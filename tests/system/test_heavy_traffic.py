@@ -7,7 +7,7 @@ import pytest
 from bus_sim.demand import Demand
 from bus_sim.sites import find_site
 from onboard.core.codes import Grade, TaskPhase
-from onboard.core.messages import Itinerary, Stamp, TaskReport
+from onboard.core.messages import Bid, Itinerary, Stamp, TaskReport
 from tests.system.scene import Scene, play
 
 CARS = 14
@@ -32,6 +32,16 @@ def test_p44_everybody_is_served_and_the_machines_never_stand_still(rush: Scene)
 def test_p18_load_spreads_over_all_robots(rush: Scene) -> None:
     owners = {m.sender for _, m in rush.all(TaskReport, "fleet") if m.phase is TaskPhase.DONE}
     assert owners == {11, 12, 13, 14}
+
+
+def test_p08_bids_of_every_call_strictly_improve_in_the_log(rush: Scene) -> None:
+    """A later bid is earlier, or as early and from a lower node-ID; the second best speaks only if the best is late."""
+    by_call: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for _, bid in rush.all(Bid, "fleet"):
+        by_call.setdefault((bid.initiator, bid.call), []).append((bid.cost, bid.sender))
+    contested = [bids for bids in by_call.values() if len(bids) > 1]
+    assert len(contested) >= 3, "else this says little"
+    assert all(later < earlier for bids in contested for earlier, later in pairwise(bids))
 
 
 def test_plans_are_told_anew_with_other_times_and_keep_their_stamp(rush: Scene) -> None:

@@ -1,4 +1,13 @@
-"""One image on every machine, nobody above another (row P01); what a task costs is each kind's own (row P21)."""
+"""One image on every machine, nobody above another (row P01), each by itself on the bus (row P19).
+
+What a task costs is each kind's own (row P21).
+"""
+
+import dataclasses
+import gc
+import itertools
+from enum import Enum
+from types import BuiltinFunctionType, CodeType, FunctionType, GetSetDescriptorType, MemberDescriptorType, ModuleType
 
 import pytest
 
@@ -11,7 +20,7 @@ from onboard.core.messages import Award, CallForProposals, Heartbeat, Reference,
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms
-from onboard.core.site import Segment
+from onboard.core.site import Segment, Site
 from onboard.kinds.car_park.bay_generation import BayGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.program import Program, Step, to_itinerary
@@ -68,6 +77,42 @@ def test_p01_a_machine_dies_and_the_others_park_the_car(name: str) -> None:
     scene.first(TaskReport, lambda m: m.task == award.task and m.phase is TaskPhase.DONE)
     summary = scene.simulation.plant.street.summary()
     assert (summary.parked, summary.inside) == (1, 1)
+
+
+# --- row P19 ---------------------------------------------------------------------------------------------------------
+
+#: What never changes once the program runs; a site is frozen.
+_FIXED = (Enum, str, bytes, int, float, property, Site, type, ModuleType, CodeType, FunctionType, BuiltinFunctionType)
+_SLOTS = (GetSetDescriptorType, MemberDescriptorType)
+
+
+def changeable(root: object) -> dict[int, object]:
+    """Everything that can be reached from an object and could be changed, by identity."""
+    seen: dict[int, object] = {}
+    ahead = [root]
+    while ahead:
+        one = ahead.pop()
+        if id(one) not in seen and one is not None and not isinstance(one, (*_FIXED, *_SLOTS)):
+            seen[id(one)] = one
+            ahead += gc.get_referents(one)
+    return {number: one for number, one in seen.items() if not is_frozen(one)}
+
+
+def is_frozen(one: object) -> bool:
+    """Whether an object itself cannot change, whatever it holds."""
+    if dataclasses.is_dataclass(one):
+        return bool(getattr(type(one), "__dataclass_params__").frozen)  # noqa: B009  # not in the stubs
+    return isinstance(one, tuple | frozenset) or type(one).__name__ in ("method", "cell")
+
+
+def test_p19_machines_have_nothing_in_common_but_the_bus(whole: Scene) -> None:
+    """In one process they could pass each other notes: no two controllers reach one thing that can change."""
+    reached = {node: changeable(one.holon) for node, one in whole.simulation.controllers.items()}
+    assert len(reached) == len(SITE.machines)
+    for first, second in itertools.combinations(reached, 2):
+        common = [type(reached[first][number]).__name__ for number in reached[first].keys() & reached[second].keys()]
+        assert not common, f"nodes {first} and {second} share {common}"
+        assert {"Mirror", "Negotiation", "TokenBook"} <= {type(one).__name__ for one in reached[first].values()}
 
 
 # --- row P21 ---------------------------------------------------------------------------------------------------------

@@ -85,7 +85,7 @@ CALL = CallForProposals(
         ),
     ],
 )  # fmt: skip
-def test_a_message_is_one_line_in_the_words_of_the_site(
+def test_p31_a_message_is_one_line_in_the_words_of_the_site(
     message: Message, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["dump", str(_log(tmp_path / "one.log", message)), "--decode", "--site", str(SITE)]) == 0

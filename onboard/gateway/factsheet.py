@@ -1,0 +1,105 @@
+"""The message `factsheet` of one mobile machine (VDA 5050 2.1, section 7): what its site file tells of its kind.
+
+A site file names no width and no height of a carrier: they are told as 0, which no vehicle has. A system that names
+no masses or speeds tells them as 0 as well.
+"""
+
+from dataclasses import dataclass
+
+from onboard.core.site import Machine, Site
+from onboard.gateway.dialect import Dialect, Json
+from onboard.gateway.settings import GatewaySettings
+from onboard.kinds.car_park.site import CarPark
+from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph
+
+#: Largest payload taken, bytes; see onboard/gateway/inbox.
+MOST_BYTES = 65_536
+
+
+@dataclass(frozen=True, slots=True)
+class _Body:
+    """Speed m/s, acceleration m/s^2, length m, most load kg; 0 where the site file is silent."""
+
+    speed: float = 0.0
+    acceleration: float = 0.0
+    length: float = 0.0
+    load: float = 0.0
+
+
+def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewaySettings) -> Json:
+    """The body of a `factsheet` message, in the keys of the version."""
+    body = _body(site)
+    kinematic, navigation = (
+        ("DIFFERENTIAL", "VIRTUAL_LINE_GUIDED") if dialect.is_third else ("DIFF", "VIRTUAL_LINE_GUIDED")
+    )
+    told: Json = {
+        "typeSpecification": {
+            "seriesName": f"{site.system}-{machine.kind.name.lower()}",
+            "seriesDescription": f"{machine.kind.name.lower()} of a {site.system}, controlled by its own holon",
+            "agvKinematic": kinematic,
+            "agvClass": "CARRIER",
+            "maxLoadMass": body.load,
+            "localizationTypes": ["SPOT"],
+            "navigationTypes": [navigation],
+        },
+        "physicalParameters": {
+            "speedMin": 0.0,
+            "speedMax": body.speed,
+            "accelerationMax": body.acceleration,
+            "decelerationMax": body.acceleration,
+            "heightMin": 0.0,
+            "heightMax": 0.0,
+            "width": 0.0,
+            "length": body.length,
+        },
+        "protocolLimits": {
+            "maxStringLens": {"msgLen": MOST_BYTES, "idLen": 64},
+            "maxArrayLens": {"order.nodes": MAX_STOPS if isinstance(site, FactoryGraph) else 0, "instantActions": 8},
+            "timing": {
+                "minOrderInterval": 1.0,
+                "minStateInterval": settings.least_state_us / 1e6,
+                "defaultStateInterval": settings.state_us / 1e6,
+                "visualizationInterval": settings.visualization_us / 1e6,
+            },
+        },
+        "protocolFeatures": {"optionalParameters": [], "agvActions": _actions(dialect, site)},
+        "agvGeometry": {},
+        "loadSpecification": _loads(site),
+    }
+    renamed: Json = dialect.renamed(told)
+    return renamed
+
+
+def _body(site: Site) -> _Body:
+    if isinstance(site, CarPark):
+        axis = site.carrier
+        return _Body(
+            axis.speed_mm_s / 1000,
+            axis.acceleration_mm_s2 / 1000,
+            site.carrier_length_mm / 1000,
+            float(site.cars.max_load_kg),
+        )
+    if isinstance(site, FactoryGraph):
+        return _Body(speed=site.speed_mm_s / 1000)
+    return _Body()
+
+
+def _loads(site: Site) -> Json:
+    if not isinstance(site, CarPark):
+        return {}
+    limits = site.cars
+    dimensions = {"length": limits.max_length_mm / 1000, "width": 0.0, "height": limits.max_height_mm / 1000}
+    one = {"setName": "car", "loadType": "car", "loadDimensions": dimensions, "maxWeight": float(limits.max_load_kg)}
+    return {"loadSets": [one]}
+
+
+def _actions(dialect: Dialect, site: Site) -> list[Json]:
+    """Instant actions that are carried out, and what machines do by themselves; see onboard/gateway/actions."""
+    found = [_action(dialect, "stateRequest", "a state is told at once")]
+    found.append(_action(dialect, "factsheetRequest", "the factsheet is told again"))
+    return found
+
+
+def _action(dialect: Dialect, kind: str, description: str) -> Json:
+    extra: Json = {"pauseAllowed": False, "cancelAllowed": False} if dialect.is_third else {}
+    return {"actionType": kind, "actionDescription": description, "actionScopes": ["INSTANT"], **extra}

@@ -1,0 +1,211 @@
+"""The fleet's own topics in JSON: tasks, calls with their bids, indicators, events with reason codes, fixed machines.
+
+docs/mqtt.md describes every topic and key. Times are ISO 8601 in UTC; what the page tells of a call
+(``onboard/web/picture``) is told here too, its times under the same names without ``_us``.
+"""
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import Any
+
+from onboard.core.codes import CallResult, KindCode, Operation, Reason, TaskPhase
+from onboard.core.messages import Award, CallForProposals, Heartbeat, Message, Progress, Reference, TaskReport
+from onboard.core.site import Segment, Site
+from onboard.gateway.dialect import Json, timestamp
+from onboard.gateway.machines import TRAVELLERS
+from onboard.gateway.settings import GatewaySettings
+from onboard.gateway.state import reference_text
+from onboard.kinds.graph.site import FactoryGraph
+from onboard.kinds.terminal.site import Terminal
+from onboard.trace.view import CallRecord
+from onboard.trace.words import Words
+from onboard.web.picture import LivePicture
+
+#: Calls for a whole task; all others are for a part of one, or for room.
+WHOLE = (Operation.PARK, Operation.RETRIEVE, Operation.TRANSPORT, Operation.REACH, Operation.MACHINE)
+#: Words of a task's life (docs/mqtt.md) by its phase.
+LIFE = {
+    TaskPhase.OPEN: "called",
+    TaskPhase.AWARDED: "awarded",
+    TaskPhase.STARTED: "moving",
+    TaskPhase.LOADED: "moving",
+    TaskPhase.DONE: "done",
+    TaskPhase.REFUSED: "refused",
+    TaskPhase.FORFEITED: "given back",
+}
+#: Topic below the site's, and its content.
+Told = tuple[str, Json]
+
+
+class FleetTopics:
+    """Feed it every message of the fleet bus in order; each call answers with what is to be told."""
+
+    def __init__(self, site: Site, settings: GatewaySettings) -> None:
+        self.site = site
+        self.picture = LivePicture(site)
+        self._epoch_us = settings.epoch_us
+        self._words = Words(site)
+        self._hour: int | None = None
+
+    def set_epoch(self, epoch_us: int) -> None:
+        """As of the publisher."""
+        self._epoch_us = epoch_us
+
+    def feed(self, message: Message, now_us: int) -> Iterator[Told]:
+        """Take up one message."""
+        before = self._phase(message)
+        self.picture.count_frame()
+        self.picture.feed(message, now_us)
+        match message:
+            case CallForProposals():
+                yield from self._on_call(message, now_us)
+            case Award() if message.result is not CallResult.OPTION:
+                yield from self._on_award(message, now_us)
+            case TaskReport() if before is not message.phase:
+                yield from self._on_report(message, now_us)
+            case Heartbeat() | Progress() if not self._is_mobile(message.sender):
+                yield from self._fixed(message.sender, now_us)
+        reason = _reason(message)
+        if reason is not None and not isinstance(message, Award | TaskReport):
+            yield "event", self._event(message, reason, now_us)
+
+    def indicators(self, now_us: int) -> Json:
+        """The indicators since the hour began, or since this began to listen."""
+        hour = self._wall_us(now_us) // 3_600_000_000
+        if hour != self._hour:
+            if self._hour is not None:
+                self.picture.indicators.begin(now_us)
+            self._hour = hour
+        return {"at": self._at(now_us), **self.picture.indicators.figures(now_us).to_json()}
+
+    def task(self, reference: Reference, now_us: int) -> Json:
+        """How a task stands."""
+        view = self.picture.view
+        told: Json = {"at": self._at(now_us), "task": reference_text(reference)}
+        record = view.tasks.get(reference)
+        if record is None:
+            return told
+        told |= {"what": record.operation.name.lower(), "phase": LIFE[record.phase], "calls": record.calls}
+        if record.owner:
+            told["owner"] = view.name(record.owner)
+        call = next((one for one in reversed(view.calls.values()) if one.call.task == reference), None)
+        if call is not None:
+            shown = self._call(call)
+            told |= {key: shown[key] for key in ("car", "from", "to") if shown[key] is not None}
+            promised: Json = next((bid["cost"] for bid in reversed(shown["bids"]) if bid["by"] == shown["winner"]), {})
+            if "end_us" in promised:
+                told["promised"] = self._at(promised["end_us"])
+        return told
+
+    def place(self, number: int) -> str | None:
+        """A station as the site's own topics name it: a node of a graph, an entity of a terminal, a place."""
+        if isinstance(self.site, FactoryGraph):
+            return str(number)
+        if isinstance(self.site, Terminal):
+            return self.site.entities[number].name if number in self.site.entities else None
+        return self._words.station(number)
+
+    def operation_of(self, reference: Reference) -> Operation | None:
+        """What a task asks for, where its call was heard."""
+        record = self.picture.view.tasks.get(reference)
+        return record.operation if record is not None else None
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _on_call(self, call: CallForProposals, now_us: int) -> Iterator[Told]:
+        record = self.picture.view.calls[call.sender, call.call]
+        if record.opened_us != now_us:
+            return
+        yield "call", self._stamped({"at_us": now_us, **self._call(record)})
+        if call.operation in WHOLE:
+            yield "task", self.task(call.task, now_us)
+
+    def _on_award(self, award: Award, now_us: int) -> Iterator[Told]:
+        record = self.picture.view.calls.get((award.sender, award.call))
+        if record is None or record.awards > 1:
+            return
+        told = self._call(record) | {"reason": award.reason.name, "code": int(award.reason)}
+        yield "call", self._stamped({"at_us": now_us, **told})
+        if record.call.operation in WHOLE:
+            yield "task", self.task(record.call.task, now_us)
+
+    def _on_report(self, report: TaskReport, now_us: int) -> Iterator[Told]:
+        operation = self.operation_of(report.task)
+        if operation is None or operation in WHOLE:
+            extra = {"phase": LIFE[report.phase], "by": self.picture.view.name(report.sender)}
+            yield "task", self.task(report.task, now_us) | extra | _coded(report.reason)
+
+    def _call(self, record: CallRecord) -> Json:
+        where = {"from": self.place(record.call.from_station), "to": self.place(record.call.to_station)}
+        return self.picture.call(record) | where
+
+    def _phase(self, message: Message) -> TaskPhase | None:
+        record = self.picture.view.tasks.get(message.task) if isinstance(message, TaskReport) else None
+        return record.phase if record is not None else None
+
+    def _is_mobile(self, node: int) -> bool:
+        machine = self.site.machines.get(node)
+        return machine is None or machine.kind in TRAVELLERS
+
+    def _fixed(self, node: int, now_us: int) -> Iterator[Told]:
+        """Elevators, compartments and all others that do not travel: state, and the floor of an elevator."""
+        machine, view = self.site.machines[node], self.picture.view
+        state = view.states.get(node)
+        told: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
+        if machine.kind is KindCode.LIFT:
+            segment, _ = view.positions[node]
+            floors = self.site.tracks[segment.track].joins if segment.track in self.site.tracks else ()
+            if 1 <= segment.index <= len(floors):
+                told["floor"] = floors[segment.index - 1].track
+        yield f"machine/{machine.name}", told
+
+    def _event(self, message: Message, reason: Reason, now_us: int) -> Json:
+        told: Json = {
+            "at": self._at(now_us),
+            "event": type(message).__name__,
+            "by": self.picture.view.name(message.sender),
+        }
+        names = {field.name for field in fields(message)}
+        if {"track", "index"} <= names:
+            told["segment"] = str(Segment(_number(message, "track"), _number(message, "index")))
+        for name in ("blocker", "count"):
+            if name in names:
+                told[name] = _number(message, name)
+        if told.get("blocker"):
+            told["blocker"] = self.picture.view.name(told["blocker"])
+        return told | _coded(reason) | {"text": self._words.message(message)}
+
+    def _stamped(self, value: Any) -> Any:
+        """The same with every time of the log as a time stamp, ``x_us`` as ``x``."""
+        if isinstance(value, dict):
+            return {
+                key.removesuffix("_us"): self._at(one)
+                if key.endswith("_us") and one is not None
+                else self._stamped(one)
+                for key, one in value.items()
+            }
+        if isinstance(value, list):
+            return [self._stamped(one) for one in value]
+        return value
+
+    def _wall_us(self, time_us: int) -> int:
+        return self._epoch_us + time_us
+
+    def _at(self, time_us: int) -> str:
+        return timestamp(self._wall_us(time_us))
+
+
+def _coded(reason: Reason) -> Json:
+    """A reason by its name and its number on the bus; nothing where there is none."""
+    return {"reason": reason.name, "code": int(reason)} if reason is not Reason.NONE else {}
+
+
+def _reason(message: Message) -> Reason | None:
+    found = getattr(message, "reason", None)
+    return found if isinstance(found, Reason) else None
+
+
+def _number(message: Message, name: str) -> int:
+    found = getattr(message, name)
+    assert isinstance(found, int)
+    return found

@@ -1,0 +1,160 @@
+"""What the fleet bus tells of each mobile machine, folded for one VDA 5050 state a machine."""
+
+from dataclasses import dataclass, field
+
+from onboard.core.codes import ANY_STATION, MOBILE_KINDS, CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.core.messages import (
+    Award,
+    Blocked,
+    CarAt,
+    Clear,
+    EmergencyStop,
+    Heartbeat,
+    Itinerary,
+    Message,
+    Reference,
+    TaskReport,
+    Waiting,
+)
+from onboard.core.site import Machine, Segment, Site
+from onboard.gateway.whereabouts import Tracker, Whereabouts, tracker_of
+
+#: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/core/presence.py).
+SILENT_BEATS = 3
+#: An arm stands where it is bolted down: it is no machine that VDA 5050 speaks of.
+TRAVELLERS = MOBILE_KINDS - {KindCode.ARM}
+#: Blocked segments that are told of; more than so many are one too many for a person as well.
+MOST_BLOCKED = 32
+_OVER = (TaskPhase.DONE, TaskPhase.REFUSED, TaskPhase.FORFEITED)
+
+
+@dataclass(slots=True)
+class TaskInHand:
+    """A machine's newest task. ``updates`` counts plans told for it; ``began`` nodes were passed before it."""
+
+    task: Reference
+    phase: TaskPhase
+    reason: Reason = Reason.NONE
+    updates: int = 0
+    began: int = 0
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing more is done for it."""
+        return self.phase in _OVER
+
+
+@dataclass(slots=True)
+class Body:
+    """One mobile machine."""
+
+    machine: Machine
+    heard_us: int | None = None
+    state: MachineState | None = None
+    task: TaskInHand | None = None
+    load: Reference | None = None
+    wait: Waiting | None = None
+    wait_us: int = 0
+
+
+@dataclass
+class Machines:
+    """A fold: feed every message of the fleet bus in order. ``changed`` are node-IDs whose state may be another."""
+
+    site: Site
+    bodies: dict[int, Body] = field(init=False)
+    blocked: dict[Segment, Blocked] = field(default_factory=dict)
+    emergency: EmergencyStop | None = None
+    changed: set[int] = field(default_factory=set)
+    #: Machines that said where they are since this was last emptied.
+    moved: set[int] = field(default_factory=set)
+    _tracker: Tracker = field(init=False)
+
+    def __post_init__(self) -> None:
+        mobile = sorted(node for node, one in self.site.machines.items() if one.kind in TRAVELLERS)
+        self.bodies = {node: Body(self.site.machines[node]) for node in mobile}
+        self._tracker = tracker_of(self.site)
+
+    def where(self, node_id: int) -> Whereabouts:
+        """Where a mobile machine is."""
+        return self._tracker.where(node_id)
+
+    def feed(self, message: Message, now_us: int) -> None:
+        """Take up one message."""
+        self._on_site(message)
+        body = self.bodies.get(message.sender)
+        if body is not None:
+            body.heard_us = now_us
+        if self._tracker.feed(message) and body is not None:
+            self.changed.add(message.sender)
+            self.moved.add(message.sender)
+            if self.where(message.sender).driving:
+                body.wait = None
+        match message:
+            case Heartbeat() if body is not None:
+                self._on_heartbeat(body, message)
+            case TaskReport() if body is not None:
+                self._on_report(body, message)
+            case CarAt():
+                self._on_car(message)
+            case Waiting() if body is not None:
+                body.wait, body.wait_us = message, now_us
+                self.changed.add(message.sender)
+            case Itinerary() if body is not None and body.task is not None:
+                body.task.updates += 1
+            case Award() if message.result is CallResult.WITHDRAWN:
+                self._on_withdrawal(message)
+
+    def is_silent(self, node_id: int, now_us: int) -> bool:
+        """Whether a machine was never heard, or not for three of its heartbeats."""
+        return self.bodies[node_id].heard_us is None or now_us >= self.silent_us(node_id)
+
+    def silent_us(self, node_id: int) -> int:
+        """When a machine that is not heard again counts as silent, us."""
+        return (self.bodies[node_id].heard_us or 0) + SILENT_BEATS * self.site.timing.heartbeat_us + 1
+
+    def _on_site(self, message: Message) -> None:
+        """What concerns all machines."""
+        match message:
+            case Blocked() if len(self.blocked) < MOST_BLOCKED:
+                self.blocked[Segment(message.track, message.index)] = message
+            case Clear():
+                self.blocked.pop(Segment(message.track, message.index), None)
+            case EmergencyStop():
+                self.emergency = message
+            case _:
+                return
+        self.changed.update(self.bodies)
+
+    def _on_heartbeat(self, body: Body, message: Heartbeat) -> None:
+        if body.state is not message.state:
+            body.state = message.state
+            self.changed.add(message.sender)
+        if message.state in (MachineState.IDLE, MachineState.WORKING) and self.emergency is not None:
+            # After an emergency stop only a machine that a person has started anew works again.
+            self.emergency = None
+            self.changed.update(self.bodies)
+
+    def _on_report(self, body: Body, report: TaskReport) -> None:
+        task = body.task
+        if task is None or task.task != report.task:
+            if report.phase in _OVER:
+                # A statement of what is over, after a restart or on being asked.
+                return
+            body.task = TaskInHand(report.task, report.phase, report.reason, began=self.where(report.sender).passed)
+        elif not task.is_over:
+            task.phase, task.reason = report.phase, report.reason
+        self.changed.add(report.sender)
+
+    def _on_withdrawal(self, award: Award) -> None:
+        for node, body in self.bodies.items():
+            if body.task is not None and body.task.task == award.task and not body.task.is_over:
+                body.task.phase, body.task.reason = TaskPhase.FORFEITED, award.reason
+                self.changed.add(node)
+
+    def _on_car(self, message: CarAt) -> None:
+        for node, body in self.bodies.items():
+            aboard = message.station == ANY_STATION and node == message.sender
+            if aboard != (body.load == message.car):
+                body.load = message.car if aboard else None
+                self.changed.add(node)

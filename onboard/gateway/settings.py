@@ -1,0 +1,57 @@
+"""What a person chooses about a gateway's topics and rates."""
+
+import re
+from dataclasses import dataclass
+
+from onboard.gateway.dialect import DIALECTS, Dialect
+
+#: Characters of a topic level: those of a serial number in VDA 5050 2.1, section 6.4.
+_LEVEL = re.compile(r"[A-Za-z0-9_.:-]+")
+
+
+class GatewayError(ValueError):
+    """A mistake in an option of the gateway; ``str`` is one line: option, value and remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class GatewaySettings:
+    """Topics, version and rates of a gateway; times in microseconds. The rates are ours where no source is named.
+
+    ``epoch_us`` is the wall time (us since 1970) at loop time 0, for the time stamps. ``serials`` names the machines
+    that are told of; empty for all of the site. ``node_id`` is the gateway's own on the bus, 251 to 255 (core/codes).
+    """
+
+    version: str = "2.1"
+    manufacturer: str = "onboard"
+    prefix: str = "onboard"
+    epoch_us: int = 0
+    serials: frozenset[str] = frozenset()
+    node_id: int = 255
+    #: A state at least so often (VDA 5050 2.1, section 6.10: 30 s).
+    state_us: int = 30_000_000
+    #: Two states of one machine are so far apart at least; changes between them are told together.
+    least_state_us: int = 200_000
+    visualization_us: int = 1_000_000
+    indicators_us: int = 60_000_000
+
+    def __post_init__(self) -> None:
+        """Raise ``GatewayError`` for a version that is not known or a name that cannot be a level of a topic."""
+        if self.version not in DIALECTS:
+            raise GatewayError(f"--vda5050 {self.version}: not known; one of {', '.join(DIALECTS)}")
+        for option, value in (("--manufacturer", self.manufacturer), ("--prefix", self.prefix)):
+            if not _LEVEL.fullmatch(value):
+                raise GatewayError(f"{option} {value!r}: not a level of a topic; letters, digits and _ . : - only")
+
+    @property
+    def dialect(self) -> Dialect:
+        """The version's words."""
+        return DIALECTS[self.version]
+
+    def tells_of(self, serial: str) -> bool:
+        """Whether a machine is one of those told of."""
+        return not self.serials or serial in self.serials
+
+
+def level(name: str) -> str:
+    """A machine's or site's name as a level of a topic: what is not allowed there becomes ``_``."""
+    return re.sub(r"[^A-Za-z0-9_.:-]", "_", name) or "_"
