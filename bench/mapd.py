@@ -2,8 +2,9 @@
 
     python bench/mapd.py [--robots N] [--rate TASKS_A_STEP] [--bus]
 
-By the robots' decision functions alone, or with ``--bus`` by their controllers on the virtual CAN bus. All 500 tasks of each file that ships. The times of Token Passing are those of Ma, Li, Kumar and Koenig (AAMAS 2017).
-Deterministic but for the processor time, which is given for all robots together: on board each plans for itself.
+By the robots' decision functions alone, or with ``--bus`` by their controllers on the virtual CAN bus. All 500 tasks of
+each file that ships. The times of Token Passing are those of Ma, Li, Kumar and Koenig (AAMAS 2017). Deterministic but
+for the processor time, which is given for all machines together: on board each plans for itself.
 """
 
 import argparse
@@ -74,14 +75,10 @@ def _on_the_bus(site: Mapd) -> tuple[float, int, int, str]:
             begun_us.setdefault(one.step, time_us)
     longest_us = max(later - earlier for earlier, later in pairwise(begun_us.values()))
     statistics = played.run.fleet.statistics()
-    more = f"  {statistics.frames} frames, load {100 * statistics.mean_load:.1f} % (worst second {100 * statistics.worst_second_load:.1f} %)"
     same = "as alone" if plant.served == alone.served else "NOT as alone"
-    return (
-        service,
-        max(plant.served.values()),
-        len(plant.served),
-        f"{more}, longest step {longest_us / 1e6:.2f} s, {same}",
-    )
+    loads = f"{100 * statistics.mean_load:.1f} % (worst second {100 * statistics.worst_second_load:.1f} %)"
+    more = f"  {statistics.frames} frames, load {loads}, longest step {longest_us / 1e6:.2f} s, {same}"
+    return service, max(plant.served.values()), len(plant.served), more
 
 
 if __name__ == "__main__":

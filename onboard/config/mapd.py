@@ -9,8 +9,18 @@ from onboard.config.reader import Table
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
 from onboard.kinds.mapd.messages import MOST_WAYS
-from onboard.kinds.mapd.rights import cell_station
-from onboard.kinds.mapd.site import FAR, FREE, Floor, Line, Mapd, Task, grid_floor, lasting_rests, network_floor
+from onboard.kinds.mapd.site import (
+    FAR,
+    FREE,
+    Floor,
+    Line,
+    Mapd,
+    Task,
+    cell_station,
+    grid_floor,
+    lasting_rests,
+    network_floor,
+)
 
 if TYPE_CHECKING:
     from onboard.config.systems import Common

@@ -8,8 +8,20 @@ from onboard.core.codes import KindCode
 from onboard.core.site import Site
 from onboard.kinds.mapd.auction import Task
 from onboard.kinds.mapd.floor import FAR, FREE, Floor, Line, grid_floor, lasting_rests, network_floor
+from onboard.kinds.mapd.rights import cell_station
 
-__all__ = ["FAR", "FREE", "Floor", "Line", "Mapd", "Task", "grid_floor", "lasting_rests", "network_floor"]
+__all__ = [
+    "FAR",
+    "FREE",
+    "Floor",
+    "Line",
+    "Mapd",
+    "Task",
+    "cell_station",
+    "grid_floor",
+    "lasting_rests",
+    "network_floor",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
