@@ -23,8 +23,6 @@ from onboard.web.picture import LivePicture
 
 #: Calls for a whole task; all others are for a part of one, or for room.
 WHOLE = (Operation.PARK, Operation.RETRIEVE, Operation.TRANSPORT, Operation.REACH, Operation.MACHINE)
-#: Calls and tasks that are over are remembered, the newest so many.
-KEPT = 256
 #: Words of a task's life (docs/mqtt.md) by its phase.
 LIFE = {
     TaskPhase.OPEN: "called",
@@ -48,7 +46,6 @@ class FleetTopics:
         self._epoch_us = settings.epoch_us
         self._words = Words(site)
         self._hour: int | None = None
-        self._closed = 0
 
     def set_epoch(self, epoch_us: int) -> None:
         """As of the publisher."""
@@ -138,10 +135,6 @@ class FleetTopics:
         yield "call", self._stamped({"at_us": now_us, **told})
         if record.call.operation in WHOLE:
             yield "task", self.task(record.call.task, now_us)
-        self._closed += 1
-        if self._closed >= KEPT:
-            self._closed = 0
-            self.picture.view.forget(KEPT)
 
     def _on_report(self, report: TaskReport, now_us: int) -> Iterator[Told]:
         operation = self.operation_of(report.task)

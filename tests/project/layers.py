@@ -94,7 +94,7 @@ LAYERS: dict[str, Layer] = {
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
-        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.trace", "onboard.web", "onboard.wire")
     ),
     # What is published is decided from the decoded bus alone; sessions, files and buses come in through ports.
     "onboard.gateway": Layer(
@@ -127,7 +127,8 @@ LAYERS: dict[str, Layer] = {
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
-    "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
+    # A bench starts the programs themselves.
+    "hil": Layer(("onboard", "onboard.cli", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
 }
 
 #: Libraries that exactly one file may know, because their interfaces move.

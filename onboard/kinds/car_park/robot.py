@@ -37,7 +37,7 @@ from onboard.core.serial import is_newer, to_bus_ms
 from onboard.core.site import Machine, Segment, Site, TrackKind
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.asking import AskingGeneration
-from onboard.kinds.car_park.generation import CarParkGeneration, Solution
+from onboard.kinds.car_park.generation import CarParkGeneration, Solution, weighed
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.going_around import GoingAround
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
@@ -220,7 +220,7 @@ class Robot:
             case PreAssigned(call_key=key, proposal=proposal):
                 (solution,) = proposal.program
                 self.generation.tentative[key] = solution
-                return []
+                return [Report(weighed(proposal.alternatives))]
             case Released(call_key=key):
                 self.generation.tentative.pop(key, None)
                 return []
