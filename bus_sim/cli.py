@@ -180,8 +180,8 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         "--bus",
         action="append",
         default=[],
-        metavar="INTERFACE:CHANNEL",
-        help="join the fleet bus with a python-can interface (repeatable)",
+        metavar="[MACHINE=]INTERFACE:CHANNEL",
+        help="join the fleet bus, or this machine's device bus, with a python-can interface (repeatable)",
     )
 
 
@@ -314,19 +314,20 @@ def _faults(args: argparse.Namespace) -> list[AnyFault]:
 def _system_options(args: argparse.Namespace, site: Site) -> SystemOptions:
     """The options for a system that is no car park. Raises ``OptionError`` for one that only a car park has."""
     usual = build_parser().parse_args(["run"])
-    taken = {"command", "site", "seed", "speed", "limit_s", "trace", "devices", "json", "fault"}
+    taken = {"command", "site", "seed", "speed", "limit_s", "trace", "devices", "json", "fault", "web", "no_web"}
     for name, value in vars(args).items():
         if name not in taken and value != getattr(usual, name):
             option = f"--{name.removesuffix('_s').replace('_', '-')}"
             raise OptionError(f"{option}: only a car park has it, and {site.name} is a {site.system}; leave it out")
     return SystemOptions(
         seed=args.seed,
-        speed=_speed(args.speed),
+        speed=HAND_SPEED if args.speed is None and args.web is not None else _speed(args.speed),
         limit_s=args.limit_s,
         trace=args.trace,
         devices=args.devices,
         json=args.json,
         faults=tuple(_faults(args)),
+        web=_web(args),
     )
 
 
@@ -334,7 +335,7 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
     faults = _faults(args)
     speed = _speed(args.speed)
     try:
-        parse_bus_specs(args.bus, 500_000)
+        parse_bus_specs(args.bus, 500_000, [machine.name for machine in site.machines.values()])
         processes = process_plan(args, site, args.site or DEFAULT_SITE, faults)
     except ValueError as error:
         raise OptionError(str(error)) from error

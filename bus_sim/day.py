@@ -229,9 +229,10 @@ class _Day:
         return summary
 
     def _page(self, where: str) -> AbstractAsyncContextManager[object]:
-        from bus_sim.web import Page, SimulatedSource  # noqa: PLC0415  # its libraries are an extra
+        from bus_sim.web.car_park import CarParkSource  # noqa: PLC0415  # its libraries are an extra
+        from bus_sim.web.page import Page  # noqa: PLC0415  # as above
 
-        return Page(SimulatedSource(self._simulation, self._zero), where, self._console)
+        return Page(CarParkSource(self._simulation, self._zero), where, self._console)
 
     async def _until(self, limit_us: int, show: TerminalShow, *, or_over: bool = False) -> None:
         street = self._simulation.plant.street

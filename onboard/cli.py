@@ -4,7 +4,7 @@ import argparse
 import asyncio
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from onboard import __version__
@@ -12,6 +12,7 @@ from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon, next_boot
+from onboard.io.broker_address import is_mqtt_installed
 from onboard.io.console import ConsoleTelemetry
 from onboard.io.journal import FileJournal
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
@@ -35,6 +36,8 @@ examples:
       join a site served by: bus-sim run level1 --serve --without MR1
   onboard trace check trace.log --site site.toml
       judge a recorded log; see onboard trace --help
+  onboard gateway -i socketcan -c can0 --site site.toml --mqtt mqtt://127.0.0.1
+      publish the site to a broker; see onboard gateway --help
   onboard web -i socketcan -c can0 --site site.toml
       a live picture on a page of this computer; see onboard web --help
 """
@@ -62,12 +65,8 @@ def build_parser() -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     words = sys.argv[1:] if argv is None else list(argv)
-    if words[:1] == ["trace"]:
-        from onboard.trace.cli import main as trace  # noqa: PLC0415  # a controller must not carry it
-
-        return trace(words[1:])
-    if words[:1] == ["web"]:
-        return _web(words[1:])
+    if words and words[0] in COMMANDS:
+        return COMMANDS[words[0]](words[1:])
     args = build_parser().parse_args(argv)
     try:
         config = load_machine(args.machine)
@@ -93,6 +92,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
 
 
+def _trace(words: list[str]) -> int:
+    from onboard.trace.cli import main as trace  # noqa: PLC0415  # a controller must not carry it
+
+    return trace(words)
+
+
 def _web(words: list[str]) -> int:
     if not is_web_installed():
         print("onboard: web: its libraries are missing; pip install 'onboard-fleet[web]'", file=sys.stderr)
@@ -100,6 +105,19 @@ def _web(words: list[str]) -> int:
     from onboard.web.cli import main as web  # noqa: PLC0415  # a controller must not carry it
 
     return web(words)
+
+
+def _gateway(words: list[str]) -> int:
+    if not is_mqtt_installed():
+        print("onboard: gateway: its libraries are missing; pip install 'onboard-fleet[mqtt]'", file=sys.stderr)
+        return 2
+    from onboard.gateway.cli import main as gateway  # noqa: PLC0415  # a controller must not carry it
+
+    return gateway(words)
+
+
+#: What is not a controller; each takes the words behind its own and returns the exit status.
+COMMANDS: dict[str, Callable[[list[str]], int]] = {"trace": _trace, "web": _web, "gateway": _gateway}
 
 
 async def run(config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path) -> int:

@@ -11,6 +11,9 @@ PACKAGES = {
     "asc2log": "can-utils",
     "candump": "can-utils",
     "gcc": "gcc libc6-dev",
+    "mosquitto": "mosquitto",
+    "mosquitto_sub": "mosquitto-clients",
+    "openssl": "openssl",
     "spin": "spin",
     "canplayer": "can-utils",
     "log2asc": "can-utils",
@@ -24,7 +27,8 @@ DEADLINE_S = 60.0
 
 def require_tool(name: str) -> str:
     """The path of a program. Skips the test where it is missing, or fails it where ``REQUIRE=all`` forbids a skip."""
-    path = shutil.which(name)
+    # A daemon is where only root looks by itself.
+    path = shutil.which(name) or shutil.which(name, path="/usr/sbin:/sbin")
     if path is not None:
         return path
     why = f"{name} is not installed (apt-get install {PACKAGES.get(name, name)})"

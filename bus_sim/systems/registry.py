@@ -18,7 +18,7 @@ class SystemOptions:
     """What ``bus-sim run`` was asked for, beside the site.
 
     ``speed`` is in simulated seconds a second, None for as fast as possible; ``epoch_us`` the wall time of loop time 0.
-    ``limit_s`` ends a run that does not end by itself.
+    ``limit_s`` ends a run that does not end by itself. ``web`` is where its page is served, None for nowhere.
     """
 
     seed: int = 1
@@ -30,6 +30,7 @@ class SystemOptions:
     faults: tuple[AnyFault, ...] = ()
     epoch_us: int = 0
     quiet: bool = False
+    web: str | None = None
 
 
 #: Runs a site to its end, prints what came of it, and returns the exit status: 0, or 1 where a rule was broken.

@@ -18,6 +18,7 @@ from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.plant.link import BusDeviceLink
 from bus_sim.plant.timers import LoopTimers, Timers
 from bus_sim.run import BusRun, RunOptions, Simulation, buses_of, run_until
+from bus_sim.systems.watched import FOREVER_US, watched
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.messages import Message
 from onboard.core.site import Site
@@ -40,6 +41,8 @@ FAULTS = frozenset(
 )
 #: After the plant is done the machines may finish what they say, us.
 TAIL_US = 3_000_000
+#: A run that does not end by itself ends here, us.
+LIMIT_US = 4 * 3_600_000_000
 
 
 class SystemPlant(Protocol):
@@ -149,11 +152,19 @@ async def _play(
     if prepare is not None:
         prepare(run)
     run.start()
-    limit_us = round(options.limit_s * 1e6) if options.limit_s is not None else 4 * 3_600_000_000
-    with _Watcher(run, plant, picture if options.speed is not None and not options.quiet else None) as watcher:
-        over = await run_until(run, lambda: bool(plant.violations) or plant.is_over, limit_us, STEP_US, watcher.show)
-        if over:
-            await asyncio.sleep(TAIL_US / 1e6)
+    limit_us = round(options.limit_s * 1e6) if options.limit_s is not None else LIMIT_US
+    shown = picture if options.speed is not None and not options.quiet else None
+    async with watched(run, options.web) as viewer:
+        if viewer.is_there and options.limit_s is None:
+            limit_us = FOREVER_US
+
+        def is_over() -> bool:
+            return viewer.is_gone or bool(plant.violations) or (plant.is_over and not viewer.is_there)
+
+        with _Watcher(run, plant, shown) as watcher:
+            over = await run_until(run, is_over, limit_us, STEP_US, watcher.show)
+            if over:
+                await asyncio.sleep(TAIL_US / 1e6)
     run.close()
     return Played(run, plant, messages, plant.is_over, time.perf_counter() - began_s)
 

@@ -84,6 +84,11 @@ def no_claim(key: TokenKey) -> Claim:
     return Claim(0, NOBODY)
 
 
+def nothing_first(grant: TokenGrant) -> list[Effect]:
+    """A token needs no other word than its grant."""
+    return []
+
+
 class Grant(NamedTuple):
     """A token on its way: said again until ``holder`` is heard under ``version`` or newer."""
 
@@ -109,6 +114,10 @@ class TokenBook:
     refused: dict[TokenKey, Reason] = field(default_factory=dict)
     #: What to say with a request for a token, from this node's plan and mirror.
     claim: Callable[[TokenKey], Claim] = no_claim
+    #: What must be in the journal before a token granted to me counts as mine; None where it cannot be mine yet.
+    before_taking: Callable[[TokenGrant], list[Effect] | None] = nothing_first
+    #: What must be heard before a grant of mine can be accepted; it is said again with it.
+    before_grant: Callable[[TokenGrant], list[Effect]] = nothing_first
     #: Tokens asked for without an agreed order, and since when the holder's view of the order has differed from mine.
     unordered: set[TokenKey] = field(default_factory=set)
     behind_since_us: dict[TokenKey, int] = field(default_factory=dict)
@@ -192,7 +201,7 @@ class TokenBook:
         if pending is not None and pending.holder == request.sender:
             if now_us < pending.repeat_at_us - self.site.timing.token_repeat_us + IN_FLIGHT_US:
                 return []
-            return [Send(self._grant(key, pending.version, pending.holder))]
+            return self._grant_again(key, pending)
         if not self.holds(key):
             return []
         if verdict is Reason.NONE:
@@ -201,10 +210,16 @@ class TokenBook:
         return [Send(TokenRefusal(self.node_id, key.kind, key.number, version, request.sender, verdict))]
 
     def on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
-        """Accept a token only if addressed to me and newer than anything seen; else learn where it went."""
+        """Accept a token only if addressed to me and newer than anything seen; else learn where it went.
+
+        One that needs another word first is as if it had not been heard: its giver says both again.
+        """
         key = TokenKey(grant.token_kind, grant.token)
         if not self.is_news(key, grant.version):
             return self._say_again(key, grant)
+        first = self.before_taking(grant) if grant.holder == self.node_id else []
+        if first is None:
+            return []
         self._learn(key, grant.version, grant.holder)
         if grant.holder != self.node_id:
             return []
@@ -212,6 +227,7 @@ class TokenBook:
         self.changes += 1
         self.forget(key)
         return [
+            *first,
             self._record("token_held", key, grant.version, self.node_id),
             Send(TokenHeld(self.node_id, key.kind, key.number, grant.version)),
         ]
@@ -255,7 +271,7 @@ class TokenBook:
         for key, grant in self.leaving.items():
             if grant.repeat_at_us <= now_us:
                 self.leaving[key] = grant._replace(repeat_at_us=now_us + repeat_us)
-                effects.append(Send(self._grant(key, grant.version, grant.holder)))
+                effects += self._grant_again(key, grant)
         return effects
 
     def next_wake(self) -> int | None:
@@ -289,6 +305,10 @@ class TokenBook:
         if grant.holder == self.node_id and self.held.get(key) == grant.version:
             return [Send(TokenHeld(self.node_id, key.kind, key.number, grant.version))]
         return []
+
+    def _grant_again(self, key: TokenKey, given: Grant) -> list[Effect]:
+        grant = self._grant(key, given.version, given.holder)
+        return [*self.before_grant(grant), Send(grant)]
 
     def _grant(self, key: TokenKey, version: int, to: int) -> TokenGrant:
         return TokenGrant(self.node_id, key.kind, key.number, version, to)

@@ -23,8 +23,6 @@ from onboard.web.picture import LivePicture
 
 #: Calls for a whole task; all others are for a part of one, or for room.
 WHOLE = (Operation.PARK, Operation.RETRIEVE, Operation.TRANSPORT, Operation.REACH, Operation.MACHINE)
-#: Calls and tasks that are over are remembered, the newest so many.
-KEPT = 256
 #: Words of a task's life (docs/mqtt.md) by its phase.
 LIFE = {
     TaskPhase.OPEN: "called",
@@ -45,10 +43,13 @@ class FleetTopics:
     def __init__(self, site: Site, settings: GatewaySettings) -> None:
         self.site = site
         self.picture = LivePicture(site)
-        self._settings = settings
+        self._epoch_us = settings.epoch_us
         self._words = Words(site)
         self._hour: int | None = None
-        self._closed = 0
+
+    def set_epoch(self, epoch_us: int) -> None:
+        """As of the publisher."""
+        self._epoch_us = epoch_us
 
     def feed(self, message: Message, now_us: int) -> Iterator[Told]:
         """Take up one message."""
@@ -127,10 +128,6 @@ class FleetTopics:
         yield "call", self._stamped({"at_us": now_us, **told})
         if record.call.operation in WHOLE:
             yield "task", self.task(record.call.task, now_us)
-        self._closed += 1
-        if self._closed >= KEPT:
-            self._closed = 0
-            self.picture.view.forget(KEPT)
 
     def _on_report(self, report: TaskReport, now_us: int) -> Iterator[Told]:
         operation = self.operation_of(report.task)
@@ -192,7 +189,7 @@ class FleetTopics:
         return value
 
     def _wall_us(self, time_us: int) -> int:
-        return self._settings.epoch_us + time_us
+        return self._epoch_us + time_us
 
     def _at(self, time_us: int) -> str:
         return timestamp(self._wall_us(time_us))

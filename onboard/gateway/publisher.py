@@ -7,7 +7,7 @@ state at every change and at least every 30 s; changes that come close together 
 import json
 from collections import Counter, deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import Message, TaskReport
@@ -69,6 +69,11 @@ class Publisher:
         """All links: the fleet's, where the whole site is told of, and one a mobile machine."""
         machines = tuple(self._serial(node) for node in self._told_of)
         return machines if self.settings.serials else (FLEET, *machines)
+
+    def set_epoch(self, epoch_us: int) -> None:
+        """Wall time in us since 1970 at loop time 0, where the clock was set."""
+        self.settings = replace(self.settings, epoch_us=epoch_us)
+        self.fleet.set_epoch(epoch_us)
 
     # --- what a link says of itself ------------------------------------------------------------------------------
 

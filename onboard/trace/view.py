@@ -5,9 +5,21 @@ simulated one or a recorded log alike.
 """
 
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TypeVar
 
-from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, Grade, MachineState, Operation, Reason, TaskPhase
+from onboard.core.codes import (
+    ANY_STATION,
+    OUTSIDE,
+    CallResult,
+    Criterion,
+    Grade,
+    MachineState,
+    Operation,
+    Reason,
+    TaskPhase,
+)
 from onboard.core.messages import (
     Award,
     Bid,
@@ -25,8 +37,16 @@ from onboard.core.messages import (
 )
 from onboard.core.site import Segment, Site, Station
 
+_Key = TypeVar("_Key")
+_Record = TypeVar("_Record")
+
 #: Events in words that are kept.
 EVENT_LIMIT = 200
+#: Calls and tasks that are kept, so that a picture may stay open for ever: those that are over go first, the oldest of
+#: them. A site of 24 machines has fewer than 20 open at a time, and what is asked about was lately.
+CALL_LIMIT, TASK_LIMIT = 512, 512
+#: Phases of tasks after which nothing is waited for.
+TASKS_OVER = (TaskPhase.DONE, TaskPhase.REFUSED)
 
 
 @dataclass
@@ -52,6 +72,14 @@ class TaskRecord:
     phase: TaskPhase = TaskPhase.OPEN
     phase_us: dict[TaskPhase, int] = field(default_factory=dict)
     promised_ms: int | None = None
+    depth: int = 0
+    #: Whether its last call was taken back: nobody waits unless it is called again.
+    is_withdrawn: bool = False
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether somebody waits for its end; a sub-task is nobody's until it is awarded."""
+        return self.phase not in TASKS_OVER and not self.is_withdrawn and (self.depth == 0 or self.owner != 0)
 
 
 class SiteView:
@@ -73,6 +101,14 @@ class SiteView:
         self.calls_closed: Counter[CallResult] = Counter()
         self.parked = 0
         self.fetched = 0
+        self.done = 0
+        #: From the first call for each to its end, all tasks that are done together.
+        self.done_us = 0
+        self.blocked: set[Segment] = set()
+        #: How people name what is carried or ordered, and what became of a task; systems other than the car park have
+        #: their own words.
+        self.thing: Callable[[Reference], str] = lambda reference: f"car {reference.number}"
+        self.task_end: Callable[[Reference, int], str] | None = None
         self.events: deque[tuple[int, str]] = deque(maxlen=EVENT_LIMIT)
         for machine in site.machines.values():
             self.positions[machine.node_id] = (machine.home, 0)
@@ -104,7 +140,14 @@ class SiteView:
             case TaskReport():
                 self._on_report(message, time_us)
             case Waiting() | Blocked() | Clear():
-                self._say(time_us, self._told_of(message))
+                self._on_segment(message, time_us)
+
+    def _on_segment(self, message: Waiting | Blocked | Clear, time_us: int) -> None:
+        if isinstance(message, Blocked):
+            self.blocked.add(Segment(message.track, message.index))
+        elif isinstance(message, Clear):
+            self.blocked.discard(Segment(message.track, message.index))
+        self.say(time_us, self._told_of(message))
 
     def _told_of(self, message: Waiting | Blocked | Clear) -> str:
         """What is said of one segment, in words."""
@@ -115,27 +158,12 @@ class SiteView:
             return f"{self.name(message.sender)} waits for {where}{blocker}: {why}"
         return f"{where} is {'blocked' if isinstance(message, Blocked) else 'clear again'}: {why}"
 
-    def forget(self, keep: int) -> None:
-        """Let go of calls and tasks that are over but the newest ``keep`` of each: for who listens without end.
-
-        Of tasks no more than four times as many stay, whatever was heard of them.
-        """
-        closed = [key for key, record in self.calls.items() if record.result is not None]
-        for key in closed[: max(0, len(closed) - keep)]:
-            del self.calls[key]
-        over = [task for task, record in self.tasks.items() if record.phase in (TaskPhase.DONE, TaskPhase.REFUSED)]
-        called = {record.call.task for record in self.calls.values()}
-        for task in over[: max(0, len(over) - keep)]:
-            if task not in called:
-                del self.tasks[task]
-        for task in list(self.tasks)[: max(0, len(self.tasks) - 4 * keep)]:
-            del self.tasks[task]
-
     def places_taken(self) -> dict[int, Reference]:
         """Car by station number, for cars that stand at one."""
         return {station: car for car, station in self.cars.items() if station not in (ANY_STATION, OUTSIDE)}
 
-    def _say(self, time_us: int, text: str) -> None:
+    def say(self, time_us: int, text: str) -> None:
+        """One more event in words."""
         self.events.append((time_us, text))
 
     def _on_car(self, message: CarAt) -> None:
@@ -154,17 +182,27 @@ class SiteView:
             return
         self.calls_opened += 1
         self.calls[key] = CallRecord(call, time_us)
-        task = self.tasks.setdefault(call.task, TaskRecord(call.operation))
-        task.calls += 1
-        task.phase_us.setdefault(TaskPhase.OPEN, time_us)
-        self._say(time_us, f"{self.name(call.sender)} calls: {call.operation.name.lower()} car {call.car.number}")
+        if self.open_task(call.task, call.operation, time_us):
+            self.tasks[call.task].depth = call.depth
+        self.tasks[call.task].calls += 1
+        self.tasks[call.task].is_withdrawn = False
+        _bound(self.calls, CALL_LIMIT, lambda record: record.result is not None)
+        self.say(time_us, f"{self.name(call.sender)} calls: {call.operation.name.lower()} {self.thing(call.car)}")
+
+    def open_task(self, reference: Reference, operation: Operation, time_us: int) -> bool:
+        """A task is told for the first time, by a call or otherwise; False where it was known."""
+        if reference in self.tasks:
+            return False
+        self.tasks[reference] = TaskRecord(operation, phase_us={TaskPhase.OPEN: time_us})
+        _bound(self.tasks, TASK_LIMIT, lambda task: not task.is_waiting)
+        return True
 
     def _on_bid(self, bid: Bid, time_us: int) -> None:
         self.bids += 1
         record = self.calls.get((bid.initiator, bid.call))
         if record is not None:
             record.bids.append((time_us, bid.sender, bid.cost))
-            self._say(time_us, f"{self.name(bid.sender)} bids for car {record.call.car.number}")
+            self.say(time_us, f"{self.name(bid.sender)} bids for {self.thing(record.call.car)}")
 
     def _on_award(self, award: Award, time_us: int) -> None:
         record = self.calls.get((award.sender, award.call))
@@ -175,16 +213,20 @@ class SiteView:
             return
         record.result, record.winner, record.reason = award.result, award.winner, award.reason
         self.calls_closed[award.result] += 1
-        task = self.tasks.setdefault(record.call.task, TaskRecord(record.call.operation))
+        self.open_task(record.call.task, record.call.operation, record.opened_us)
+        task = self.tasks[record.call.task]
+        if award.result is CallResult.WITHDRAWN and record.call.operation is task.operation:
+            task.is_withdrawn = True
         if award.result is CallResult.AWARDED:
             if record.call.operation is not task.operation:
-                self._say(time_us, f"{self.name(award.winner)} takes {self.name(award.sender)} along")
+                self.say(time_us, f"{self.name(award.winner)} takes {self.name(award.sender)} along")
                 return
             task.owner = award.winner
-            task.promised_ms = next((cost for _, node, cost in reversed(record.bids) if node == award.winner), None)
-            self._say(time_us, f"{self.name(award.winner)} wins car {record.call.car.number}")
+            if record.call.criterion is Criterion.FINISH_TIME:
+                task.promised_ms = next((cost for _, node, cost in reversed(record.bids) if node == award.winner), None)
+            self.say(time_us, f"{self.name(award.winner)} wins {self.thing(record.call.car)}")
         else:
-            self._say(time_us, f"call for car {record.call.car.number} ends: {award.result.name.lower()}")
+            self.say(time_us, f"call for {self.thing(record.call.car)} ends: {award.result.name.lower()}")
 
     def _on_report(self, report: TaskReport, time_us: int) -> None:
         task = self.tasks.get(report.task)
@@ -192,16 +234,24 @@ class SiteView:
             return
         first = report.phase not in task.phase_us
         task.phase = report.phase
+        if first and report.phase is TaskPhase.AWARDED and not task.owner:
+            # Ordered by name, without a call.
+            task.owner = report.sender
         task.phase_us.setdefault(report.phase, time_us)
         if not first or report.phase not in _WORDS:
             return
         if report.phase is TaskPhase.DONE:
+            self.done += 1
+            self.done_us += time_us - task.phase_us.get(TaskPhase.OPEN, time_us)
             self.parked += task.operation is Operation.PARK
             self.fetched += task.operation is Operation.RETRIEVE
         where = self._station(report.station)
         what = "parked" if task.operation is Operation.PARK else "fetched"
         words = _WORDS[report.phase].format(what=what, where=where)
-        self._say(time_us, f"{self.name(report.sender)} {words}")
+        if self.task_end is not None:
+            words = _OTHER_WORDS[report.phase].format(thing=self.thing(report.task))
+            words = self.task_end(report.task, report.station) if report.phase is TaskPhase.DONE else words
+        self.say(time_us, f"{self.name(report.sender)} {words}")
 
     def _station(self, number: int) -> str:
         for node, station in self.site.compartments.items():
@@ -210,9 +260,23 @@ class SiteView:
         return str(Station.from_number(number)) if number not in (ANY_STATION, OUTSIDE) else "outside"
 
 
+def _bound(records: dict[_Key, _Record], most: int, is_over: Callable[[_Record], bool]) -> None:
+    """Drop the oldest that is over, else the oldest, where there are more than ``most``."""
+    if len(records) > most:
+        del records[next((key for key, record in records.items() if is_over(record)), next(iter(records)))]
+
+
 _WORDS = {
     TaskPhase.LOADED: "has loaded the car at {where}",
     TaskPhase.DONE: "has {what} the car: {where}",
     TaskPhase.REFUSED: "refuses the car at {where}",
     TaskPhase.FORFEITED: "gives the task up at {where}",
+}
+
+#: The same for tasks of other systems; what a task that is done came to, each says in its own words.
+_OTHER_WORDS = {
+    TaskPhase.LOADED: "has loaded {thing}",
+    TaskPhase.DONE: "",
+    TaskPhase.REFUSED: "refuses {thing}",
+    TaskPhase.FORFEITED: "gives {thing} up",
 }

@@ -23,7 +23,8 @@ SNAPSHOTS_S = 10
 #: Most viewers at a time, and the longest command, bytes: a page that is left open must not fill the memory.
 MOST_VIEWERS = 32
 MOST_COMMAND_BYTES = 4_096
-_TYPES = {"index.html": "text/html", "page.js": "text/javascript", "draw.js": "text/javascript", "page.css": "text/css"}
+_SCRIPTS = ("page.js", "draw.js", "plan.js", "paint.js")
+_TYPES = {"index.html": "text/html", "page.css": "text/css", **dict.fromkeys(_SCRIPTS, "text/javascript")}
 #: Everything comes from this server, and nobody may put the page into a frame.
 _POLICY = "default-src 'self'; img-src data:; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'"
 _HEADERS = {
@@ -43,7 +44,7 @@ class Source(Protocol):
     mode: str
 
     def layout(self) -> dict[str, Any]:
-        """What never changes."""
+        """What never changes, with ``commands``: the names of those that ``command`` takes."""
 
     def snapshot(self) -> dict[str, Any]:
         """What changes, with ``now_us`` and ``pace``, simulated seconds a second."""

@@ -12,8 +12,10 @@ from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
 from onboard.kinds.registry import system_of
+from onboard.trace.readers.open_log import Log, LogOpenError
 from onboard.web.address import DEFAULT_PORT, WebError
 from onboard.web.app import Source
+from onboard.web.film import Film
 from onboard.web.live import LiveSource, LogSource
 from onboard.web.serve import WebServer
 from onboard.wire.codec import Codecs, codecs
@@ -36,7 +38,9 @@ def build_parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("log", nargs="?", type=Path, metavar="LOG", help="a log of candump -L instead of a bus")
+    parser.add_argument(
+        "log", nargs="?", metavar="LOG", help="a log instead of a bus: candump -L, Vector ASC or pcapng"
+    )
     parser.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
     parser.add_argument(
         "--web",
@@ -59,27 +63,30 @@ def main(argv: Sequence[str]) -> int:
         system = system_of(site)
         codec = codecs(system.name, system.messages)
         if args.log is not None:
-            return asyncio.run(_show_log(site, codec, args.log, _read(args.log), args.web))
+            with Film(site, codec) as film:
+                _read(film, args.log)
+                return asyncio.run(_show_log(film, args.web))
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         return asyncio.run(_show_bus(site, codec, settings, args.web))
-    except (ConfigError, BusOpenError, WebError) as error:
+    except (ConfigError, BusOpenError, LogOpenError, WebError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard web: {line}", file=sys.stderr)
         return 2
 
 
-def _read(path: Path) -> list[bytes]:
-    try:
-        return path.read_bytes().splitlines(keepends=True)
-    except OSError as error:
-        raise WebError(f"{path}: {error.strerror or error}; name an existing log") from error
+def _read(film: Film, name: str) -> None:
+    """The whole log, with a bar on standard error where that is a terminal; what was wrong with it is told there."""
+    with Log(name, bar=sys.stderr) as log:
+        try:
+            film.read(log)
+        except ValueError as error:
+            raise WebError(f"{name}: {error}; name a log of this site") from error
+        for line in log.faults.lines():
+            print(f"{name}: {line}", file=sys.stderr)
 
 
-async def _show_log(site: Site, codec: Codecs, path: Path, lines: list[bytes], where: str) -> int:
-    try:
-        source = LogSource(site, codec, lines)
-    except ValueError as error:
-        raise WebError(f"{path}: {error}; name a log of this site in the format of candump -L") from error
+async def _show_log(film: Film, where: str) -> int:
+    source = LogSource(film)
     playing = asyncio.get_running_loop().create_task(source.play())
     try:
         return await _serve(source, where, None)

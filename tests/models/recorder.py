@@ -104,7 +104,8 @@ class Recorder:
         else:
             steps.append(f"learn({node}, {what.version}, {self.index(key, what.holder)})")
         for effect in effects:
-            if isinstance(effect, Record):
+            if isinstance(effect, Record) and str(effect.entry["record"]).startswith("token_"):
+                # Of what goes to the journal with a token, such as the place of a car, the model knows nothing.
                 name = str(effect.entry["record"]).removeprefix("token_")
                 steps.append(f"record_{name}({node})")
             elif isinstance(effect, Send) and isinstance(effect.message, TokenGrant):

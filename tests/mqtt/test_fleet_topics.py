@@ -8,9 +8,9 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
 from onboard.core.messages import Award, Bid, CallForProposals, Reference
-from onboard.gateway.fleet import KEPT
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.settings import GatewaySettings
+from onboard.trace.view import CALL_LIMIT, TASK_LIMIT
 from tests.mqtt.logs import EPOCH_US, content, published, record
 
 
@@ -84,4 +84,4 @@ def test_what_is_over_is_forgotten_and_a_call_number_may_come_again() -> None:
         said += publisher.feed(Award(1, wire, 11, task, 1, CallResult.REFUSED, Reason.NO_BID), now_us + 1)
         assert [content(one)["result"] for one in said if one.publication.topic.endswith("/call")] == [None, "refused"]
     view = publisher.fleet.picture.view
-    assert len(view.calls) <= 2 * KEPT and len(view.tasks) <= 5 * KEPT
+    assert len(view.calls) <= CALL_LIMIT and len(view.tasks) <= TASK_LIMIT

@@ -94,15 +94,31 @@ LAYERS: dict[str, Layer] = {
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
-        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.web", "onboard.wire")
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.trace", "onboard.web", "onboard.wire")
     ),
     # What is published is decided from the decoded bus alone; sessions, files and buses come in through ports.
     "onboard.gateway": Layer(
         (*CORE_TYPES, *SYSTEM_TYPES, "onboard.ports", "onboard.trace", "onboard.web.picture", "onboard.wire"),
         not_stdlib=frozenset({"random", "socket", "threading", "time"}),
     ),
+    # Its command line is a composition root: it opens the bus, the journal and the broker.
+    "onboard.gateway.cli": Layer(
+        (
+            *CORE_TYPES,
+            "onboard.config",
+            "onboard.gateway",
+            "onboard.io",
+            "onboard.kinds",
+            "onboard.ports",
+            "onboard.wire",
+        )
+    ),
+    "onboard.gateway.options": Layer(("onboard.gateway", "onboard.io")),
     "onboard": Layer(
-        (*ALL_OF_ONBOARD, "onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+        (
+            *ALL_OF_ONBOARD,
+            *("onboard.cli", "onboard.gateway.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+        ),
         not_stdlib=frozenset({"random", "threading", "time"}),
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
@@ -111,7 +127,8 @@ LAYERS: dict[str, Layer] = {
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
-    "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
+    # A bench starts the programs themselves.
+    "hil": Layer(("onboard", "onboard.cli", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
 }
 
 #: Libraries that exactly one file may know, because their interfaces move.

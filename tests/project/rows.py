@@ -46,6 +46,8 @@ class Mutation:
         path = ROOT / self.file
         if not self.file.startswith(("onboard/", "bus_sim/", "dbc/")) or not path.is_file():
             return f"{self.file} is no file of the product"
+        if self.old == self.new:
+            return f"{self.file}: {self.old!r} stays as it is"
         count = path.read_text(encoding="utf-8").count(self.old)
         return None if count == 1 else f"{self.file} has this text {count} times: {self.old!r}"
 

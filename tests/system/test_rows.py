@@ -21,6 +21,7 @@ from onboard.core.codes import (
     MachineState,
     Operation,
     Reason,
+    ShuttleAction,
     Side,
     TaskPhase,
 )
@@ -39,6 +40,7 @@ from onboard.core.messages import (
     Message,
     OperatorOrder,
     Reference,
+    ShuttleOrder,
     Stamp,
     TaskReport,
 )
@@ -74,7 +76,22 @@ def a_robot(standing: Segment, steps: list[Step] | None = None) -> CarParkGenera
     return CarParkGeneration(SITE, SITE.machines[11], Mirror(SITE, 11), program)
 
 
-def test_p18_a_busy_robot_bids_a_later_finishing_date_than_its_idle_twin() -> None:
+def test_p18_a_busy_robot_bids_later_on_the_bus_than_its_idle_twin() -> None:
+    """The same site twice: with a car in hand for the first bay, and with nothing to do, when the call comes."""
+    site = one_floor(extra='[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n')
+    took_ms = {}
+    for cars in (1, 2):
+        scene = play(site, stays(*[(float(number), None) for number in range(cars)]), extra_s=200)
+        scene.assert_sound()
+        call = scene.all(CallForProposals)[-1][1]
+        (bid,) = (m for _, m in scene.all(Bid) if (m.initiator, m.call) == (call.sender, call.call))
+        took_ms[cars] = bid.cost - call.deadline_ms
+        done = [report for _, report in scene.all(TaskReport) if report.phase is TaskPhase.DONE]
+        assert [report.sender for report in done] == [11] * cars
+    assert took_ms[2] > took_ms[1] + 25_000
+
+
+def test_p18_a_busy_robot_names_a_later_finishing_date_than_its_idle_twin() -> None:
     call = a_call()
     work = Work(Handling.LEAVE, Station(1, 8, BAY.side), Reference(1, 9), 2700, call)
     busy = a_robot(Segment(1, 8), [Step(LegAction.WORK, 1, 8, 8, 0, 30_000_000, work)])
@@ -138,6 +155,49 @@ def test_p46_of_all_solutions_the_earliest_is_bid_though_another_place_is_nearer
     assert proposal.cost == to_bus_ms(dates[far])
     works = [leg for leg in proposal.itinerary.legs if leg.action is LegAction.WORK]
     assert (works[-1].track, works[-1].to_index, works[-1].side) == far
+
+
+def test_p46_every_bid_on_the_bus_is_the_earliest_of_what_was_weighed_and_logged(pair: Scene) -> None:
+    """The log names each place that was worked out with its date, and counts those that could not be sooner."""
+    bids = [(t, bid) for t, bid in pair.all(Bid) if bid.sender == 12]
+    logged = [(t, text) for t, who, text in pair.simulation.log.lines if who == "MR2" and text.startswith("weighed: ")]
+    assert len(bids) == len(logged) == 4
+    weighed = []
+    for (bid_us, bid), (time_us, text) in zip(bids, logged, strict=True):
+        assert 0 <= bid_us - time_us < 5_000
+        dated, _, counts = text.removeprefix("weighed: ").partition("; ")
+        dates = {place: float(at_s) for place, at_s in (one.split(" at ") for one in dated.split(", "))}
+        assert round(min(dates.values()) * 1000) == bid.cost
+        others = sum(int(count.rpartition(" ")[2]) for count in counts.split("; "))
+        weighed.append(len(dates) + others)
+    assert weighed == [len(SITE.places), len(SITE.places) - 1, 1, 1], "all places but that of the other car"
+
+
+def test_p23_the_program_that_a_robot_prints_is_the_itinerary_that_it_sends(pair: Scene) -> None:
+    """Step by step and to the millisecond: what is told of it in words, and the legs on the bus."""
+    printed = [(t, text[9:].split("; ")) for t, who, text in pair.simulation.log.lines if text.startswith("program: [")]
+    assert len(printed) == 4
+    for time_us, steps in printed:
+        _, plan = pair.first(Itinerary, lambda m: m.sender == 12 and m.grade is Grade.FIRM, after_us=time_us)
+        legs = plan.legs[-len(steps) :]
+        for step, leg in zip(steps, legs, strict=True):
+            times, what = step[1:].split("] ")
+            assert leg.end_ms == pytest.approx(float(times.split()[1]) * 1000, abs=1)
+            word = {"travel": LegAction.TRAVEL, "stand": LegAction.STAND}.get(what.split()[0], LegAction.WORK)
+            assert leg.action is word and str(Segment(leg.track, leg.to_index)) in what
+
+
+def test_p33_small_and_large_cars_are_parked_and_what_cannot_be_gripped_is_turned_away() -> None:
+    wheelbases = (1_850, 3_350, 3_500)
+    demand = [Stay(round(200e6 * n), None, car(n, wheelbase_mm=mm)) for n, mm in enumerate(wheelbases)]
+    scene = play(one_floor(), Demand(tuple(demand)), limit_s=600)
+    scene.assert_sound()
+    grips = {order.wheelbase_mm for _, order in scene.all(ShuttleOrder) if order.action is ShuttleAction.GRIP}
+    assert grips == {1_850, 3_350}
+    scene.first(DeskOrder, lambda order: order.text is DeskText.CAR_TOO_LARGE, after_us=400_000_000)
+    assert [call.wheelbase_mm for _, call in scene.all(CallForProposals)] == [1_850, 3_350]
+    summary = scene.simulation.plant.street.summary()
+    assert (summary.parked, summary.inside, summary.refused_too_large) == (2, 2, 1)
 
 
 @pytest.mark.parametrize("wheelbase_mm", [1600, 3900])

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from bus_sim.run import BusRun, RunOptions, buses_of, run_until
 from bus_sim.systems.terminal.plant import NOISE, TerminalPlant
 from bus_sim.systems.terminal.world import Handling
+from bus_sim.systems.watched import watched
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.messages import CarAt, Message
 from onboard.core.mirror import Mirror
@@ -145,12 +146,16 @@ def play(
     noise: float = NOISE,
     prepare: Callable[[TerminalRun], None] | None = None,
     show: Callable[[TerminalRun], None] | None = None,
+    web: str | None = None,
 ) -> Outcome:
-    """Run a site on a loop of its own. ``prepare`` gets the run before it is switched on, ``show`` after each step."""
+    """Run a site on a loop of its own. ``prepare`` gets the run before it is switched on, ``show`` after each step.
+
+    With ``web`` its page is served there, and it goes on until ``limit_us`` or a person's Ctrl-C.
+    """
     loop = VirtualTimeLoop(pace=options.pace)
     try:
         asyncio.set_event_loop(loop)
-        return loop.run_until_complete(_play(site, options, loop, limit_us, noise, prepare, show))
+        return loop.run_until_complete(_play(site, options, loop, limit_us, noise, prepare, show, web))
     finally:
         asyncio.set_event_loop(None)
         loop.close()
@@ -164,13 +169,17 @@ async def _play(
     noise: float,
     prepare: Callable[[TerminalRun], None] | None,
     show: Callable[[TerminalRun], None] | None,
+    web: str | None,
 ) -> Outcome:
     run = build(site, options, loop, noise=noise)
     if prepare is not None:
         prepare(run)
     run.start()
     picture = (lambda: show(run)) if show is not None else None
-    await run_until(run, lambda: is_over(run), limit_us, STEP_US, picture)
+    async with watched(run, web) as viewer:
+        await run_until(
+            run, lambda: viewer.is_gone or (is_over(run) and not viewer.is_there), limit_us, STEP_US, picture
+        )
     found = outcome(run)
     run.close()
     return found

@@ -16,6 +16,7 @@ from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.run import RunOptions
 from bus_sim.systems.terminal.run import LIMIT_US, Outcome, TerminalRun, play
 from bus_sim.systems.terminal.table import picture, plan_table
+from bus_sim.systems.watched import FOREVER_US
 from onboard.core.site import Site
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.vehicle import terminal
@@ -109,13 +110,14 @@ def run_terminal(site: Site, options: "SystemOptions") -> int:
         pace=pace,
         faults=frame_faults(options.faults, place),
     )
-    limit_us = LIMIT_US if options.limit_s is None else round(options.limit_s * 1e6)
+    unlimited_us = LIMIT_US if options.web is None else FOREVER_US
+    limit_us = unlimited_us if options.limit_s is None else round(options.limit_s * 1e6)
     show = Show(place, options.quiet)
     if on_terminal:
         with Live(console=Console(), refresh_per_second=10) as show.live:
-            found = play(place, run_options, limit_us=limit_us, show=show)
+            found = play(place, run_options, limit_us=limit_us, show=show, web=options.web)
     else:
-        found = play(place, run_options, limit_us=limit_us, show=show)
+        found = play(place, run_options, limit_us=limit_us, show=show, web=options.web)
     if shown:
         print("\n".join(summary_lines(place, found)))
     if options.json is not None:

@@ -25,6 +25,11 @@ def car_record(statement: CarAt) -> Record:
     return Record(entry)
 
 
+def cars_at(node_id: int, entries: Iterable[Entry]) -> dict[Reference, CarAt]:
+    """What node ``node_id`` has last journalled of each car, as it told it."""
+    return BayMemory(node_id).read(entry for entry in entries if entry.get("record") == "car_at").cars
+
+
 def winner_record(car: Reference, winner: int, task: Reference, version: int) -> Record:
     """Who may fetch a car, for which task and under which version of it; 0 for nobody any more."""
     entry: dict[str, str | int] = {"record": "winner", "car_origin": car.origin, "car": car.number, "winner": winner}

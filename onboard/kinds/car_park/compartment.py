@@ -30,7 +30,6 @@ from onboard.core.codes import (
 from onboard.core.effects import Actuate, Effect, Record, Report, Send
 from onboard.core.messages import (
     BayState,
-    CarAt,
     DeskEvent,
     DeskOrder,
     DoorOrder,
@@ -46,11 +45,10 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site, Station
-from onboard.kinds.car_park import bay_task
+from onboard.kinds.car_park import bay_task, custody
 from onboard.kinds.car_park.bay_generation import BayGeneration
 from onboard.kinds.car_park.bay_memory import (
     BayMemory,
-    car_record,
     job_over_record,
     job_record,
     next_reference,
@@ -325,7 +323,9 @@ class Compartment:
             # Whoever won meanwhile says so when asked, which every machine does at power-up.
             self.job.retry_at_us = now_us + SETTLING_US
         self._go(BayPhase.LOCKING)
-        return self._when_locking(now_us)
+        is_unsaid = operation is Operation.PARK and car not in self.fleet.mirror.cars
+        said = custody.state(self.fleet, car, self.station.number, wheelbase_mm) if is_unsaid else []
+        return said + self._when_locking(now_us)
 
     def _to_free(self) -> list[Effect]:
         over: list[Effect] = [job_over_record()] if self.job is not None else []
@@ -374,19 +374,22 @@ class Compartment:
         effects: list[Effect] = [Record({"record": "number", "number": self._number})]
         effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
-        effects += self._state_car(car, self.station.number, bay.wheelbase_mm)
+        effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
         effects.append(self._desk(DeskText.TAKE_TICKET, car))
         effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
         self._go(BayPhase.LOCKING)
         return [*effects, self._light(LightColour.RED)]
 
     def _when_locking(self, now_us: int) -> list[Effect]:
-        assert self.bay is not None
+        assert self.bay is not None and self.job is not None
         if self._is(DoorName.INPUT, DoorPosition.LOCKED):
             self._go(BayPhase.AWAITING)
             return self._when_awaiting(now_us)
         if self.bay.person_inside:
-            return []
+            # Who presses again has no ticket: the power failed before it was printed.
+            asked, self._key_pressed = self._key_pressed, False
+            is_new = self.job.operation is Operation.PARK
+            return [self._desk(DeskText.TAKE_TICKET, self.job.car)] if asked and is_new else []
         return self._door(DoorName.INPUT, DoorAction.CLOSE)
 
     def _when_reserving(self, now_us: int) -> list[Effect]:
@@ -450,7 +453,8 @@ class Compartment:
         if not is_open or self.bay.load_kg or self.bay.person_inside:
             return []
         car = self.job.car
-        effects = [*self._state_car(car, OUTSIDE, self.job.wheelbase_mm), self._desk(DeskText.WELCOME, Reference(0, 0))]
+        effects = custody.state(self.fleet, car, OUTSIDE, self.job.wheelbase_mm)
+        effects.append(self._desk(DeskText.WELCOME, Reference(0, 0)))
         return effects + self._to_free()
 
     # --- inner works -------------------------------------------------------------------------------------------
@@ -462,19 +466,13 @@ class Compartment:
             return [Report(f"nobody can fetch car {job.car.number}: {reason.name}; called again in 30 s")]
         effects: list[Effect] = [
             Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
-            *self._state_car(job.car, OUTSIDE, job.wheelbase_mm),
+            *custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm),
             self._desk(bay_task.refusal_text(self.fleet.mirror), job.car),
         ]
         return effects + self._to_free()
 
     def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
         return list(self.fleet.negotiation.open(job.terms(source, sink), now_us))
-
-    def _state_car(self, car: Reference, station: int, wheelbase_mm: int) -> list[Effect]:
-        version = self.fleet.tokens.seen[car_token(*car)]
-        statement = CarAt(self.fleet.node_id, car, station, version, wheelbase_mm)
-        self.fleet.mirror.on_car(statement)
-        return [car_record(statement), Send(statement)]
 
     def _door(self, door: DoorName, action: DoorAction) -> list[Effect]:
         """Order a door once; the plant's interlock refuses what must not be, and the phase then waits."""

@@ -11,10 +11,10 @@ from enum import Enum
 from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
-from onboard.core.effects import Actuate, Effect, Record, Send
-from onboard.core.messages import CarAt, ShuttleOrder, ShuttleState
+from onboard.core.effects import Actuate, Effect, Record
+from onboard.core.messages import ShuttleOrder, ShuttleState
 from onboard.core.serial import successor
-from onboard.core.site import Station
+from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.program import Handling, Work
 
 
@@ -144,25 +144,12 @@ class ShuttleWork:
         """The shuttle is home: state where the car is, pass custody on after leaving it, give the station back."""
         key = car_token(*work.car)
         taken = work.handling is Handling.TAKE
-        station = ANY_STATION if taken else work.station.number
-        effects: list[Effect] = []
-        if self.fleet.tokens.holds(key):
-            # After a restart it may be with its new custodian already, who states it then.
-            statement = CarAt(self.fleet.node_id, work.car, station, self.fleet.tokens.seen[key], work.wheelbase_mm)
-            self.fleet.mirror.on_car(statement)
-            effects.append(Send(statement))
-        owner = keeper(self.fleet, work.station)
+        # After a restart it may be with its new custodian already, who states it then.
+        effects = custody.state(self.fleet, work.car, ANY_STATION if taken else work.station.number, work.wheelbase_mm)
+        owner = custody.keeper(self.fleet.site, work.station)
         given = [station_token(work.station)] if taken else [key, station_token(work.station)]
         for token in given:
             # After a restart in the middle of this one of them may be gone already.
             if self.fleet.tokens.holds(token):
                 effects += self.fleet.tokens.give(token, owner, now_us)
         return effects
-
-
-def keeper(fleet: Fleet, station: Station) -> int:
-    """Node that keeps a station's token and its car: the compartment itself, else the track's steward."""
-    for node_id, bay in fleet.site.compartments.items():
-        if bay == station:
-            return node_id
-    return fleet.site.stewards[station.track]

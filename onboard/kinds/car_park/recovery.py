@@ -5,13 +5,17 @@ ride begun and ended. The mirror, bids and plans are not in the journal; the way
 say that the carrier stands (design, section 5).
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Criterion, KindCode, Operation
+from onboard.core.codes import Criterion, KindCode, LegAction, Operation
 from onboard.core.effects import Record
-from onboard.core.messages import CallForProposals, Reference
-from onboard.core.site import Station
+from onboard.core.lift_uses import ride_us
+from onboard.core.lifts import platform_on, sill
+from onboard.core.messages import CallForProposals, CarAt, Reference
+from onboard.core.site import Segment, Site, Station
+from onboard.kinds.car_park.bay_memory import cars_at
+from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import Phase
 from onboard.kinds.car_park.program import Handling, Step, Work
 
@@ -31,7 +35,7 @@ def handled_record(work: Work) -> Record:
     """A handling is over."""
     task = work.call.task
     entry: dict[str, str | int] = {"record": "handled", "task_origin": task.origin, "task": task.number}
-    return Record(entry | {"handling": work.handling.value})
+    return Record(entry | {"handling": work.handling.value, "station": work.station.number})
 
 
 def forfeited_record(task: Reference) -> Record:
@@ -49,6 +53,15 @@ def floor_record(track: int) -> Record:
     return Record({"record": "floor", "track": track})
 
 
+def ends_at(site: Site, step: Step) -> Segment:
+    """Where a carrier is after a step; after a ride on the platform, as a position of the floor's alley."""
+    if step.action is not LegAction.RIDE:
+        return step.destination
+    there = platform_on(site, step.track, sill(site, step.track, step.to_index).track)
+    assert there is not None
+    return there
+
+
 @dataclass
 class Recovery:
     """The journal read from its oldest entry on. ``works`` is what is left to do, in order."""
@@ -60,15 +73,19 @@ class Recovery:
     #: Lift track, board and leave index of a ride that was begun and not ended.
     riding: tuple[int, int, int] | None = None
     is_restart: bool = False
-    #: The last task whose car was left: who asks for it is told so.
-    last_done: Reference | None = None
+    #: The last task whose car was left, and the number of its station: who asks for it is told so. Nobody may have
+    #: heard of it yet where the shuttle has done nothing since.
+    last_done: tuple[Reference, int] | None = None
+    is_news: bool = False
+    #: Where I have said that cars are.
+    cars: dict[Reference, CarAt] = field(default_factory=dict)
     #: Under which version each task was taken on, where it is not the first.
     versions: dict[Reference, int] = field(default_factory=dict)
 
     @classmethod
-    def read(cls, entries: Iterable[Entry]) -> "Recovery":
-        """From a journal; entries of other kinds are passed over."""
-        found = cls()
+    def read(cls, node_id: int, entries: Sequence[Entry]) -> "Recovery":
+        """From the journal of node ``node_id``; entries of other kinds are passed over."""
+        found = cls(cars=cars_at(node_id, entries))
         for entry in entries:
             found._take(entry)
         return found
@@ -84,16 +101,30 @@ class Recovery:
             case "forfeited":
                 self.forget(_task(entry))
             case "step":
-                self.phase = Phase(str(entry["phase"]))
+                self.phase, self.is_news = Phase(str(entry["phase"])), False
             case "handled":
                 self.works = [work for work in self.works if not _is(work, entry)]
                 self.phase = None
                 if entry["handling"] == Handling.LEAVE.value:
-                    self.last_done = _task(entry)
+                    self.last_done, self.is_news = (_task(entry), int(entry.get("station", 0))), True
             case "riding":
                 self.riding = (int(entry["lift"]), int(entry["board"]), int(entry["leave"]))
             case "floor":
                 self.floor, self.riding = int(entry["track"]), None
+
+    def in_hand(self, generation: CarParkGeneration, now_us: int) -> tuple[Step, ...]:
+        """The handling or the ride that the restart fell into, as the first step of the new program."""
+        here = generation.program.standing
+        assert here is not None
+        if self.riding is not None:
+            lift, board, leave = self.riding
+            end_us = now_us + ride_us(generation.site, lift, board, leave)
+            return (Step(LegAction.RIDE, lift, board, leave, now_us, end_us),)
+        if self.phase is None or not self.works:
+            return ()
+        work = self.works[0]
+        end_us = now_us + generation.handling_us(work.station)
+        return (Step(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)
 
     def forget(self, task: Reference) -> None:
         """A task is another's, or was given back."""

@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
@@ -17,8 +18,7 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.effects import Effect, Halt, Report, Send
-from onboard.core.lift_uses import ride_us
-from onboard.core.lifts import platform_on, sill
+from onboard.core.lifts import sill
 from onboard.core.messages import (
     Award,
     CallForProposals,
@@ -35,13 +35,14 @@ from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import is_newer, to_bus_ms
 from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.asking import AskingGeneration
-from onboard.kinds.car_park.generation import CarParkGeneration, Solution
+from onboard.kinds.car_park.generation import CarParkGeneration, Solution, weighed
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.going_around import GoingAround
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
-from onboard.kinds.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
+from onboard.kinds.car_park.recovery import Recovery, award_record, ends_at, floor_record, handled_record, ride_record
 from onboard.kinds.car_park.ride_calls import calls_after_winning
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.site import RideCalls, car_park
@@ -96,7 +97,9 @@ class Robot:
         self.carriage.way_on = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
         self.giving_way = GivingWay(self.fleet, self.program)
-        self.recovery = Recovery.read(self.fleet.entries)
+        self.recovery = Recovery.read(self.fleet.node_id, self.fleet.entries)
+        custody.replay(self.fleet, self.recovery.cars.values())
+        self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
         if self.recovery.floor is not None:
             self.carriage.track = self.recovery.floor
@@ -217,7 +220,7 @@ class Robot:
             case PreAssigned(call_key=key, proposal=proposal):
                 (solution,) = proposal.program
                 self.generation.tentative[key] = solution
-                return []
+                return [Report(weighed(proposal.alternatives))]
             case Released(call_key=key):
                 self.generation.tentative.pop(key, None)
                 return []
@@ -293,7 +296,7 @@ class Robot:
             effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.current)]
         # An initiator that was restarted learns that its task is in hand.
         effects += self._taken_on(self.program.works())
-        return effects + self.fleet.tokens.statements()
+        return effects + custody.statements(self.fleet) + self.fleet.tokens.statements()
 
     def _taken_on(self, works: list[Work]) -> list[Effect]:
         to_take = [work for work in works if work.handling is Handling.TAKE]
@@ -324,17 +327,21 @@ class Robot:
         # Whoever has got one of them meanwhile, its initiator knows.
         mine = self._taken_on(self.recovery.works)
         if self.recovery.last_done is not None:
-            self._done.append(self.recovery.last_done)
+            task, station = self.recovery.last_done
+            self._done.append(task)
+            if self.recovery.is_news:
+                # The power may have failed before this was said, or heard.
+                mine = [self._report(task, TaskPhase.DONE, station), *mine]
         return self._publish(now_us) + mine
 
     def _recover(self, now_us: int) -> list[Effect]:
         """Go on with what the journal says is mine, by a way planned anew (rows P14, P20)."""
         assert self.program.standing is not None
         works = list(self.recovery.works)
-        steps = self._in_hand(works, now_us)
+        steps = self.recovery.in_hand(self.generation, now_us)
         origin, start_us = self.program.standing, now_us
         for step in steps:
-            origin = self._after_ride(step) if step.action is LegAction.RIDE else step.destination
+            origin = ends_at(self.fleet.site, step)
             works, start_us = (works if step.work is None else works[1:]), step.end_us
         more = self.generation.reroute(origin, start_us, works, now_us)
         if more is None:
@@ -351,19 +358,6 @@ class Robot:
         effects += self._publish(now_us)
         return effects + (self._call_lifts(calls[0], more, now_us) if calls else [])
 
-    def _in_hand(self, works: list[Work], now_us: int) -> tuple[Step, ...]:
-        """The handling or the ride that the restart fell into, as the first step of the new program."""
-        here = self.program.standing
-        assert here is not None
-        if self.recovery.riding is not None:
-            lift, board, leave = self.recovery.riding
-            end_us = now_us + ride_us(self.fleet.site, lift, board, leave)
-            return (Step(LegAction.RIDE, lift, board, leave, now_us, end_us),)
-        if self.recovery.phase is None or not works:
-            return ()
-        end_us = now_us + self.generation.handling_us(works[0].station)
-        return (Step(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, works[0]),)
-
     def _resume(self, step: Step) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""
         self._begun = True
@@ -371,11 +365,6 @@ class Robot:
             self.shuttle.resume(step.work, self.recovery.phase)
         elif step.action is LegAction.RIDE:
             self.riding.begin(step.track, step.to_index)
-
-    def _after_ride(self, step: Step) -> Segment:
-        there = platform_on(self.fleet.site, step.track, sill(self.fleet.site, step.track, step.to_index).track)
-        assert there is not None
-        return there
 
     def _take_on(
         self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], version: int, now_us: int

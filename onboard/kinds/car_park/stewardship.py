@@ -15,7 +15,8 @@ from onboard.core.messages import Award, CallForProposals, CarAt, Message, Refer
 from onboard.core.petitions import UNORDERED
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment
-from onboard.kinds.car_park.bay_memory import BayMemory, car_record, winner_record
+from onboard.kinds.car_park import custody
+from onboard.kinds.car_park.bay_memory import BayMemory, winner_record
 
 #: Calls remembered to know which car an award is about; older ones are long closed.
 MAX_CALLS = 64
@@ -39,13 +40,14 @@ class Stewardship:
     _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        self.fleet.tokens.before_taking = self._before_taking
+
     def replay(self, memory: BayMemory) -> None:
         """Take up what the journal tells of the cars that are in my custody still."""
         self.winners.update(memory.winners)
         self.tasks.update(memory.tasks)
-        for car, statement in memory.cars.items():
-            if self.fleet.tokens.holds(car_token(*car)):
-                self.fleet.mirror.on_car(statement)
+        custody.replay(self.fleet, memory.cars.values())
 
     def hear(self, message: Message) -> list[Effect]:
         """Learn from calls and awards; state a car anew when its token has come to me."""
@@ -59,7 +61,7 @@ class Stewardship:
                 if car is not None and self._is_news(car, message):
                     return self.won(car, message.winner, message.task, message.task_version)
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
-                return self._take_custody(Reference(message.token >> 16, message.token & 0xFFFF), message.version)
+                return self._state_anew(custody.car_of(message), message.version)
         return []
 
     def won(self, car: Reference, winner: int, task: Reference, version: int) -> list[Effect]:
@@ -146,14 +148,20 @@ class Stewardship:
             if record.station != OUTSIDE or (car, record) in gone
         ]
 
-    def _take_custody(self, car: Reference, version: int) -> list[Effect]:
+    def _before_taking(self, grant: TokenGrant) -> list[Effect] | None:
+        """A car's place goes to the journal before its token; whoever was to fetch it until now has done so."""
+        effects = custody.before_taking(self.fleet, grant)
+        if effects and grant.token_kind is TokenKind.CAR:
+            self.winners.pop(custody.car_of(grant), None)
+            self.tasks.pop(custody.car_of(grant), None)
+        return effects
+
+    def _state_anew(self, car: Reference, version: int) -> list[Effect]:
+        """Say where a car stands that came into my custody; again with each repeated grant: my word was lost."""
         record = self.fleet.mirror.cars.get(car)
-        if record is None or not self.fleet.tokens.holds(car_token(*car)):
+        if record is None or (record.custodian, record.version) != (self.fleet.node_id, version):
             return []
-        self.winners.pop(car, None)
-        self.tasks.pop(car, None)
-        statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
-        return [car_record(statement), Send(statement)] if self.fleet.mirror.on_car(statement) else []
+        return [Send(CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm))]
 
     def _passing_order(self, segment: Segment, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Tokens go in the plan's order, as its holder and the requester both see it; without one to the oldest."""

@@ -20,11 +20,14 @@ MOST_TASKS = 4_096
 
 @dataclass
 class TaskSeen:
-    """A task by its awards: its owner (0: nobody), under which version, and who won some part of it."""
+    """A task by its awards: its owner (0: nobody), under which version, and who won some part of it.
+
+    ``done_in`` holds the boot counters of the lives in which its owner told that it is done.
+    """
 
     owner: int = 0
     version: int = -1
-    done: bool = False
+    done_in: set[int | None] = field(default_factory=set)
     winners: set[int] = field(default_factory=set)
 
 
@@ -92,9 +95,11 @@ class OneOwner(Rule):
         elif report.phase is TaskPhase.AWARDED and report.sender not in task.winners:
             self.find(event, (report.sender,), f"takes task {_name(report.task)} on without an award")
         if report.phase is TaskPhase.DONE and report.sender == task.owner:
-            if task.done:
+            # Whoever was killed right after it says so once more after its restart: nobody may have heard it.
+            life = self.picture.boots.get(report.sender)
+            if life in task.done_in:
                 self.find(event, (report.sender,), f"tells DONE of task {_name(report.task)} again")
-            task.done = True
+            task.done_in.add(life)
         elif report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED) and report.sender == task.owner:
             task.owner = 0
 

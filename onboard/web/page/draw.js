@@ -1,7 +1,7 @@
 // Drawing the site as an elevation: floors above each other, lifts at the ends, everything to the millimetre that the
 // bus tells. Between two words of a machine it moves on at its last speed, never beyond the next segment's middle.
 
-const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+import { css, ready } from "./paint.js";
 
 export class Stage {
   constructor(canvas) {
@@ -26,17 +26,13 @@ export class Stage {
 
   resize() {
     if (!this.layout) return;
-    const ratio = window.devicePixelRatio || 1;
     const width = this.canvas.clientWidth || 600;
     const cell = width / (this.longest + 3.9);
     const rows = Math.max(1, this.alleys.length);
     const high = Math.max(26, Math.min(cell * 2.4, (window.innerHeight * 0.82) / rows));
     this.cell = cell;
     this.floor = high;
-    this.canvas.style.height = `${Math.round(high * rows + 16)}px`;
-    this.canvas.width = Math.round(width * ratio);
-    this.canvas.height = Math.round((high * rows + 16) * ratio);
-    this.ratio = ratio;
+    this.ratio = ready(this.canvas, width, high * rows + 16);
   }
 
   // Middle of an alley's position, in pixels; index 0 and length + 1 are the platforms.
@@ -105,6 +101,7 @@ export class Stage {
     pen.textBaseline = "middle";
     this.hits = [];
     this.drawFloors(pen, snapshot);
+    this.drawBlocked(pen, snapshot);
     this.drawAhead(pen, snapshot, nowUs, chosen);
     this.drawShafts(pen, snapshot, nowUs);
     for (const machine of this.layout.machines) {
@@ -123,6 +120,8 @@ export class Stage {
       pen.font = `${Math.min(13, floor * 0.3)}px system-ui`;
       pen.fillText(String(alley.number), cell * 0.45, middle);
       for (let index = 1; index <= alley.length; index++) {
+        const spot = this.at(alley.number, index);
+        this.hits.push({ x: spot.x - cell / 2, y: middle - floor * 0.14, w: cell, h: floor * 0.28, what: "segment", id: `p(${alley.number},${index})` });
         for (const side of [0, 1]) this.drawStation(pen, snapshot, alley.number, index, side);
       }
     }
@@ -132,6 +131,26 @@ export class Stage {
       const spot = this.at(alley, index);
       pen.strokeRect(spot.x - cell * 0.46, spot.y - floor * 0.44, cell * 0.92, floor * 0.26);
     }
+  }
+
+  // A segment that nobody can pass, by somebody's word.
+  drawBlocked(pen, snapshot) {
+    const { cell, floor } = this;
+    pen.strokeStyle = css("--bad");
+    pen.lineWidth = 2.5;
+    for (const [number, index] of snapshot.blocked ?? []) {
+      const track = this.tracks.get(number);
+      if (!track || track.kind === "lift") continue;
+      const spot = track.kind === "alley" ? this.at(number, index) : this.at(...track.joins[0]);
+      const y = track.kind === "alley" ? spot.y : spot.y - floor * 0.3;
+      pen.beginPath();
+      pen.moveTo(spot.x - cell * 0.4, y - floor * 0.12);
+      pen.lineTo(spot.x + cell * 0.4, y + floor * 0.12);
+      pen.moveTo(spot.x + cell * 0.4, y - floor * 0.12);
+      pen.lineTo(spot.x - cell * 0.4, y + floor * 0.12);
+      pen.stroke();
+    }
+    pen.lineWidth = 1;
   }
 
   drawStation(pen, snapshot, track, index, side) {

@@ -1,10 +1,13 @@
 // The page: one socket, snapshots in, commands out. What is shown is what the bus told; the page itself knows nothing.
 
 import { Stage } from "./draw.js";
+import { Plan } from "./plan.js";
 
 const $ = (selector) => document.querySelector(selector);
-const stage = new Stage($("#picture"));
+let stage = new Stage($("#picture"));
 const state = { layout: null, snapshot: null, figures: null, chosen: null, call: null, socket: null, at: 0, retry: 500, paused: false };
+// So long without a word on a line that is open, ms: then it is taken for lost and opened again.
+const SILENT_MS = 6000;
 const PACES = [0.5, 1, 2, 5, 10, 20, 60, 120, 300];
 
 // --- the connection ---------------------------------------------------------------------------------------------------
@@ -15,6 +18,7 @@ function connect() {
   state.socket = socket;
   socket.onopen = () => {
     state.retry = 500;
+    state.at = performance.now();
     tell("connected", false);
   };
   socket.onmessage = (event) => take(JSON.parse(event.data));
@@ -28,11 +32,19 @@ function connect() {
 function tell(words, lost) {
   $("#link").textContent = words;
   $("#link").classList.toggle("lost", lost);
+  document.body.classList.toggle("is-lost", lost);
 }
+
+// A line that nobody closed can be dead all the same: a cable, a sleeping computer. A pause is no silence.
+setInterval(() => {
+  const quiet = performance.now() - state.at > SILENT_MS;
+  if (quiet && state.socket?.readyState === WebSocket.OPEN && state.snapshot && !state.paused) state.socket.close();
+}, 1000);
 
 function take(told) {
   if (told.layout) {
     state.layout = told.layout;
+    stage = told.layout.plan ? new Plan($("#picture")) : new Stage($("#picture"));
     stage.setLayout(told.layout);
     begin(told.layout);
   }
@@ -56,11 +68,15 @@ function begin(layout) {
   document.title = `${layout.site}: fleet`;
   $("#site").textContent = layout.site;
   $("#mode").textContent = layout.mode;
-  document.body.classList.toggle("is-simulated", layout.mode === "simulated");
-  $("#controls").hidden = layout.mode === "live";
+  const can = new Set(layout.commands);
+  for (const one of document.querySelectorAll("[data-needs]")) one.hidden = !can.has(one.dataset.needs);
+  $("#controls").hidden = can.size === 0;
+  $("#noun").textContent = layout.noun;
   $("#slider").hidden = layout.mode !== "log";
-  const select = $("#trouble select");
-  select.replaceChildren(...layout.machines.map((machine) => new Option(machine.name, machine.name)));
+  $("#picture").setAttribute("aria-label", `${layout.plan ? "plan" : "elevation"} of the site; the table of machines tells the same`);
+  $("#trouble select").replaceChildren(...layout.machines.map((machine) => new Option(machine.name, machine.name)));
+  $("#blockable").replaceChildren(...(layout.blockable ?? []).map((name) => new Option(name)));
+  state.chosen = state.call = state.place = null;
 }
 
 // --- the tables -------------------------------------------------------------------------------------------------------
@@ -90,13 +106,6 @@ function rows(body, lines, key, choose) {
   if (fresh.length !== body.children.length || fresh.some((row, number) => body.children[number] !== row)) body.replaceChildren(...fresh);
 }
 
-function place(machine) {
-  const track = state.layout.tracks.find((one) => one.number === machine.track);
-  if (!track) return "";
-  if (track.kind === "lift") return `floor ${track.joins[Math.max(0, Math.min(track.joins.length, machine.index) - 1)][0]}`;
-  return `p(${machine.track},${machine.index})`;
-}
-
 function show() {
   const { snapshot, layout } = state;
   $("#clock").textContent = clock(snapshot.now_us);
@@ -107,11 +116,12 @@ function show() {
   rows($("#machines tbody"), layout.machines.map((machine) => {
     const told = snapshot.machines[machine.node];
     const wait = told.wait ? `${told.wait.for ?? ""} ${told.wait.why}`.trim() : "";
-    return { node: machine.node, chosen: state.chosen === machine.node, cells: [machine.name, told.state, place(told), told.car ?? "", wait] };
+    return { node: machine.node, chosen: state.chosen === machine.node, cells: [machine.name, told.state, told.where, told.car ?? "", wait] };
   }), "node", (line) => chooseMachine(line.node));
   rows($("#tasks tbody"), snapshot.tasks.map((task) => ({
     task: task.task, cells: [task.task, task.at, task.what, task.phase, task.owner ?? "", `${Math.round((snapshot.now_us - task.since_us) / 1e6)} s`],
-  })), "task", () => {});
+    owner: layout.machines.find((one) => one.name === task.owner)?.node,
+  })), "task", (line) => (line.owner === undefined ? chooseCall(snapshot.calls.findLast((call) => call.task === line.task)?.id) : chooseMachine(line.owner)));
   showCalls();
   showEvents();
   showFigures();
@@ -119,18 +129,27 @@ function show() {
 }
 
 function cost(call, bid) {
-  return bid.cost.end_us !== undefined ? `${((bid.cost.end_us - call.opened_us) / 1e6).toFixed(1)} s` : `${bid.cost.number} ${bid.cost.unit}`;
+  return bid.cost.end_us !== undefined ? `${((bid.cost.end_us - call.opened_us) / 1e6).toFixed(1)} s` : bid.cost.unit === "ct" ? (bid.cost.number / 100).toFixed(2) : `${bid.cost.number} ${bid.cost.unit}`;
 }
 
+// Lines stay the same elements as long as they are shown: whoever goes through them by keyboard is not thrown out.
 function showCalls() {
+  const box = $("#calls");
+  const old = new Map([...box.children].map((line) => [line.dataset.call, line]));
   const lines = state.snapshot.calls.slice().reverse().map((call) => {
-    const line = document.createElement("div");
-    line.className = `call${call.won ? " won" : call.result ? " over" : ""}`;
+    const line = old.get(call.id) ?? document.createElement("div");
+    const told = JSON.stringify([call, state.call === call.id]);
+    if (line.dataset.told === told) return line;
+    line.dataset.told = told;
     line.dataset.call = call.id;
-    line.onclick = () => { state.call = call.id; state.chosen = null; showDetails(); };
+    line.className = `call${call.won ? " won" : call.result ? " over" : ""}${state.call === call.id ? " chosen" : ""}`;
+    line.tabIndex = 0;
+    line.setAttribute("role", "button");
+    line.onclick = () => chooseCall(call.id);
+    line.onkeydown = (event) => event.key === "Enter" && chooseCall(call.id);
     const when = document.createElement("time");
     when.textContent = clock(call.opened_us);
-    line.append(when, `${call.by}: ${call.what}${call.car ? ` car ${call.car}` : ""} `);
+    line.replaceChildren(when, `${call.by}: ${call.what}${call.thing ? ` ${call.thing}` : ""} `);
     const best = call.bids.at(-1);
     for (const bid of call.bids) {
       const word = document.createElement("span");
@@ -141,7 +160,7 @@ function showCalls() {
     if (call.result) line.append(call.won ? `→ ${call.winner}` : `(${call.result})`);
     return line;
   });
-  $("#calls").replaceChildren(...lines);
+  if (lines.length !== box.children.length || lines.some((line, number) => box.children[number] !== line)) box.replaceChildren(...lines);
 }
 
 function showEvents() {
@@ -156,10 +175,12 @@ function showEvents() {
 
 function showFigures() {
   const { snapshot, figures } = state;
-  const told = [["parked", snapshot.figures.parked], ["fetched", snapshot.figures.fetched], ["calls", snapshot.figures.calls], ["bids", snapshot.figures.bids]];
-  if (figures) {
+  const told = Object.entries(snapshot.figures);
+  if (figures?.slack) {
     told.push(["messages a task", figures.messages_per_task.toFixed(0)], ["empty travel", `${(figures.robots_empty_share * 100).toFixed(0)} %`]);
     told.push(["give-ways", figures.give_ways], ["promised minus actual", figures.slack.count ? `${figures.slack.mean_s.toFixed(1)} s` : "none"]);
+  } else if (figures) {
+    told.push(["frames a task", figures.messages_per_task?.toFixed(0) ?? "none"], ["call to end, mean", figures.mean_time_s === null ? "none" : `${figures.mean_time_s.toFixed(0)} s`]);
   }
   if (snapshot.waiting) told.push(["waiting in, mean", snapshot.waiting.in_s === null ? "none" : `${snapshot.waiting.in_s.toFixed(0)} s`], ["waiting out, mean", snapshot.waiting.out_s === null ? "none" : `${snapshot.waiting.out_s.toFixed(0)} s`]);
   const list = $("#figures");
@@ -171,8 +192,8 @@ function showFigures() {
     text.dataset.figure = name;
     return [term, text];
   }));
-  const series = [["bus load", 1, (value) => `${(value * 100).toFixed(2)} %`], ["open tasks", 2, String], ["parked", 3, String], ["fetched", 4, String]];
-  $("#charts").replaceChildren(...series.map(([name, column, words]) => chart(name, snapshot.chart.map((row) => row[column]), words)));
+  $("#charts").replaceChildren(...state.layout.series.map((name, number) =>
+    chart(name, snapshot.chart.map((row) => row[number + 1]), name === "bus load" ? (value) => `${(value * 100).toFixed(2)} %` : String)));
 }
 
 function chart(name, values, words) {
@@ -191,13 +212,40 @@ function chart(name, values, words) {
 
 function chooseMachine(node) {
   state.chosen = state.chosen === node ? null : node;
-  state.call = null;
+  state.call = state.place = null;
   show();
+}
+
+function chooseCall(id) {
+  state.call = state.call === id ? null : id ?? null;
+  state.chosen = state.place = null;
+  show();
+}
+
+// A place or shape of the drawing: what is there is told anew with every snapshot.
+function placeLines() {
+  const { what, id } = state.place;
+  if (what === "place") {
+    const car = state.snapshot.cars?.[id];
+    return [`place p(${id >> 8},${id & 127})${(id >> 7) & 1 ? "F" : "N"}: ${car ? `car ${car}` : "free"}`];
+  }
+  if (what === "segment") {
+    const [track, index] = id.match(/\d+/g).map(Number);
+    const holder = state.layout.machines.find((one) => state.snapshot.machines[one.node].holds?.some(([k, i]) => k === track && i === index));
+    const blocked = state.snapshot.blocked?.some(([k, i]) => k === track && i === index);
+    return [`segment ${id}: ${blocked ? "blocked" : holder ? `held by ${holder.name}` : "free"}`];
+  }
+  const shape = state.layout.plan?.shapes.find((one) => one.id === id);
+  const mark = state.snapshot.marks?.[id] ?? {};
+  const held = state.layout.machines.filter((one) => state.snapshot.machines[one.node].held?.some(([held]) => held === id));
+  const lines = [shape ? `${shape.kind} ${shape.name}` : id, ...(mark.lines ?? [])];
+  if (held.length) lines.push(`held by ${held.map((one) => one.name).join(", ")}`);
+  return lines;
 }
 
 function showDetails() {
   const box = $("#details");
-  const lines = state.call !== null ? callLines() : state.chosen !== null ? machineLines() : state.place ? [state.place] : [];
+  const lines = state.call !== null ? callLines() : state.chosen !== null ? machineLines() : state.place ? placeLines() : [];
   box.hidden = lines.length === 0;
   box.querySelector("div").replaceChildren(...lines.map((text) => {
     const line = document.createElement("p");
@@ -211,11 +259,12 @@ function machineLines() {
   const { snapshot, layout } = state;
   const machine = layout.machines.find((one) => one.node === state.chosen);
   const told = snapshot.machines[machine.node];
-  const lines = [`${machine.name}: ${machine.kind}, node ${machine.node}, ${told.state}, at ${place(told)}`];
-  if (told.car) lines.push(`carries car ${told.car}`);
+  const lines = [`${machine.name}: ${machine.kind}, node ${machine.node}, ${told.state}, at ${told.where}`];
+  if (told.car) lines.push(`${layout.noun} ${told.car} in hand`);
   if (told.wait) lines.push(`waits for p(${told.wait.at.join(",")})${told.wait.for ? ` of ${told.wait.for}` : ""}: ${told.wait.why}`);
-  if (told.holds.length) lines.push(`holds ${told.holds.map(([track, index]) => `p(${track},${index})`).join(" ")}`);
-  for (const [track, from, to, begin, end] of told.plan) lines.push(`${clock(begin)} to ${clock(end)}: ${track >= 128 ? "lift or spur" : "floor"} ${track}, ${from} to ${to}`);
+  if (told.holds?.length) lines.push(`holds ${told.holds.map(([track, index]) => `p(${track},${index})`).join(" ")}`);
+  for (const [us, words] of told.told ?? []) lines.push(us === null ? words : `${clock(us)}: ${words}`);
+  for (const [track, from, to, begin, end] of told.plan ?? []) lines.push(`${clock(begin)} to ${clock(end)}: ${track >= 128 ? "lift or spur" : "floor"} ${track}, ${from} to ${to}`);
   if (told.doors) lines.push(`street door ${told.doors.input}, alley door ${told.doors.output}, light ${told.doors.light}`);
   const task = snapshot.tasks.find((one) => one.owner === machine.name);
   if (task) lines.push(`works on task ${task.task} (${task.what}, ${task.phase})${task.promised_us ? `, promised for ${clock(task.promised_us)}` : ""}`);
@@ -225,7 +274,7 @@ function machineLines() {
 function callLines() {
   const call = state.snapshot.calls.find((one) => one.id === state.call);
   if (!call) return ["this call is long over"];
-  const lines = [`call ${call.id} of ${call.by}: ${call.what}${call.car ? ` car ${call.car}` : ""}, from ${call.from} to ${call.to}`, `opened ${clock(call.opened_us)}${call.deadline_us ? `, deadline ${clock(call.deadline_us)}` : ""}${call.attempt > 1 ? `, attempt ${call.attempt}` : ""}`];
+  const lines = [`call ${call.id} of ${call.by}: ${call.what}${call.thing ? ` ${call.thing}` : ""}, from ${call.from} to ${call.to}`, `opened ${clock(call.opened_us)}${call.deadline_us ? `, deadline ${clock(call.deadline_us)}` : ""}${call.attempt > 1 ? `, attempt ${call.attempt}` : ""}`];
   for (const bid of call.bids) lines.push(`${bid.by} bids ${cost(call, bid)} after ${((bid.at_us - call.opened_us) / 1e3).toFixed(0)} ms`);
   lines.push(call.result ? (call.won ? `won by ${call.winner}: the best bid heard` : `ended: ${call.result}`) : "open");
   return lines;
@@ -244,6 +293,7 @@ function act(command) {
   else if (command === "slower") pace(-1);
   else if (command === "faster") pace(1);
   else if (command === "repair") send("repair", { machine: $("#trouble select").value });
+  else if (command === "clear") send("clear", { place: $("#trouble [name=place]").value });
   else send(command);
 }
 
@@ -255,7 +305,7 @@ document.addEventListener("click", (event) => {
 for (const form of document.querySelectorAll("form[data-command]")) {
   form.addEventListener("submit", (event) => {
     event.preventDefault();
-    const values = Object.fromEntries([...new FormData(form)].map(([name, value]) => [name, name === "machine" ? value : Number(value)]));
+    const values = Object.fromEntries([...new FormData(form)].map(([name, value]) => [name, name === "machine" || name === "place" ? value : Number(value)]));
     send(form.dataset.command, values);
   });
 }
@@ -266,9 +316,10 @@ $("#slider input").addEventListener("input", (event) => {
 });
 
 document.addEventListener("keydown", (event) => {
-  if (event.target.matches("input, select") || event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.target.matches("input, select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
   const keys = { " ": "pause", "-": "slower", "+": "faster", "=": "faster", i: "car_in", o: "car_out" };
-  if (keys[event.key] && (state.layout?.mode === "simulated" || (state.layout?.mode === "log" && !"io".includes(event.key)))) {
+  const needs = { pause: "pause", slower: "speed", faster: "speed" }[keys[event.key]] ?? keys[event.key];
+  if (needs && state.layout?.commands.includes(needs)) {
     if (event.target.matches("button") && event.key === " ") return;
     event.preventDefault();
     act(keys[event.key]);
@@ -290,7 +341,10 @@ $("#picture").addEventListener("click", (event) => {
   state.place = null;
   if (hit?.what === "machine") return chooseMachine(hit.id);
   state.chosen = null;
-  if (hit) state.place = `place p(${hit.id >> 8},${hit.id & 127})${(hit.id >> 7) & 1 ? "F" : "N"}: ${hit.car ? `car ${hit.car}` : "free"}`;
+  if (hit) state.place = { what: hit.what, id: hit.id };
+  const shape = state.layout.plan?.shapes.find((one) => one.id === hit?.id);
+  const name = shape ? shape.name : hit?.id;
+  if (state.layout.blockable?.includes(name)) $("#trouble [name=place]").value = name;
   show();
 });
 

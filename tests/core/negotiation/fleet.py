@@ -1,5 +1,6 @@
 """A fleet on the smallest bus there is: messages one after the other, each heard by all others after a while.
 
+Each message goes over the wire as the frames of ``dbc/fleet.dbc``: what is heard, and what a test looks at, is decoded.
 ``Bus.lose`` may take a message from a single receiver, as an inconsistent omission or a full receive queue does. Time
 begins a second before bus time wraps on the wire, so every run crosses the wrap.
 """
@@ -29,6 +30,8 @@ from onboard.core.negotiation import (
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Timing
+from onboard.wire.codec import fleet_codec
+from onboard.wire.decoder import Decoder
 
 START_US = (BUS_MS_MODULUS - 1_000) * 1_000
 CALLER = 1
@@ -204,6 +207,14 @@ class Machine:
 Loss = Callable[[Message, int], bool]
 
 
+def decoded(message: Message) -> Message:
+    """The message that whoever hears its frames puts together."""
+    decoder = Decoder(fleet_codec())
+    *unfinished, whole = [decoder.feed(frame, 0) for frame in fleet_codec().encode(message)]
+    assert whole is not None and unfinished.count(None) == len(unfinished), f"{message} comes to nothing"
+    return whole
+
+
 def nothing_lost(message: Message, receiver: int) -> bool:
     """A perfect bus."""
     return False
@@ -224,7 +235,7 @@ class Bus:
 
     def post(self, messages: list[Message]) -> None:
         """Put messages on the bus; each takes the latency, one after the other."""
-        for message in messages:
+        for message in map(decoded, messages):
             self._free_us = max(self._free_us, self.now_us) + self.latency_us
             self.wire.append((self.now_us, message))
             heapq.heappush(self._arrivals, (self._free_us, next(self._sequence), message))

@@ -1,0 +1,156 @@
+"""``onboard gateway``: publish a whole site to a broker from any bus that is only listened to."""
+
+import argparse
+import asyncio
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from onboard.config.problems import ConfigError
+from onboard.config.site import load_site
+from onboard.core.site import Site
+from onboard.gateway.gateway import Gateway
+from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings
+from onboard.gateway.reports import Reports
+from onboard.gateway.settings import GatewayError, GatewaySettings, level
+from onboard.io.broker_address import BrokerAddress
+from onboard.io.journal import FileJournal
+from onboard.io.mqtt import MqttBroker
+from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
+from onboard.kinds.registry import system_of
+from onboard.ports.broker import BrokerError
+from onboard.wire.codec import codecs
+
+EXAMPLES = """\
+exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the command line or in a file
+
+examples:
+  onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1
+      listens to a real bus; terminal reports are kept in ./spool until the broker has them
+  onboard gateway -i socketcand-asyncio -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site mysite.toml \\
+          --mqtt mqtts://broker.example --mqtt-ca ca.pem --mqtt-cert gateway.pem --mqtt-key gateway.key --vda5050 3.0
+"""
+#: What has become of the sessions is looked at so often, s, and told where it has changed.
+NEWS_S = 1.0
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The command line of ``onboard gateway``."""
+    parser = argparse.ArgumentParser(
+        prog="onboard gateway",
+        description="Publish a site over MQTT: VDA 5050 for every machine that travels, JSON for the fleet.",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    parser.add_argument(
+        "--spool",
+        type=Path,
+        default=Path("spool"),
+        metavar="DIR",
+        help="where terminal reports wait for the broker (default: ./%(default)s)",
+    )
+    add_mqtt_arguments(parser, required=True)
+    add_bus_arguments(parser)
+    return parser
+
+
+def main(argv: Sequence[str]) -> int:
+    """Entry point; returns the exit status."""
+    parser = build_parser()
+    args = parser.parse_args(argv)
+    if not hasattr(args, "interface"):
+        parser.error("name a bus: -i INTERFACE -c CHANNEL")
+    try:
+        site = load_site(args.site)
+        settings = gateway_settings(args)
+        address = broker_address(args)
+        bus = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
+        return asyncio.run(_run(site, settings, address, bus, args.spool))
+    except (ConfigError, BusOpenError, GatewayError, BrokerError) as error:
+        for line in str(error).splitlines():
+            print(line if isinstance(error, ConfigError) else f"onboard gateway: {line}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"onboard gateway: --spool {args.spool}: {error.strerror or error}", file=sys.stderr)
+        return 2
+
+
+async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bus: BusSettings, spool: Path) -> int:
+    broker = MqttBroker(address)
+    journal = FileJournal(spool)
+    try:
+        reports = Reports(journal)
+        opened = await open_bus(bus)
+        try:
+            system = system_of(site)
+            codec = codecs(system.name, system.messages).fleet
+            client = f"{settings.prefix}-{level(site.name)}"
+            gateway = Gateway(site, codec, broker, settings, reports=reports, wall_us=wall_us, client=client)
+            # What a node of this computer sends on the same interface is heard as well.
+            opened.subscribe(gateway.on_frame, gateway.on_frame)
+            print("\n".join(watch_lines(address, site, settings)), flush=True)
+            return await _until_ended(gateway, opened)
+        finally:
+            await opened.close()
+    finally:
+        await journal.close()
+
+
+async def _until_ended(gateway: Gateway, bus: OpenBus) -> int:
+    """Until a signal ends it, or the bus is gone for good."""
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, gateway.stop)
+    status = 0
+
+    def on_lost(task: "asyncio.Task[str]") -> None:
+        nonlocal status
+        if not task.cancelled():
+            status = 1
+            print(f"onboard gateway: the bus is gone: {task.result()}", file=sys.stderr)
+            gateway.stop()
+
+    lost = loop.create_task(bus.wait_lost())
+    lost.add_done_callback(on_lost)
+    news = loop.create_task(_tell_news(gateway))
+    try:
+        await gateway.run()
+    finally:
+        lost.cancel()
+        news.cancel()
+    return status
+
+
+async def _tell_news(gateway: Gateway) -> None:
+    """One line whenever the sessions with the broker have changed, or something was lost."""
+    told = ""
+    while True:
+        await asyncio.sleep(NEWS_S)
+        line = gateway.news()
+        if line != told:
+            told = line
+            print(line, flush=True)
+
+
+def watch_lines(address: BrokerAddress, site: Site, settings: GatewaySettings) -> list[str]:
+    """How to watch with mosquitto's own program."""
+    words = f"mosquitto_sub -h {address.host} -p {address.port}"
+    if address.user is not None:
+        words += f" -u {address.user} -P ..."
+    if address.tls:
+        words += f" --cafile {address.ca or '...'} --cert ... --key ..."
+    root = f"{settings.prefix}/{level(site.name)}"
+    machines = f"{settings.dialect.topic_root}/{settings.manufacturer}"
+    return [
+        f"publishing {site.name} to {address}, VDA 5050 {settings.version}; watch with:",
+        f"  {words} -v -t '{root}/#'",
+        f"  {words} -v -t '{machines}/+/state'",
+    ]
+
+
+def wall_us() -> int:
+    """Wall time in us since 1970."""
+    return time.time_ns() // 1000

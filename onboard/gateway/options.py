@@ -1,0 +1,64 @@
+"""The options by which a command line names a broker and what is published there."""
+
+import argparse
+import os
+from pathlib import Path
+
+from onboard.gateway.settings import GatewayError, GatewaySettings
+from onboard.io.broker_address import BrokerAddress, parse_broker
+
+
+def add_mqtt_arguments(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Add ``--mqtt`` and what goes with it."""
+    group = parser.add_argument_group("MQTT (docs/mqtt.md)")
+    group.add_argument(
+        "--mqtt",
+        required=required,
+        metavar="URL",
+        help="the broker: mqtt://[USER@]HOST[:PORT], or mqtts:// with TLS; a password is read from --mqtt-password",
+    )
+    group.add_argument("--mqtt-ca", type=Path, metavar="FILE", help="certificate of the broker's authority, PEM")
+    group.add_argument("--mqtt-cert", type=Path, metavar="FILE", help="own certificate, PEM")
+    group.add_argument("--mqtt-key", type=Path, metavar="FILE", help="key of the own certificate, PEM")
+    group.add_argument("--mqtt-password", type=Path, metavar="FILE", help="file whose first line is the password")
+    group.add_argument("--vda5050", default="2.1", metavar="VERSION", help="2.1 or 3.0 (default: %(default)s)")
+    group.add_argument("--manufacturer", default="onboard", metavar="NAME", help="in topics (default: %(default)s)")
+    group.add_argument("--prefix", default="onboard", metavar="NAME", help="of fleet topics (default: %(default)s)")
+
+
+def broker_address(args: argparse.Namespace) -> BrokerAddress:
+    """The broker that the options name. Raises ``GatewayError``: option, value, remedy."""
+    try:
+        found = parse_broker(args.mqtt)
+    except ValueError as error:
+        raise GatewayError(f"--mqtt {error}") from error
+    files = {"--mqtt-ca": args.mqtt_ca, "--mqtt-cert": args.mqtt_cert, "--mqtt-key": args.mqtt_key}
+    for option, path in files.items():
+        if path is not None and not found.tls:
+            raise GatewayError(f"{option} {path}: goes with TLS only; write --mqtt mqtts://...")
+        if path is not None and not os.access(path, os.R_OK):
+            raise GatewayError(f"{option} {path}: cannot be read; name an existing PEM file")
+    return BrokerAddress(
+        found.host,
+        found.port,
+        found.tls,
+        found.user,
+        _password(args.mqtt_password),
+        args.mqtt_ca,
+        args.mqtt_cert,
+        args.mqtt_key,
+    )
+
+
+def gateway_settings(args: argparse.Namespace, serials: frozenset[str] = frozenset()) -> GatewaySettings:
+    """What is published. Raises ``GatewayError``."""
+    return GatewaySettings(version=args.vda5050, manufacturer=args.manufacturer, prefix=args.prefix, serials=serials)
+
+
+def _password(path: Path | None) -> str | None:
+    if path is None:
+        return None
+    try:
+        return path.read_text(encoding="utf-8").splitlines()[0]
+    except (OSError, UnicodeDecodeError, IndexError) as error:
+        raise GatewayError(f"--mqtt-password {path}: {error}; name a file whose first line is the password") from error

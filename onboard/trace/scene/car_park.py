@@ -1,0 +1,166 @@
+"""The car park's elevation: tracks and places, cars, doors and bays, plans and segments held ahead of each robot."""
+
+from typing import Any
+
+from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, LegAction, TokenKind
+from onboard.core.messages import (
+    BayState,
+    BusTime,
+    DoorState,
+    Message,
+    Progress,
+    Reference,
+    ShuttleState,
+    TokenGrant,
+    TokenHeld,
+)
+from onboard.core.serial import is_newer
+from onboard.core.site import Segment, Site, Station, TrackKind
+from onboard.trace.scene.scene import BusClock, Json
+from onboard.trace.view import SiteView
+
+
+class CarParkScene:
+    """Fed beside ``view``, which knows where machines and cars are."""
+
+    noun = "car"
+
+    def __init__(self, site: Site, view: SiteView) -> None:
+        self.site = site
+        self.view = view
+        self._clock = BusClock()
+        self._doors: dict[int, dict[str, str]] = {}
+        self._bays: dict[int, dict[str, Any]] = {}
+        self._shuttles: dict[int, dict[str, Any]] = {}
+        self._tokens: dict[int, tuple[int, int]] = {}
+        self._speeds: dict[int, tuple[int, int]] = {}
+
+    def feed(self, message: Message, time_us: int) -> None:
+        """As in the port."""
+        match message:
+            case BusTime():
+                self._clock.feed(message, time_us)
+            case TokenGrant() if message.token_kind is TokenKind.SEGMENT:
+                self._on_token(message.token, message.version, message.holder)
+            case TokenHeld() if message.token_kind is TokenKind.SEGMENT:
+                self._on_token(message.token, message.version, message.sender)
+            case Progress():
+                self._speeds[message.sender] = (message.speed_mm_s, time_us)
+
+    def feed_device(self, node: int, message: Message, time_us: int) -> None:
+        """As in the port."""
+        match message:
+            case DoorState():
+                self._doors[node] = {
+                    "input": message.input_door.name.lower(),
+                    "output": message.output_door.name.lower(),
+                    "light": message.light.name.lower(),
+                }
+            case BayState():
+                self._bays[node] = {"car": message.load_kg > 0, "person": message.person_inside}
+            case ShuttleState():
+                self._shuttles[node] = {"mm": message.extension_mm, "side": int(message.side)}
+
+    def _on_token(self, number: int, version: int, holder: int) -> None:
+        known = self._tokens.get(number)
+        if known is None or not is_newer(known[0], version, 16):
+            self._tokens[number] = (version, holder)
+
+    def layout(self) -> Json:
+        """Tracks and places; ``blockable`` are the segments that a person may name."""
+        site = self.site
+        return {
+            "carrier_mm": site.carrier_length_mm,
+            "tracks": [
+                {
+                    "number": track.number,
+                    "kind": track.kind.value,
+                    "length": track.length,
+                    "pitch_mm": track.pitch_mm,
+                    "joins": [[join.track, join.index] for join in track.joins],
+                }
+                for track in site.tracks.values()
+            ],
+            "places": [place.number for place in site.places],
+            "blockable": [
+                str(Segment(track.number, index))
+                for track in site.tracks.values()
+                if track.kind is not TrackKind.LIFT
+                for index in range(1, track.length + 1)
+            ],
+        }
+
+    def marks(self, now_us: int) -> Json:
+        """Cars by the station where they stand, and segments that somebody says nobody can pass."""
+        return {
+            "cars": {station: f"{car.origin}.{car.number}" for station, car in self.view.places_taken().items()},
+            "blocked": [[*segment] for segment in sorted(self.view.blocked)],
+        }
+
+    def machine(self, node: int, now_us: int) -> Json:
+        """As in the port."""
+        view = self.view
+        segment, offset_mm = view.positions[node]
+        speed_mm_s, since_us = self._speeds.get(node, (0, 0))
+        aboard = view.aboard.get(node)
+        told: Json = {
+            "track": segment.track,
+            "index": segment.index,
+            "offset_mm": offset_mm,
+            "speed_mm_s": speed_mm_s,
+            "since_us": since_us,
+            "where": self._where(segment),
+            "car": f"{aboard.origin}.{aboard.number}" if aboard is not None else None,
+            "plan": self._plan(node, now_us),
+            "holds": self._held(node),
+        }
+        for name, known in (("doors", self._doors), ("bay", self._bays), ("shuttle", self._shuttles)):
+            if node in known:
+                told[name] = known[node]
+        return told
+
+    def _where(self, segment: Segment) -> str:
+        track = self.site.tracks.get(segment.track)
+        if track is None or track.kind is not TrackKind.LIFT:
+            return str(segment)
+        floor = track.joins[max(0, min(len(track.joins), segment.index) - 1)].track
+        return f"floor {floor}"
+
+    def _plan(self, node: int, now_us: int) -> list[list[int]]:
+        """What is left of a firm itinerary: [track, from, to, begin us, end us, is a ride or work] a leg."""
+        plan = self.view.itineraries.get(node)
+        if plan is None:
+            return []
+        legs, begin_us = [], self._clock.log_us(plan.stamp.award_ms, now_us)
+        for leg in plan.legs:
+            end_us = self._clock.log_us(leg.end_ms, now_us)
+            if begin_us is None or end_us is None:
+                return []
+            if end_us > now_us and leg.action is not LegAction.STAND:
+                legs.append([leg.track, leg.from_index, leg.to_index, begin_us, end_us, int(leg.action)])
+            begin_us = end_us
+        return legs
+
+    def _held(self, node: int) -> list[list[int]]:
+        if self.site.machines[node].kind is not KindCode.ROBOT:
+            return []
+        return sorted([number >> 8, number & 0xFF] for number, (_, holder) in self._tokens.items() if holder == node)
+
+    def thing(self, reference: Reference) -> str:
+        """A car as its ticket names it: who named it, and the number there."""
+        return f"car {reference.origin}.{reference.number}"
+
+    def place(self, number: int) -> str:
+        """As in the port."""
+        if number == ANY_STATION:
+            return "any place"
+        if number == OUTSIDE:
+            return "outside"
+        for node, station in self.site.compartments.items():
+            if station.number == number:
+                return self.view.name(node)
+        return str(Station.from_number(number))
+
+    def task_end(self, reference: Reference, station: int) -> str:
+        """The view tells it: parked or fetched."""
+        return ""

@@ -1,0 +1,170 @@
+"""The custody of a car: its token and the word where it stands are passed on together, whatever fails in between."""
+
+from collections.abc import Iterable
+
+import pytest
+
+from onboard.core.authority import car_token
+from onboard.core.codes import (
+    ANY_STATION,
+    DeskInput,
+    DeskText,
+    DoorPosition,
+    DriveMode,
+    LightColour,
+    Operation,
+    TaskPhase,
+    TokenKind,
+)
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.holon import Holon
+from onboard.core.messages import (
+    BayState,
+    BusTime,
+    CarAt,
+    DeskEvent,
+    DeskOrder,
+    DoorState,
+    DriveState,
+    Message,
+    Reference,
+    SyncRequest,
+    TaskReport,
+    TokenGrant,
+    TokenHeld,
+)
+from onboard.core.site import Station
+from onboard.kinds.registry import factory_for
+from tests.sites import one_floor
+
+SITE = one_floor()
+BAY, ROBOT, STRANGER = 1, 11, 200
+CAR, TASK, WHEELBASE_MM = Reference(BAY, 1), Reference(BAY, 7), 2_600
+HERE = SITE.compartments[BAY].number
+PLACE = SITE.places[0].number
+Entry = dict[str, str | int]
+
+
+def machine(node: int, entries: Iterable[Entry] = ()) -> Holon:
+    """A machine with its journal, that knows the bus time."""
+    past = [{"record": "boot", "boot": 1}, *entries] if entries else []
+    made = Holon(
+        SITE, SITE.machines[node], factory_for(SITE, SITE.machines[node].kind), boot=len(past[:1]) + 1, entries=past
+    )
+    made.start(0)
+    if node != BAY:
+        made.receive(BusTime(BAY, 0), 0)
+    return made
+
+
+def said(effects: list[Effect]) -> list[Message]:
+    return [effect.message for effect in effects if isinstance(effect, Send)]
+
+
+def records(effects: list[Effect]) -> list[Entry]:
+    return [dict(effect.entry) for effect in effects if isinstance(effect, Record)]
+
+
+def grant(version: int, sender: int = ROBOT, holder: int = BAY) -> TokenGrant:
+    return TokenGrant(sender, TokenKind.CAR, car_token(*CAR).number, version, holder)
+
+
+def put_down(station: int = PLACE, version: int = 2) -> CarAt:
+    """The robot's word, under the version before that of its grant."""
+    return CarAt(ROBOT, CAR, station, version, WHEELBASE_MM)
+
+
+@pytest.mark.parametrize(
+    "heard",
+    [
+        [],
+        [put_down(ANY_STATION)],
+        [put_down(PLACE, 1)],
+    ],
+    ids=["nothing", "aboard", "older"],
+)
+def test_a_steward_takes_no_car_before_its_giver_has_said_where_it_stands(heard: list[CarAt]) -> None:
+    steward = machine(BAY)
+    for word in heard:
+        steward.receive(word, 10)
+    assert said(steward.receive(grant(3), 20)) == [], "as if it had not been heard"
+    both = [*steward.receive(put_down(), 30), *steward.receive(grant(3), 40)]
+    assert TokenHeld(BAY, TokenKind.CAR, car_token(*CAR).number, 3) in said(both)
+    assert CarAt(BAY, CAR, PLACE, 3, WHEELBASE_MM) in said(both)
+
+
+def test_the_place_is_in_the_journal_before_the_token() -> None:
+    steward = machine(BAY)
+    written = records([*steward.receive(put_down(), 10), *steward.receive(grant(3), 20)])
+    assert [entry["record"] for entry in written] == ["car_at", "token_held"]
+    killed_between = machine(BAY, [journalled_place(BAY, HERE, 1), *written[:1]])
+    assert not any(isinstance(word, CarAt) for word in said(killed_between.receive(SyncRequest(ROBOT, BAY), 30)))
+    again = [*killed_between.receive(put_down(), 40), *killed_between.receive(grant(3), 50)]
+    assert CarAt(BAY, CAR, PLACE, 3, WHEELBASE_MM) in said(again)
+
+
+def test_what_was_journalled_under_an_older_version_is_no_knowledge_of_the_place() -> None:
+    entries = [journalled_place(BAY, HERE, 1), token_entry("token_held", 3, BAY)]
+    assert not any(isinstance(word, CarAt) for word in said(machine(BAY, entries).receive(SyncRequest(ROBOT, BAY), 9)))
+
+
+@pytest.mark.parametrize("is_restarted", [False, True])
+def test_the_giver_says_the_place_again_with_each_repeated_grant(is_restarted: bool) -> None:
+    """As long as the new custodian is not heard; also when the giver was killed in between."""
+    entries = [token_entry("token_held", 2, ROBOT), journalled_place(ROBOT, PLACE, 2)]
+    if is_restarted:
+        robot = machine(ROBOT, [*entries, token_entry("token_given", 3, BAY)])
+    else:
+        robot = machine(ROBOT, entries)
+        robot.tokens.give(car_token(*CAR), BAY, 0)
+    again = said(robot.wake(SITE.timing.token_repeat_us))
+    assert again.index(put_down()) == again.index(grant(3)) - 1
+    robot.receive(CarAt(BAY, CAR, PLACE, 3, WHEELBASE_MM), 300_000)
+    robot.receive(TokenHeld(BAY, TokenKind.CAR, car_token(*CAR).number, 3), 300_010)
+    assert put_down() not in said(robot.wake(1_000_000))
+
+
+@pytest.mark.parametrize("has_gone_on", [False, True])
+def test_a_robot_killed_before_it_said_done_says_so_when_it_knows_where_it_is(has_gone_on: bool) -> None:
+    entries: list[Entry] = [{"record": "handled", "task_origin": BAY, "task": 7, "handling": "leave", "station": PLACE}]
+    if has_gone_on:
+        entries.append({"record": "step", "phase": "reach", "handling": "take", "station": PLACE, "car": 1})
+    robot = machine(ROBOT, entries)
+    home = SITE.machines[ROBOT].home
+    at_mm = robot.behaviour.carriage.axis.position_mm(home.index)  # type: ignore[attr-defined]  # the robot's own axis
+    standing = DriveState(ROBOT, 0, at_mm, 0, DriveMode.STANDING, True)
+    effects = robot.sense(standing, 10)
+    reports = [word for word in said(effects) if isinstance(word, TaskReport)]
+    done = [word for word in reports if word.phase is TaskPhase.DONE]
+    assert [(word.task, word.station) for word in done] == ([] if has_gone_on else [(TASK, PLACE)])
+    assert not any(isinstance(word, TaskReport) for word in said(robot.sense(standing, 20))), "once"
+
+
+def test_who_presses_again_inside_gets_the_ticket_that_the_power_failed_to_print() -> None:
+    entries = [
+        token_entry("token_held", 1, BAY),
+        {"record": "job", "task_origin": BAY, "task": 1, "operation": int(Operation.PARK), "car_origin": BAY, "car": 1}
+        | {"wheelbase_mm": WHEELBASE_MM},
+    ]
+    bay = machine(BAY, entries)
+    bay.sense(DoorState(BAY, DoorPosition.OPEN, DoorPosition.LOCKED, LightColour.GREEN), 10)
+    first = bay.sense(BayState(BAY, 1_500, 4_300, 1_500, WHEELBASE_MM, True, False), 20)
+    assert CarAt(BAY, CAR, HERE, 1, WHEELBASE_MM) in said(first), "nor had it been said that the car is here"
+    assert tickets(first) == []
+    assert tickets(bay.sense(DeskEvent(BAY, 1, DeskInput.KEY, Reference(0, 0)), 30)) == [CAR]
+
+
+def tickets(effects: list[Effect]) -> list[Reference]:
+    orders = [effect.message for effect in effects if isinstance(effect, Actuate)]
+    return [one.car for one in orders if isinstance(one, DeskOrder) and one.text is DeskText.TAKE_TICKET]
+
+
+def token_entry(record: str, version: int, holder: int) -> Entry:
+    key = car_token(*CAR)
+    return {"record": record, "kind": int(key.kind), "number": key.number, "version": version, "holder": holder}
+
+
+def journalled_place(node: int, station: int, version: int) -> Entry:
+    assert Station.from_number(station) in (*SITE.places, *SITE.compartments.values()), node
+    place = {"station": station, "version": version, "wheelbase_mm": WHEELBASE_MM}
+    return {"record": "car_at", "car_origin": CAR.origin, "car": CAR.number, **place}
