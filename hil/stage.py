@@ -1,6 +1,5 @@
 """What a scenario stands on: a device under test in a simulated fleet, and everything that is said on its buses."""
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
@@ -10,6 +9,7 @@ from bus_sim.plant.bodies import random_car
 from bus_sim.plant.customer import Customer, Event, State
 from bus_sim.run import FLEET, Simulation
 from hil.device import Device
+from hil.notice import Notice
 from onboard.core.codes import MachineState
 from onboard.core.frame import Frame
 from onboard.core.messages import BusTime, Heartbeat, Message
@@ -49,7 +49,7 @@ class Stage:
         self.customers: list[Customer] = []
         #: The bench's own node on the fleet bus.
         self.node = simulation.fleet.attach("bench", None)
-        self._news = asyncio.Event()
+        self._notice = Notice()
         self._boot = 0
         simulation.observers.append(lambda message, time_us: self._hear(time_us, FLEET, message))
         simulation.observers.append(self._power_devices)
@@ -121,14 +121,9 @@ class Stage:
 
     async def until(self, look: Callable[[], T | None], what: str, within_s: float) -> T:
         """Look again after every message until ``look`` finds something. Fails the test after ``within_s``."""
-        try:
-            async with asyncio.timeout(within_s):
-                while (found := look()) is None:
-                    self._news.clear()
-                    await self._news.wait()
-                return found
-        except TimeoutError:
-            raise AssertionError(f"no {what} within {within_s:g} s; {self._last_words()}") from None
+        found = await self._notice.until(look, within_s)
+        assert found is not None, f"no {what} within {within_s:g} s; {self._last_words()}"
+        return found
 
     async def takes_part(self, within_s: float, since: int | None = None) -> Heartbeat:
         """Wait until the device, and every machine of the fleet, tells the same mirror digest and takes part."""
@@ -169,7 +164,7 @@ class Stage:
 
     def _hear(self, time_us: int, bus: str, message: Message) -> None:
         self.said.append(Said(time_us, bus, message))
-        self._news.set()
+        self._notice.tell()
 
     def _all(self, kind: type[M], since: int) -> list[Said[M]]:
         said = self.said[since:]
