@@ -180,8 +180,8 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         "--bus",
         action="append",
         default=[],
-        metavar="INTERFACE:CHANNEL",
-        help="join the fleet bus with a python-can interface (repeatable)",
+        metavar="[MACHINE=]INTERFACE:CHANNEL",
+        help="join the fleet bus, or this machine's device bus, with a python-can interface (repeatable)",
     )
 
 
@@ -335,7 +335,7 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
     faults = _faults(args)
     speed = _speed(args.speed)
     try:
-        parse_bus_specs(args.bus, 500_000)
+        parse_bus_specs(args.bus, 500_000, [machine.name for machine in site.machines.values()])
         processes = process_plan(args, site, args.site or DEFAULT_SITE, faults)
     except ValueError as error:
         raise OptionError(str(error)) from error

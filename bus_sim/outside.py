@@ -30,11 +30,15 @@ class Outside:
             self._simulation.fleet.attach("gateway")
         if self._address is not None:
             await self._serve(self._address)
-        bitrate = self._simulation.site.bitrate
-        for settings in parse_bus_specs(self._buses, bitrate):
-            bridge, _ = await open_bridge(self._simulation.fleet.attach(str(settings), None), settings)
+        site = self._simulation.site
+        machines = [machine.name for machine in site.machines.values()]
+        for machine, settings in parse_bus_specs(self._buses, site.bitrate, machines):
+            node = self._simulation.join(machine or FLEET, str(settings))
+            assert node is not None, "the names were checked"
+            bridge, _ = await open_bridge(node, settings)
             self._bridges.append(bridge)
-            self._console.print(f"the fleet bus is on {settings}", highlight=False)
+            which = "the fleet bus" if machine is None else f"the device bus of {machine}"
+            self._console.print(f"{which} is on {settings}", highlight=False)
 
     async def __aexit__(self, *_: object) -> None:
         for bridge in self._bridges:

@@ -1,14 +1,26 @@
-"""A simulated bus joined with a bus outside: ``--bus socketcan:vcan0``, or any other interface of python-can."""
+"""A simulated bus joined with a bus outside: ``--bus socketcan:vcan0``, or any other interface of python-can.
+
+``--bus MR1=socketcan:vcan1`` is a machine's device bus, for a controller that has two real interfaces as on a board.
+"""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
 
+from onboard.config.problems import nearest
 from onboard.core.frame import Frame
 from onboard.io.open_bus import OpenBus, cast, open_bus
 from onboard.io.settings import BusSettings
 from onboard.ports.bus import Bus
 
-_FORM = "INTERFACE:CHANNEL[,NAME=VALUE...], such as socketcan:vcan0"
+_FORM = "INTERFACE:CHANNEL[,NAME=VALUE...], such as socketcan:vcan0, or MR1=socketcan:vcan1 for a device bus"
+
+
+class Joint(NamedTuple):
+    """What joins which simulated bus: the device bus of ``machine``, or the fleet bus where that is None."""
+
+    machine: str | None
+    settings: BusSettings
 
 
 def parse_bus_spec(spec: str, bitrate: int) -> BusSettings:
@@ -24,15 +36,26 @@ def parse_bus_spec(spec: str, bitrate: int) -> BusSettings:
     return BusSettings(interface, channel, bitrate, tuple(sorted((name, cast(value)) for name, _, value in pairs)))
 
 
-def parse_bus_specs(specs: Sequence[str], bitrate: int) -> list[BusSettings]:
-    """Several ``--bus`` options. One bus named twice is refused: two bridges between two buses are a loop."""
-    found: list[BusSettings] = []
+def parse_bus_specs(specs: Sequence[str], bitrate: int, machines: Collection[str] = ()) -> list[Joint]:
+    """Several ``--bus`` options for a site of these machines. Raises ``ValueError`` with one line for a person.
+
+    One bus named twice is refused: two bridges between two buses are a loop.
+    """
+    found: list[Joint] = []
     for spec in specs:
-        settings = parse_bus_spec(spec, bitrate)
-        if any((settings.interface, settings.channel) == (one.interface, one.channel) for one in found):
+        name, equals, rest = spec.partition("=")
+        machine = name if equals and ":" not in name else None
+        if machine is not None and machine not in machines:
+            raise ValueError(f'--bus "{spec}": no machine {machine}; {nearest(machine, list(machines))}')
+        settings = parse_bus_spec(spec if machine is None else rest, bitrate)
+        if any(_is_same(settings, one.settings) for one in found):
             raise ValueError(f'--bus "{spec}": given twice, and every frame would go round for ever; give it once')
-        found.append(settings)
+        found.append(Joint(machine, settings))
     return found
+
+
+def _is_same(one: BusSettings, other: BusSettings) -> bool:
+    return (one.interface, one.channel) == (other.interface, other.channel)
 
 
 class Bridge:

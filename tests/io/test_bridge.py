@@ -63,3 +63,13 @@ def test_a_mistake_names_the_form(spec: str) -> None:
 def test_one_bus_twice_is_a_loop() -> None:
     with pytest.raises(ValueError, match="given twice"):
         parse_bus_specs(["socketcan:vcan0", "socketcan:vcan1", "socketcan:vcan0"], 500_000)
+
+
+def test_a_machines_device_bus_is_named_before_its_interface() -> None:
+    specs = ["socketcan:can0", "MR1=socketcan:can1", "socketcand:fleet,port=29536"]
+    joints = parse_bus_specs(specs, 500_000, ["IOC1", "MR1"])
+    assert [(joint.machine, joint.settings.channel) for joint in joints] == [
+        *((None, "can0"), ("MR1", "can1"), (None, "fleet")),
+    ]
+    with pytest.raises(ValueError, match="no machine MR2; did you mean"):
+        parse_bus_specs(["MR2=socketcan:can1"], 500_000, ["IOC1", "MR1"])

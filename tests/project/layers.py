@@ -127,7 +127,9 @@ LAYERS: dict[str, Layer] = {
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
-    "hil": Layer(("onboard", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
+    "deploy": Layer(("onboard", "onboard.config", *CORE_TYPES)),
+    # A bench starts the programs themselves.
+    "hil": Layer(("onboard", "onboard.cli", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
 }
 
 #: Libraries that exactly one file may know, because their interfaces move.

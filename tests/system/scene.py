@@ -1,7 +1,7 @@
 """A whole site in virtual time for one test, with everything said on any of its buses written down."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -92,30 +92,40 @@ def play(
     before: Callable[[Simulation], None] | None = None,
     extra_s: float = 60,
     plant: Callable[[Simulation], None] | None = None,
+    without: frozenset[str] = frozenset(),
+    after: Callable[[], Awaitable[None]] | None = None,
 ) -> Scene:
     """Run a site until all customers are served (or the limit), then a little longer.
 
-    ``plant`` is called before power-up, ``before`` right after it.
+    ``plant`` is called before power-up, ``before`` right after it, ``after`` at the end, on the loop still. Machines
+    named in ``without`` are not started.
     """
     loop = VirtualTimeLoop()
+    options = RunOptions(seed=seed, faults=tuple(faults), without=without)
     try:
-        return loop.run_until_complete(_play(site, demand, seed, limit_s, tuple(faults), before, loop, extra_s, plant))
+        scene = loop.run_until_complete(_play(site, demand, options, limit_s, before, loop, extra_s, plant))
+        if after is not None:
+            loop.run_until_complete(_finish(after))
+        return scene
     finally:
         loop.close()
+
+
+async def _finish(after: Callable[[], Awaitable[None]]) -> None:
+    await after()
 
 
 async def _play(
     site: Site,
     demand: Demand,
-    seed: int,
+    options: RunOptions,
     limit_s: float,
-    faults: tuple[Fault, ...],
     before: Callable[[Simulation], None] | None,
     loop: VirtualTimeLoop,
     extra_s: float,
     plant: Callable[[Simulation], None] | None,
 ) -> Scene:
-    simulation = build(site, RunOptions(seed=seed, faults=faults), loop)
+    simulation = build(site, options, loop)
     scene = Scene(simulation)
     _listen(scene, FLEET, fleet_codec())
     for node_id, machine in site.machines.items():

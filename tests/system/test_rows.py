@@ -15,12 +15,12 @@ from onboard.core.codes import (
     Criterion,
     DeskText,
     DriveMode,
-    Grade,
     KindCode,
     LegAction,
     MachineState,
     Operation,
     Reason,
+    ShuttleAction,
     Side,
     TaskPhase,
 )
@@ -34,11 +34,10 @@ from onboard.core.messages import (
     CarAt,
     DeskOrder,
     DriveState,
-    Heartbeat,
-    Itinerary,
     Message,
     OperatorOrder,
     Reference,
+    ShuttleOrder,
     Stamp,
     TaskReport,
 )
@@ -51,7 +50,7 @@ from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.program import Handling, Program, Step, Work
 from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
-from tests.system.scene import Scene, car, play, stays
+from tests.system.scene import car, play, stays
 
 SITE = one_floor(robots=2)
 BAY = SITE.compartments[1]
@@ -74,7 +73,22 @@ def a_robot(standing: Segment, steps: list[Step] | None = None) -> CarParkGenera
     return CarParkGeneration(SITE, SITE.machines[11], Mirror(SITE, 11), program)
 
 
-def test_p18_a_busy_robot_bids_a_later_finishing_date_than_its_idle_twin() -> None:
+def test_p18_a_busy_robot_bids_later_on_the_bus_than_its_idle_twin() -> None:
+    """The same site twice: with a car in hand for the first bay, and with nothing to do, when the call comes."""
+    site = one_floor(extra='[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n')
+    took_ms = {}
+    for cars in (1, 2):
+        scene = play(site, stays(*[(float(number), None) for number in range(cars)]), extra_s=200)
+        scene.assert_sound()
+        call = scene.all(CallForProposals)[-1][1]
+        (bid,) = (m for _, m in scene.all(Bid) if (m.initiator, m.call) == (call.sender, call.call))
+        took_ms[cars] = bid.cost - call.deadline_ms
+        done = [report for _, report in scene.all(TaskReport) if report.phase is TaskPhase.DONE]
+        assert [report.sender for report in done] == [11] * cars
+    assert took_ms[2] > took_ms[1] + 25_000
+
+
+def test_p18_a_busy_robot_names_a_later_finishing_date_than_its_idle_twin() -> None:
     call = a_call()
     work = Work(Handling.LEAVE, Station(1, 8, BAY.side), Reference(1, 9), 2700, call)
     busy = a_robot(Segment(1, 8), [Step(LegAction.WORK, 1, 8, 8, 0, 30_000_000, work)])
@@ -140,68 +154,22 @@ def test_p46_of_all_solutions_the_earliest_is_bid_though_another_place_is_nearer
     assert (works[-1].track, works[-1].to_index, works[-1].side) == far
 
 
+def test_p33_small_and_large_cars_are_parked_and_what_cannot_be_gripped_is_turned_away() -> None:
+    wheelbases = (1_850, 3_350, 3_500)
+    demand = [Stay(round(200e6 * n), None, car(n, wheelbase_mm=mm)) for n, mm in enumerate(wheelbases)]
+    scene = play(one_floor(), Demand(tuple(demand)), limit_s=600)
+    scene.assert_sound()
+    grips = {order.wheelbase_mm for _, order in scene.all(ShuttleOrder) if order.action is ShuttleAction.GRIP}
+    assert grips == {1_850, 3_350}
+    scene.first(DeskOrder, lambda order: order.text is DeskText.CAR_TOO_LARGE, after_us=400_000_000)
+    assert [call.wheelbase_mm for _, call in scene.all(CallForProposals)] == [1_850, 3_350]
+    summary = scene.simulation.plant.street.summary()
+    assert (summary.parked, summary.inside, summary.refused_too_large) == (2, 2, 1)
+
+
 @pytest.mark.parametrize("wheelbase_mm", [1600, 3900])
 def test_p33_a_car_that_the_shuttle_cannot_grip_gets_no_bid(wheelbase_mm: int) -> None:
     assert a_robot(Segment(1, 2)).lower_bound(a_call(wheelbase_mm=wheelbase_mm), 0) is None
-
-
-@pytest.fixture(scope="module")
-def pair() -> Scene:
-    """Two robots on the floor; the one at the far end cannot pass the other."""
-    scene = play(SITE, stays((0, 400), (30, 700)), extra_s=200)
-    scene.assert_sound()
-    return scene
-
-
-def test_the_nearer_robot_does_all_the_work_and_the_other_saves_its_searches(pair: Scene) -> None:
-    assert {bid.sender for _, bid in pair.all(Bid)} == {12}
-    done = [report for _, report in pair.all(TaskReport) if report.phase is TaskPhase.DONE]
-    assert [report.sender for report in done] == [12, 12, 12, 12]
-    behind = pair.simulation.controllers[11].holon.negotiation.counters
-    assert (behind.bids_sent, behind.calls_heard, behind.searches_saved) == (0, 4, 4)
-
-
-def test_p45_who_is_shut_in_counts_the_calls_and_says_nothing() -> None:
-    """The robot before it has lost its controller and stands in the only alley: no way leads around it."""
-
-    def cut(simulation: Simulation) -> None:
-        simulation.loop.call_at(9.0, simulation.crash, SITE.machines[12])
-        # Somebody acknowledges what the devices say: a lone sensor would repeat its frame for ever.
-        simulation.devices[12].attach("listener")
-
-    scene = play(SITE, stays((0, None)), before=cut, limit_s=300)
-    assert scene.simulation.plant.oracle.finish() == []
-    calls = [call for _, call in scene.all(CallForProposals)]
-    assert [call.attempt for call in calls] == [1, 2, 3, 4, 5]
-    called_us = scene.first(CallForProposals)[0]
-    said = {type(one.message) for one in scene.said if one.message.sender == 11 and one.time_us > called_us}
-    assert Heartbeat in said and said.isdisjoint({Bid, Itinerary, Award, TaskReport})
-    counters = scene.simulation.controllers[11].holon.negotiation.counters
-    assert (counters.calls_heard, counters.searches, counters.calls_impossible) == (5, 5, 5)
-
-
-def test_p06_other_kinds_spend_nothing_on_a_call(pair: Scene) -> None:
-    robot = pair.simulation.controllers[12].holon.negotiation.counters
-    compartment = pair.simulation.controllers[1].holon.negotiation.counters
-    assert robot.searches == 4
-    assert (compartment.searches, compartment.calls_heard) == (0, 0)
-
-
-def test_p15_no_plan_reaches_beyond_its_task_and_no_task_is_known_before_its_call(pair: Scene) -> None:
-    called = {call.task: time_us for time_us, call in pair.all(CallForProposals)}
-    for time_us, report in pair.all(TaskReport):
-        assert called[report.task] < time_us
-    for time_us, itinerary in pair.all(Itinerary):
-        if itinerary.grade is Grade.FIRM and itinerary.legs:
-            assert itinerary.legs[-1].end_ms * 1000 < time_us + 180_000_000
-
-
-def test_p19_the_bus_is_the_only_link(pair: Scene) -> None:
-    """Every machine that took part was heard on the bus, and the log of it alone tells the whole story."""
-    assert {beat.sender for _, beat in pair.all(Heartbeat)} == set(SITE.machines)
-    awarded = {award.task for _, award in pair.all(Award) if award.result is CallResult.AWARDED}
-    finished = {report.task for _, report in pair.all(TaskReport) if report.phase is TaskPhase.DONE}
-    assert awarded == finished and len(awarded) == 4
 
 
 def test_p12_nobody_can_so_the_call_is_opened_again_then_refused_and_the_customer_told() -> None:

@@ -6,6 +6,7 @@ others' present and foreseen tasks (rows P21, P28), unlike that of a lathe. Wher
 chooses the place itself and evaluates all its solutions (row P46).
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -51,6 +52,19 @@ class Alternative(NamedTuple):
     station: Station
     finish_us: int | None
     bound_us: int | None = None
+
+
+def weighed(alternatives: Iterable[Alternative]) -> str:
+    """What was weighed, in words for the log: dates in bus time, s, and how many places were not worked out, or why."""
+    told, bounded, blocked = [], 0, 0
+    for station, finish_us, bound_us in alternatives:
+        if finish_us is not None:
+            told.append(f"{station} at {finish_us / 1e6:.3f}")
+        elif bound_us is not None:
+            bounded += 1
+        else:
+            blocked += 1
+    return f"weighed: {', '.join(told)}; no sooner: {bounded}; out of reach: {blocked}"
 
 
 class Solution(NamedTuple):

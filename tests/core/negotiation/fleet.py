@@ -1,7 +1,9 @@
 """A fleet on the smallest bus there is: messages one after the other, each heard by all others after a while.
 
-``Bus.lose`` may take a message from a single receiver, as an inconsistent omission or a full receive queue does. Time
-begins a second before bus time wraps on the wire, so every run crosses the wrap.
+Each message goes over the wire as the frames of ``dbc/fleet.dbc``, put together again by each machine for itself; what
+a test looks at is decoded. ``Bus.lose`` may take a frame of a message from a single receiver, as an inconsistent
+omission or a full receive queue does: the rest of it is inert. Time begins a second before bus time wraps on the wire,
+so every run crosses the wrap.
 """
 
 import heapq
@@ -29,6 +31,8 @@ from onboard.core.negotiation import (
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Timing
+from onboard.wire.codec import fleet_codec
+from onboard.wire.decoder import Decoder
 
 START_US = (BUS_MS_MODULUS - 1_000) * 1_000
 CALLER = 1
@@ -200,8 +204,16 @@ class Machine:
         return self.carry_out(list(self.negotiation.open(what, now_us)), now_us)
 
 
-#: (message, receiver) to whether this receiver misses it.
+#: (message, receiver) to whether this receiver misses a frame of it.
 Loss = Callable[[Message, int], bool]
+
+
+def decoded(message: Message) -> Message:
+    """The message that whoever hears its frames puts together."""
+    decoder = Decoder(fleet_codec())
+    *unfinished, whole = [decoder.feed(frame, 0) for frame in fleet_codec().encode(message)]
+    assert whole is not None and unfinished.count(None) == len(unfinished), f"{message} comes to nothing"
+    return whole
 
 
 def nothing_lost(message: Message, receiver: int) -> bool:
@@ -221,10 +233,12 @@ class Bus:
         self._free_us = 0
         self._sequence = itertools.count()
         self._arrivals: list[tuple[int, int, Message]] = []
+        self._decoders = {node: Decoder(fleet_codec()) for node in self.machines}
+        self._losses = 0
 
     def post(self, messages: list[Message]) -> None:
         """Put messages on the bus; each takes the latency, one after the other."""
-        for message in messages:
+        for message in map(decoded, messages):
             self._free_us = max(self._free_us, self.now_us) + self.latency_us
             self.wire.append((self.now_us, message))
             heapq.heappush(self._arrivals, (self._free_us, next(self._sequence), message))
@@ -256,9 +270,20 @@ class Bus:
         return min((time for time in times if time is not None), default=None)
 
     def _deliver(self, message: Message) -> None:
+        frames = fleet_codec().encode(message)
         for node, machine in self.machines.items():
-            if node != message.sender and not self.lose(message, node):
-                self.post(machine.receive(message, self.now_us))
+            if node == message.sender:
+                continue
+            missed = self._miss(len(frames)) if self.lose(message, node) else None
+            for number, frame in enumerate(frames):
+                heard = self._decoders[node].feed(frame, self.now_us) if number != missed else None
+                if heard is not None:
+                    self.post(machine.receive(heard, self.now_us))
+
+    def _miss(self, frames: int) -> int:
+        """Which frame of a message is lost: each in turn."""
+        self._losses += 1
+        return self._losses % frames
 
     # --- what was said -----------------------------------------------------------------------------------------
 
