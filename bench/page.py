@@ -87,7 +87,7 @@ def _watch(viewers: int, seconds: float, folder: Path) -> tuple[float, float, fl
         found = re.search(r"http://(\S+)/", line)
         assert found is not None
         try:
-            time.sleep(FILL_S)
+            _go_on(process, FILL_S)
             begin_s, spent_s = time.monotonic(), _processor_s(process.pid)
             updates = octets = 0
             if viewers:
@@ -96,12 +96,21 @@ def _watch(viewers: int, seconds: float, folder: Path) -> tuple[float, float, fl
                         octets += len(socket.recv())
                         updates += 1
             else:
-                time.sleep(seconds)
+                _go_on(process, seconds)
             passed_s = time.monotonic() - begin_s
             return updates / passed_s, octets / passed_s / 1e3, (_processor_s(process.pid) - spent_s) / passed_s
         finally:
             process.terminate()
             process.stdout.close()
+
+
+def _go_on(process: subprocess.Popen[str], seconds: float) -> None:
+    """Let a program run for so long."""
+    try:
+        process.wait(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        return
+    raise SystemExit(f"the run ended by itself: exit status {process.returncode}")
 
 
 def _processor_s(pid: int) -> float:
