@@ -12,7 +12,7 @@ from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.gateway.gateway import Gateway
-from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings
+from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings, watch_lines
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress
@@ -142,22 +142,6 @@ async def _tell_news(gateway: Gateway) -> None:
         if line != told:
             told = line
             print(line, flush=True)
-
-
-def watch_lines(address: BrokerAddress, site: Site, settings: GatewaySettings) -> list[str]:
-    """How to watch with mosquitto's own program."""
-    words = f"mosquitto_sub -h {address.host} -p {address.port}"
-    if address.user is not None:
-        words += f" -u {address.user} -P ..."
-    if address.tls:
-        words += f" --cafile {address.ca or '...'} --cert ... --key ..."
-    root = f"{settings.prefix}/{level(site.name)}"
-    machines = f"{settings.dialect.topic_root}/{settings.manufacturer}"
-    return [
-        f"publishing {site.name} to {address}, VDA 5050 {settings.version}; watch with:",
-        f"  {words} -v -t '{root}/#'",
-        f"  {words} -v -t '{machines}/+/state'",
-    ]
 
 
 def wall_us() -> int:

@@ -113,7 +113,7 @@ LAYERS: dict[str, Layer] = {
             "onboard.wire",
         )
     ),
-    "onboard.gateway.options": Layer(("onboard.gateway", "onboard.io")),
+    "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
@@ -123,7 +123,7 @@ LAYERS: dict[str, Layer] = {
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
-        ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
+        ("onboard", "onboard.gateway", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
