@@ -17,7 +17,7 @@ import pytest
 from bus_sim.cli import main as bus_sim
 from bus_sim.sites import site_text
 from onboard.cli import main as onboard
-from tests.mqtt.mosquitto import DEADLINE_S
+from tests.mqtt.mosquitto import DEADLINE_S, Mosquitto
 from tests.tools import require_tool, run_tool
 
 ROOT = Path(__file__).parents[2]
@@ -118,3 +118,52 @@ def test_without_its_libraries_the_gateway_says_what_to_install(
 def test_a_broker_that_is_no_address_is_refused_before_anything_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert bus_sim(["run", "small", "--mqtt", "here"]) == 2
     assert "--mqtt here: not an address" in capsys.readouterr().err
+
+
+MACHINE = """\
+[machine]
+name = "MR1"
+site = "site.toml"
+[fleet_bus]
+interface = "socketcand-asyncio"
+channel = "fleet"
+host = "127.0.0.1"
+port = {port}
+[device_bus]
+interface = "socketcand-asyncio"
+channel = "MR1"
+host = "127.0.0.1"
+port = {port}
+"""
+
+
+async def test_a_controller_with_a_gateway_of_its_own_tells_of_itself_alone_and_its_death_is_told(
+    tmp_path: Path,
+) -> None:
+    mosquitto = Mosquitto(tmp_path / "broker")
+    await mosquitto.start()
+    run = (sys.executable, "-m", "bus_sim.cli", "run", "small", "--without", "MR1", "--serve", "127.0.0.1:0")
+    topics = ("mosquitto_sub", "-h", "127.0.0.1", "-p", str(mosquitto.port), "-v", "-t", "#")
+    (tmp_path / "site.toml").write_text(site_text("small"), encoding="utf-8")
+    with process(*run, "--one-car", "9000", folder=tmp_path) as site, process(*topics, folder=tmp_path) as reader:
+        served = re.search(r"serving at 127\.0\.0\.1:(\d+)", lines_until(site, "serving at")[-1])
+        assert served is not None
+        (tmp_path / "mr1.toml").write_text(MACHINE.format(port=served[1]), encoding="utf-8")
+        words = (
+            "-m",
+            "onboard",
+            "--machine",
+            "mr1.toml",
+            "--mqtt",
+            f"mqtt://127.0.0.1:{mosquitto.port}",
+            "--vda5050",
+            "3.0",
+        )
+        with process(sys.executable, *words, folder=tmp_path) as controller:
+            told = lines_until(reader, r"^vda5050/v3/onboard/MR1/state .*p\(2,3\)")
+            controller.kill()
+            told += lines_until(reader, r"^vda5050/v3/onboard/MR1/connection .*CONNECTION_BROKEN")
+    assert any(re.match(r"vda5050/v3/onboard/MR1/connection .*ONLINE", one) for one in told)
+    machines = r"(vda5050/v3/onboard/MR1/|onboard/small/log/MR1 )"
+    assert all(re.match(machines, one) for one in told), told
+    await mosquitto.stop()

@@ -117,7 +117,8 @@ LAYERS: dict[str, Layer] = {
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.gateway.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+            *("onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+            *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),
         ),
         not_stdlib=frozenset({"random", "threading", "time"}),
     ),
