@@ -46,3 +46,8 @@ async def watched(run: BusRun, web: str | None) -> AsyncIterator[Viewer]:
             yield viewer
         finally:
             loop.remove_signal_handler(signal.SIGINT)
+    # While the server came to its end, the machines went on: what they began is not waited for.
+    begun = asyncio.all_tasks() - {asyncio.current_task()}
+    for task in begun:
+        task.cancel()
+    await asyncio.gather(*begun, return_exceptions=True)

@@ -18,6 +18,8 @@ MEMORY_MB = 1536
 #: done (QEMU, "TCG Instruction Counting"). So it sees a processor of 500 million instructions a second, about that of
 #: a small board, however busy the host is; on the host's clock a busy host would make every controller late.
 ICOUNT = "shift=1,sleep=off"
+#: Where an executable names its loader.
+_ELF_HEAD = 4096
 #: Newer models (``max``) cost a quarter more: their deeper page tables and checks are emulated too.
 MODEL = "Nehalem"
 
@@ -42,8 +44,8 @@ def missing_for_guest() -> str | None:
         return "the guest shares the files of a Linux host"
     if shutil.which(QEMU) is None:
         return f"{QEMU} is not installed (apt-get install qemu-system-x86)"
-    if not BUSYBOX.exists():
-        return f"{BUSYBOX} is not installed (apt-get install busybox-static)"
+    if not BUSYBOX.exists() or b"ld-linux" in BUSYBOX.read_bytes()[:_ELF_HEAD]:
+        return f"no {BUSYBOX} that runs without a loader (apt-get install busybox-static)"
     for tool, package in TOOLS.items():
         if shutil.which(tool, path="/usr/sbin:/usr/bin:/sbin:/bin") is None:
             return f"{tool} is not installed (apt-get install {package})"

@@ -52,6 +52,19 @@ class Mesh:
         run("ip", "link", "set", name, "down")
 
 
+def hand_out_boards(names: Sequence[str], bitrate: int) -> None:
+    """Give each node a namespace with one of the guest's CAN controllers as ``can0``, in the order of their numbers.
+
+    Brings them up with this bit rate, as on a board: restart after bus-off in 100 ms, a queue of ``QUEUE_LENGTH``.
+    Raises ``RuntimeError``.
+    """
+    for number, name in enumerate(names):
+        run("ip", "netns", "add", name)
+        run("ip", "link", "set", f"can{number}", "netns", name, "name", "can0")
+        run("ip", "-n", name, "link", "set", "can0", "type", "can", "bitrate", str(bitrate), "restart-ms", "100")
+        bring_up(name, "can0")
+
+
 def join_pair(one: str, channel: str, other: str, other_channel: str) -> None:
     """A bus of two nodes between two namespaces."""
     peer = ["peer", "name", other_channel, "netns", other]

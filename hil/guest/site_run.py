@@ -16,7 +16,7 @@ from pathlib import Path
 from bus_sim.cli import main as bus_sim
 from hil.guest.ears import Ears, NotHeardError
 from hil.guest.forked import Forked, Main
-from hil.guest.mesh import Mesh, inside, join_pair, run
+from hil.guest.mesh import Mesh, hand_out_boards, inside, join_pair, run
 from onboard.cli import main as onboard
 from onboard.config.site import parse_site
 from onboard.io.pycan import open_python_can
@@ -66,14 +66,22 @@ class SiteRun:
         self.connect_devices()
         return mesh
 
+    def connect_boards(self, bitrate: int) -> None:
+        """The fleet bus over the guest's CAN controllers, and a device bus for each machine."""
+        hand_out_boards([*self.order.machines, PLANT, TOOLS], bitrate)
+        self.connect_devices()
+
     def connect_devices(self) -> None:
         """``can1`` of each machine's namespace; the plant's end is called as ``device_channel`` says."""
         for name in self.order.machines:
             join_pair(PLANT, device_channel(name), name, "can1")
 
     def record(self) -> None:
-        """Write down the fleet bus, as a node and as seen from outside."""
+        """Write down the fleet bus as a further node hears it."""
         self.start("candump", [*inside(TOOLS), *_CANDUMP, "can0"], "fleet.log")
+
+    def record_outside(self) -> None:
+        """Write down the mesh as seen from outside, where the interface tells who sent."""
         self.start("candump-outside", [*_CANDUMP, "any"], "outside.log")
 
     def start_plant(self) -> None:

@@ -47,6 +47,8 @@ EVENT_LIMIT = 200
 CALL_LIMIT, TASK_LIMIT = 512, 512
 #: Phases of tasks after which nothing is waited for.
 TASKS_OVER = (TaskPhase.DONE, TaskPhase.REFUSED)
+#: Ends of a call after which its task has neither an owner nor a call.
+CALLS_OVER = (CallResult.REFUSED, CallResult.WITHDRAWN, CallResult.REJECTED)
 
 
 @dataclass
@@ -73,13 +75,13 @@ class TaskRecord:
     phase_us: dict[TaskPhase, int] = field(default_factory=dict)
     promised_ms: int | None = None
     depth: int = 0
-    #: Whether its last call was taken back: nobody waits unless it is called again.
-    is_withdrawn: bool = False
+    #: Whether its last call ended without a winner and was not opened again: until it is called once more.
+    is_closed: bool = False
 
     @property
     def is_waiting(self) -> bool:
         """Whether somebody waits for its end; a sub-task is nobody's until it is awarded."""
-        return self.phase not in TASKS_OVER and not self.is_withdrawn and (self.depth == 0 or self.owner != 0)
+        return self.phase not in TASKS_OVER and not self.is_closed and (self.depth == 0 or self.owner != 0)
 
 
 class SiteView:
@@ -185,7 +187,7 @@ class SiteView:
         if self.open_task(call.task, call.operation, time_us):
             self.tasks[call.task].depth = call.depth
         self.tasks[call.task].calls += 1
-        self.tasks[call.task].is_withdrawn = False
+        self.tasks[call.task].is_closed = False
         _bound(self.calls, CALL_LIMIT, lambda record: record.result is not None)
         self.say(time_us, f"{self.name(call.sender)} calls: {call.operation.name.lower()} {self.thing(call.car)}")
 
@@ -215,8 +217,8 @@ class SiteView:
         self.calls_closed[award.result] += 1
         self.open_task(record.call.task, record.call.operation, record.opened_us)
         task = self.tasks[record.call.task]
-        if award.result is CallResult.WITHDRAWN and record.call.operation is task.operation:
-            task.is_withdrawn = True
+        if award.result in CALLS_OVER and record.call.operation is task.operation:
+            task.is_closed = True
         if award.result is CallResult.AWARDED:
             if record.call.operation is not task.operation:
                 self.say(time_us, f"{self.name(award.winner)} takes {self.name(award.sender)} along")

@@ -21,6 +21,7 @@ def scene(site: SiteRun) -> dict[str, object]:
     mesh = site.connect()
     site.tell("the bus is there")
     site.record()
+    site.record_outside()
     ears = Ears(TOOLS)
     site.start_machines()
     site.start_plant()

@@ -16,24 +16,9 @@ from onboard.trace.check.checks import Checks, check_records
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 from onboard.wire.site_dbc import site_dbc
-from tests.qemu.guest import ROOT, once, require_guest, scene_script
+from tests.qemu.guest import QUICK, ROOT, once, require_guest, scene_script
 from tests.qemu.park_scene import REPLAYED, UNPLUGGED
 
-#: The site ``small`` with machines so fast that a car is in and out again in a minute and a half.
-QUICK = """
-[carrier]
-speed_mm_s = 6_000
-acceleration_mm_s2 = 6_000
-[shuttle]
-speed_mm_s = 5_000
-acceleration_mm_s2 = 5_000
-[lift]
-speed_mm_s = 3_000
-acceleration_mm_s2 = 3_000
-[timing]
-door_ms = 500
-grip_ms = 300
-"""
 SITE = (ROOT / "bus_sim" / "sites" / "small.toml").read_text(encoding="utf-8") + QUICK
 MACHINES = {"IOC1": 1, "ER1": 5, "ER2": 6, "MR1": 11, "MR2": 12}
 #: A node-ID that is kept for tools.

@@ -2,50 +2,23 @@
 
 import asyncio
 import json
-from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import pytest
 
-from bus_sim.cli import main as bus_sim
 from bus_sim.sites import find_site
 from onboard.cli import main as onboard
 from onboard.core.messages import Heartbeat
-from onboard.core.site import Site
-from onboard.kinds.registry import system_of
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.readers.open_log import Log
 from onboard.web import film as films
 from onboard.web.app import CommandError
 from onboard.web.film import Film
 from onboard.web.live import LogSource
-from onboard.wire.codec import Codecs, codecs
+from tests.web.logs import contract, film_of, frames_of, log_of
 
 SITES = ("small", "terminal", "graph", "cell", "turning")
-
-
-@cache
-def log_of(name: str) -> Path:
-    """The log of a run of a shipped site, device buses included."""
-    path = Path(mkdtemp(prefix="film-")) / "run.log"
-    words = ["--one-car", "60"] if name == "small" else ["--for", "900"] if name == "turning" else []
-    assert bus_sim(["run", name, *words, "--trace", str(path), "--devices"]) in (0, 1)
-    return path
-
-
-def contract(site: Site) -> Codecs:
-    system = system_of(site)
-    return codecs(system.name, system.messages)
-
-
-def film_of(name: str, path: Path | None = None) -> Film:
-    site = find_site(name)
-    film = Film(site, contract(site))
-    with Log(str(path or log_of(name))) as log:
-        film.read(log)
-    return film
 
 
 def shown(film: Film, time_us: int) -> dict[str, Any]:
@@ -79,14 +52,12 @@ def test_the_load_shown_is_that_of_the_frames_to_the_bit() -> None:
         chart = shown(film, film.last_us)["chart"]
         first_us = film.first_us
     site, bits, ends = find_site("small"), 0, []
-    decoder = contract(site).fleet
-    with Log(str(log_of("small"))) as log:
-        for raw in log:
-            frame = raw.classic()
-            assert frame is not None
-            if decoder.name_of(frame) is not None:
-                bits += frame_bits(frame)
-                ends.append((raw.time_us, bits))
+    for raw in frames_of("small"):
+        frame = raw.classic()
+        assert frame is not None
+        if raw.channel == "fleet":
+            bits += frame_bits(frame)
+            ends.append((raw.time_us, bits))
     first_s, load = chart[0][0], chart[0][1]
     told = next(total for time_us, total in ends if time_us / 1e6 >= first_s)
     assert load == round(told / site.bitrate / (first_s - first_us / 1e6), 5) > 0

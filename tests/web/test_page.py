@@ -1,75 +1,17 @@
-"""The page in a real browser: what it shows is what the buses say, and what it is told happens (Debian's Chromium)."""
+"""The page in a real browser: what it is told happens, and what it says of its line is true (Debian's Chromium)."""
 
-import os
-import re
 import signal
-import subprocess
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
-import pytest
-from playwright.sync_api import Page, expect, sync_playwright
+from playwright.sync_api import Page, expect
 
 from onboard.core.codes import TaskPhase
-from onboard.core.messages import TaskReport
+from onboard.core.messages import Blocked, CallForProposals, Clear, Message, TaskReport
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
-from tests.tools import require_tool
-
-ROOT = Path(__file__).parents[2]
-DEADLINE_MS = 60_000
-
-
-def start(words: list[str], folder: Path) -> tuple[subprocess.Popen[str], str]:
-    """A program that serves the page, and the page's address."""
-    process = subprocess.Popen(
-        [sys.executable, "-u", "-m", *words],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"},
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdout is not None
-    for line in process.stdout:
-        found = re.search(r"picture at (http\S+)", line)
-        if found:
-            return process, found[1]
-    raise AssertionError("the page's address was not printed")
-
-
-def end(process: subprocess.Popen[str], how: signal.Signals) -> int:
-    """End the program that serves; its exit status."""
-    process.send_signal(how)
-    process.communicate(timeout=30)
-    return process.returncode
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Page]:
-    """A page of a headless browser; an error in its console fails the test."""
-    with sync_playwright() as playwright:
-        found = playwright.chromium.launch(executable_path=require_tool("chromium"), args=["--no-sandbox"])
-        page = found.new_page(viewport={"width": 1280, "height": 800})
-        page.set_default_timeout(DEADLINE_MS)
-        expect.set_options(timeout=DEADLINE_MS)
-        yield page
-        found.close()
-
-
-@pytest.fixture
-def errors(browser: Page) -> list[str]:
-    """What the page's own script complains about."""
-    found: list[str] = []
-    browser.on("pageerror", lambda error: found.append(str(error)))
-    return found
-
-
-def cells(page: Page, name: str) -> list[str]:
-    """One machine's row."""
-    return page.locator("#machines tbody tr", has_text=name).first.locator("td").all_inner_texts()
+from tests.web.browser import drawn, end, rows, served, start
+from tests.web.logs import SITE_FILES, log_of
 
 
 def test_a_simulated_site_is_shown_and_obeys(browser: Page, errors: list[str], tmp_path: Path) -> None:
@@ -79,13 +21,12 @@ def test_a_simulated_site_is_shown_and_obeys(browser: Page, errors: list[str], t
         browser.goto(address)
         expect(browser.locator("#link")).to_have_text("connected")
         expect(browser.locator("#machines tbody tr")).to_have_count(5)
-        browser.get_by_role("button", name="car in").click()
+        browser.get_by_role("button", name="car in", exact=True).click()
         expect(browser.locator("#answer")).to_have_text("by hand 1 comes in")
         expect(browser.locator("[data-figure=parked]")).to_have_text("1")
         browser.get_by_role("button", name="pause").click()
         expect(browser.locator("#pace")).to_have_text("paused")
         before = browser.locator("#clock").inner_text()
-        assert cells(browser, "IOC1")[:1] == ["IOC1"]
         browser.locator("#machines tbody tr", has_text="MR1").first.click()
         expect(browser.locator("#details")).to_contain_text("MR1: robot, node 11")
         browser.set_viewport_size({"width": 360, "height": 740})
@@ -94,50 +35,113 @@ def test_a_simulated_site_is_shown_and_obeys(browser: Page, errors: list[str], t
         assert browser.locator("#clock").inner_text() == before, "nothing moves while it is paused"
         browser.keyboard.press("Space")
         expect(browser.locator("#pace")).to_have_text("20 x")
-        browser.select_option("#trouble select", "MR2")
-        browser.get_by_role("button", name="break").click()
-        expect(browser.locator("#answer")).to_have_text("MR2's controller has lost its power")
-        browser.get_by_role("button", name="repair").click()
-        expect(browser.locator("#answer")).to_have_text("MR2 starts again with its journal")
+        _break_and_block(browser)
         shown = browser.locator("[data-figure=parked]").inner_text(), browser.locator("#calls .call").count()
     finally:
-        end(process, signal.SIGINT)
+        end(process)
     expect(browser.locator("#link")).to_have_text("connection lost, trying again")
-    done, calls = told_by(tmp_path / "trace.log")
-    assert shown[0] == str(done)
-    assert shown[1] <= calls
+    told = _said(tmp_path / "trace.log")
+    reports = [one for one in told if isinstance(one, TaskReport) and one.sender in (11, 12)]
+    assert shown[0] == str(len({one.task for one in reports if one.phase is TaskPhase.DONE}))
+    assert shown[1] <= len({(one.sender, one.call) for one in told if isinstance(one, CallForProposals)})
+    people = [one for one in told if isinstance(one, Blocked | Clear) and one.sender == 251]
+    assert [(type(one), one.track, one.index) for one in people] == [(Blocked, 3, 4), (Clear, 3, 4)]
     assert not errors
 
 
-def told_by(trace: Path) -> tuple[int, int]:
-    """Cars parked, and calls opened, by the trace."""
-    decoder, done, calls = Decoder(fleet_codec()), set(), set()
+def _break_and_block(page: Page) -> None:
+    """Trouble that a person makes: a machine loses its power and starts again, a segment cannot be passed."""
+    answer, place = page.locator("#answer"), page.locator("#trouble [name=place]")
+    page.select_option("#trouble select", "MR2")
+    page.get_by_role("button", name="break").click()
+    expect(answer).to_have_text("MR2's controller has lost its power")
+    expect(page.locator("#machines tbody tr", has_text="MR2")).to_contain_text("silent")
+    page.get_by_role("button", name="repair").click()
+    expect(answer).to_have_text("MR2 starts again with its journal")
+    spot = drawn(page, "segment")["p(3,4)"]
+    page.locator("#picture").click(position={"x": spot["x"] + spot["w"] / 2, "y": spot["y"] + spot["h"] / 2})
+    expect(place).to_have_value("p(3,4)")
+    page.get_by_role("button", name="block", exact=True).click()
+    expect(page.locator("#details")).to_contain_text("segment p(3,4): blocked")
+    page.get_by_role("button", name="clear").click()
+    expect(page.locator("#details")).to_contain_text("segment p(3,4): free")
+    place.fill("p(9,9)")
+    place.press("Enter")
+    expect(answer).to_have_text("p(9,9): no segment of this site; write one such as p(1,3), or click on it")
+
+
+def _said(trace: Path) -> list[Message]:
+    decoder = Decoder(fleet_codec())
     with trace.open("rb") as lines:
-        for record in CandumpReader(lines):
-            message = decoder.feed(record.frame, record.time_us)
-            if isinstance(message, TaskReport) and message.phase is TaskPhase.DONE and message.sender in (11, 12):
-                done.add(message.task)
-            if type(message).__name__ == "CallForProposals":
-                calls.add((message.sender, message.call))  # type: ignore[union-attr]  # what its name says
-    return len(done), len(calls)
+        found = [decoder.feed(record.frame, record.time_us) for record in CandumpReader(lines)]
+    return [one for one in found if one is not None]
 
 
-def test_a_recorded_log_has_a_slider_and_takes_no_orders(browser: Page, errors: list[str], tmp_path: Path) -> None:
-    trace, site = tmp_path / "trace.log", ROOT / "bus_sim" / "sites" / "level1.toml"
-    # In a process of its own: the browser's loop runs in this one.
-    words = [sys.executable, "-m", "bus_sim.cli", "run", "level1", "--one-car", "60", "--trace", str(trace)]
-    subprocess.run(words, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, check=True, capture_output=True)
-    process, address = start(["onboard", "web", str(trace), "--site", str(site), "--web", "0"], tmp_path)
+def test_another_system_is_simulated_and_obeys(browser: Page, errors: list[str], tmp_path: Path) -> None:
+    words = ["bus_sim.cli", "run", "terminal", "--speed", "40", "--web", "0", "--trace", "terminal.log"]
+    with served(words, tmp_path) as address:
+        browser.goto(address)
+        expect(browser.get_by_role("img", name="plan of the site")).to_be_visible()
+        expect(browser.get_by_role("button", name="car in")).to_be_hidden()
+        browser.locator("#trouble [name=place]").fill("L2")
+        browser.get_by_role("button", name="block", exact=True).click()
+        expect(browser.locator("#events")).to_contain_text("L2 is blocked")
+        assert set(drawn(browser, "machine")) == {"11", "12", "13", "14"}
+    words = ["bus_sim.cli", "run", "graph", "--speed", "100", "--web", "0", "--trace", "graph.log"]
+    with served(words, tmp_path) as address:
+        browser.goto(address)
+        expect(browser.locator("[data-figure=done]")).to_have_text("8")
+        browser.get_by_role("button", name="order", exact=True).click()
+        expect(browser.locator("#answer")).to_have_text("order 9 comes to OD")
+        expect(browser.locator("[data-figure=done]")).to_have_text("9")
+    assert not errors
+
+
+def test_a_lost_line_says_so_and_comes_back_by_itself(browser: Page, errors: list[str], tmp_path: Path) -> None:
+    words = ["onboard", "web", str(log_of("graph")), "--site", str(SITE_FILES / "graph.toml"), "--web"]
+    process, address = start([*words, "0"], tmp_path)
     try:
         browser.goto(address)
-        expect(browser.locator("#mode")).to_have_text("log")
-        expect(browser.get_by_role("button", name="car in")).to_be_hidden()
-        slider = browser.locator("#slider input")
-        slider.evaluate("(one) => { one.value = 999; one.dispatchEvent(new Event('input')); }")
-        expect(browser.locator("[data-figure=fetched]")).to_have_text("1")
-        slider.evaluate("(one) => { one.value = 1; one.dispatchEvent(new Event('input')); }")
-        expect(browser.locator("[data-figure=fetched]")).to_have_text("0")
+        expect(browser.locator("#link")).to_have_text("connected")
     finally:
-        status = end(process, signal.SIGTERM)
-    assert status == 0
+        end(process, signal.SIGKILL)
+    expect(browser.locator("#link")).to_have_text("connection lost, trying again")
+    assert "is-lost" in (browser.locator("body").get_attribute("class") or "")
+    process, again = start([*words, address.rstrip("/").rpartition(":")[2]], tmp_path)
+    assert again == address
+    try:
+        expect(browser.locator("#link")).to_have_text("connected")
+        expect(browser.locator("body")).not_to_have_class("is-lost")
+        # A program that hangs closes nothing: silence is told as well.
+        process.send_signal(signal.SIGSTOP)
+        expect(browser.locator("#link")).to_have_text("connection lost, trying again")
+        process.send_signal(signal.SIGCONT)
+        expect(browser.locator("#link")).to_have_text("connected")
+    finally:
+        assert end(process, signal.SIGTERM) == 0
+    assert not errors
+
+
+def test_calls_and_machines_can_be_chosen_by_keys(browser: Page, errors: list[str], tmp_path: Path) -> None:
+    words = ["onboard", "web", str(log_of("small")), "--site", str(SITE_FILES / "small.toml"), "--web", "0"]
+    with served(words, tmp_path) as address:
+        browser.goto(address)
+        expect(browser.locator("#mode")).to_have_text("log")
+        for name in ("car in", "break", "block", "do it"):
+            expect(browser.get_by_role("button", name=name, exact=True)).to_be_hidden()
+        expect(browser.locator("#calls .call")).not_to_have_count(0)
+        browser.keyboard.press("Space")
+        expect(browser.locator("#pace")).to_have_text("paused")
+        call = browser.locator("#calls .call").last
+        call.focus()
+        browser.keyboard.press("Enter")
+        expect(browser.locator("#details")).to_contain_text("IOC1: park car 1.1, from IOC1 to any place")
+        expect(call).to_be_focused()
+        browser.keyboard.press("Escape")
+        expect(browser.locator("#details")).to_be_hidden()
+        browser.keyboard.press("ArrowDown")
+        expect(browser.locator("#details")).to_contain_text("IOC1: compartment, node 1")
+        browser.keyboard.press("ArrowDown")
+        expect(browser.locator("#machines tr.chosen")).to_contain_text("ER1")
+        assert len(rows(browser, "machines")) == 5
     assert not errors

@@ -221,18 +221,20 @@ class TerminalScene:
     def _to_come(self, body: _Body) -> Iterator[PlanStep]:
         return (body.steps[number] for number in range(body.current, body.count) if number in body.steps)
 
-    def _ahead(self, node: int, body: _Body) -> list[list[float]]:
-        spots: list[list[float]] = []
+    def _ahead(self, node: int, body: _Body) -> list[str | list[float]]:
+        """The way to come: lanes by their shapes, the one in hand too; other places by their spots."""
+        found: list[str | list[float]] = []
         for step in self._to_come(body):
-            if self.site.entities[step.entity].kind is EntityKind.AREA:
+            if step.entity in self._lines:
+                one: str | list[float] = str(step.entity)
+            elif self.site.entities[step.entity].kind is EntityKind.AREA:
                 continue
-            for x, y in self._lines.get(step.entity, [self._standing(node, step.entity)]):
-                if not spots or spots[-1] != [round(x, 1), round(y, 1)]:
-                    spots.append([round(x, 1), round(y, 1)])
-        if body.path and spots and body.entity in self._lines:
-            # The lane in hand is begun already: only what is left of it.
-            spots = spots[len(self._lines[body.entity]) - 1 :]
-        return spots
+            else:
+                x, y = self._standing(node, step.entity)
+                one = [round(x, 1), round(y, 1)]
+            if not found or found[-1] != one:
+                found.append(one)
+        return found
 
     def _held(self, node: int) -> list[list[object]]:
         """Lanes with the piece of them that is held, and crossings."""

@@ -14,7 +14,7 @@ NAME, VEHICLE = 24.0, 40.0
 #: Stations side by side in an area.
 COLUMNS = 2
 #: Pieces of a bent line.
-PIECES = 12
+PIECES = 24
 
 Corners = tuple[Spot, Spot]
 
@@ -86,6 +86,6 @@ def _line(site: Terminal, lane: Entity, spots: dict[int, Spot], corners: dict[in
 
 def _outside(line: list[Spot], corners: list[Corners]) -> list[Spot]:
     """What of a line is outside the areas that it joins, in as many pieces; all of it where nothing would be left."""
-    dense = [spot_on(line, number / (8 * PIECES)) for number in range(8 * PIECES + 1)]
+    dense = [spot_on(line, number / (4 * PIECES)) for number in range(4 * PIECES + 1)]
     left = [(x, y) for x, y in dense if not any(x0 <= x <= x1 and y0 <= y <= y1 for (x0, y0), (x1, y1) in corners)]
     return [spot_on(left, number / PIECES) for number in range(PIECES + 1)] if len(left) > 2 else line

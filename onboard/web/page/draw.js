@@ -107,6 +107,8 @@ export class Stage {
     for (const machine of this.layout.machines) {
       if (machine.kind === "robot") this.drawRobot(pen, machine, snapshot, nowUs, chosen);
     }
+    // For whoever asks what is drawn where, such as a test.
+    this.canvas.drawn = this.hits;
   }
 
   drawFloors(pen, snapshot) {
@@ -117,7 +119,7 @@ export class Stage {
       pen.fillStyle = css("--free");
       pen.fillRect(left, middle - floor * 0.14, cell * alley.length, floor * 0.28);
       pen.fillStyle = css("--dim");
-      pen.font = `${Math.min(13, floor * 0.3)}px system-ui`;
+      pen.font = `${Math.min(20, floor * 0.3)}px system-ui`;
       pen.fillText(String(alley.number), cell * 0.45, middle);
       for (let index = 1; index <= alley.length; index++) {
         const spot = this.at(alley.number, index);
@@ -225,7 +227,7 @@ export class Stage {
       }
       pen.globalAlpha = strong ? 0.9 : 0.15;
       pen.strokeStyle = css("--plan");
-      pen.lineWidth = 2.5;
+      pen.lineWidth = Math.max(2.5, this.cell * 0.03);
       pen.setLineDash([6, 4]);
       pen.beginPath();
       let from = this.where(machine.node, snapshot, nowUs);

@@ -7,7 +7,7 @@ const $ = (selector) => document.querySelector(selector);
 let stage = new Stage($("#picture"));
 const state = { layout: null, snapshot: null, figures: null, chosen: null, call: null, socket: null, at: 0, retry: 500, paused: false };
 // So long without a word on a line that is open, ms: then it is taken for lost and opened again.
-const SILENT_MS = 6000;
+const SILENT_MS = 4000;
 const PACES = [0.5, 1, 2, 5, 10, 20, 60, 120, 300];
 
 // --- the connection ---------------------------------------------------------------------------------------------------
@@ -22,11 +22,13 @@ function connect() {
     tell("connected", false);
   };
   socket.onmessage = (event) => take(JSON.parse(event.data));
-  socket.onclose = () => {
-    tell("connection lost, trying again", true);
-    setTimeout(connect, state.retry);
-    state.retry = Math.min(8000, state.retry * 2);
-  };
+  socket.onclose = lose;
+}
+
+function lose() {
+  tell("connection lost, trying again", true);
+  setTimeout(connect, state.retry);
+  state.retry = Math.min(3000, state.retry * 2);
 }
 
 function tell(words, lost) {
@@ -38,7 +40,11 @@ function tell(words, lost) {
 // A line that nobody closed can be dead all the same: a cable, a sleeping computer. A pause is no silence.
 setInterval(() => {
   const quiet = performance.now() - state.at > SILENT_MS;
-  if (quiet && state.socket?.readyState === WebSocket.OPEN && state.snapshot && !state.paused) state.socket.close();
+  if (!quiet || state.socket?.readyState !== WebSocket.OPEN || !state.snapshot || state.paused) return;
+  // Who says nothing may not answer a farewell either.
+  state.socket.onclose = state.socket.onmessage = null;
+  state.socket.close();
+  lose();
 }, 1000);
 
 function take(told) {
@@ -109,6 +115,7 @@ function rows(body, lines, key, choose) {
 function show() {
   const { snapshot, layout } = state;
   $("#clock").textContent = clock(snapshot.now_us);
+  $("#clock").dataset.us = snapshot.now_us;
   state.paused = snapshot.pace === 0;
   $("#pace").textContent = snapshot.pace === undefined ? "" : state.paused ? "paused" : `${snapshot.pace} x`;
   $('[data-command="pause"]').textContent = state.paused ? "go on" : "pause";
@@ -139,8 +146,8 @@ function showCalls() {
   const lines = state.snapshot.calls.slice().reverse().map((call) => {
     const line = old.get(call.id) ?? document.createElement("div");
     const told = JSON.stringify([call, state.call === call.id]);
-    if (line.dataset.told === told) return line;
-    line.dataset.told = told;
+    if (line.told === told) return line;
+    line.told = told;
     line.dataset.call = call.id;
     line.className = `call${call.won ? " won" : call.result ? " over" : ""}${state.call === call.id ? " chosen" : ""}`;
     line.tabIndex = 0;

@@ -62,6 +62,8 @@ export class Plan {
     for (const one of this.layout.plan.shapes) this.drawLabel(pen, one, marks[one.id] ?? {});
     for (const thing of snapshot.things ?? []) this.drawThing(pen, thing);
     for (const one of bodies) this.drawBody(pen, one, snapshot.machines[one.node], nowUs, chosen);
+    // For whoever asks what is drawn where, such as a test.
+    this.canvas.drawn = this.hits;
   }
 
   line(pen, points) {
@@ -165,12 +167,13 @@ export class Plan {
     } else if (one.kind === "area") {
       const box = this.box(one);
       pen.textAlign = "left";
-      pen.fillText(one.name, box.x + 5, box.y + size * 0.75);
+      pen.fillText(one.name, box.x + 5, box.y + (this.scale < 0.6 ? -size * 0.6 : size * 0.75));
       pen.textAlign = "center";
       this.hits.push({ ...box, what: "shape", id: one.id });
     } else if (one.kind === "station") {
       const box = this.box(one);
-      pen.fillText(`${one.name}  ${mark.count ?? 0}/${one.room}`, box.x + box.w / 2, box.y + box.h * 0.42);
+      const words = [`${one.name}  ${mark.count ?? 0}/${one.room}`, one.name, ""].find((text) => pen.measureText(text).width < box.w - 2);
+      pen.fillText(words, box.x + box.w / 2, box.y + box.h * 0.42);
       pen.fillStyle = css("--car");
       pen.fillRect(box.x, box.y + box.h * 0.78, box.w * Math.min(1, (mark.count ?? 0) / Math.max(1, one.room)), box.h * 0.22);
       this.hits.push({ ...box, what: "shape", id: one.id });
@@ -222,13 +225,24 @@ export class Plan {
     if (told.ahead?.length && here) {
       pen.globalAlpha = strong ? 0.9 : 0.12;
       pen.strokeStyle = css("--plan");
-      pen.lineWidth = 2.5;
+      pen.lineWidth = Math.max(2, 3.5 * this.scale);
       pen.setLineDash([6, 4]);
-      this.line(pen, [[here.x, here.y], ...told.ahead]);
+      this.line(pen, [[here.x, here.y], ...this.way(told.ahead, here)]);
       pen.setLineDash([]);
       pen.globalAlpha = 1;
     }
     pen.lineWidth = 1;
+  }
+
+  // The way ahead as points: a name is a shape's line; of the first, what is left of it from here.
+  way(ahead, here) {
+    return ahead.flatMap((one, number) => {
+      if (typeof one !== "string") return [one];
+      const points = this.shapes.get(one)?.points ?? [];
+      if (number) return points;
+      const gaps = points.map(([x, y]) => Math.hypot(x - here.x, y - here.y));
+      return points.slice(gaps.indexOf(Math.min(...gaps)) + 1);
+    });
   }
 
   drawThing(pen, thing) {

@@ -1,0 +1,72 @@
+"""Logs of short runs of all systems, made once for all tests that show them."""
+
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+from bus_sim.sites import find_site
+from onboard.core.messages import Message
+from onboard.core.site import Site
+from onboard.kinds.registry import system_of
+from onboard.trace.listener import Listener
+from onboard.trace.raw import RawFrame
+from onboard.trace.readers.open_log import Log
+from onboard.web.film import Film
+from onboard.wire.codec import Codecs, codecs
+
+ROOT = Path(__file__).parents[2]
+SITE_FILES = ROOT / "bus_sim" / "sites"
+#: What a site's run is asked for, where it is not its own day.
+_WORDS = {"small": ["--one-car", "60"], "turning": ["--for", "900"]}
+
+
+@cache
+def log_of(name: str) -> Path:
+    """The log of a run of a shipped site, device buses included."""
+    path = Path(mkdtemp(prefix="film-")) / "run.log"
+    words = ["run", name, *_WORDS.get(name, []), "--trace", str(path), "--devices"]
+    # In a process of its own: a browser's loop may run in this one.
+    words = [sys.executable, "-m", "bus_sim.cli", *words]
+    assert subprocess.run(words, env=environment(), capture_output=True, check=False).returncode in (0, 1)
+    return path
+
+
+def environment() -> dict[str, str]:
+    """What a program of this tree is started with."""
+    return {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "200"}
+
+
+def contract(site: Site) -> Codecs:
+    """What is said on a site's buses."""
+    system = system_of(site)
+    return codecs(system.name, system.messages)
+
+
+def film_of(name: str, path: Path | None = None, *, fleet_only: bool = False) -> Film:
+    """The film of a run; ``fleet_only`` as one sees it who hears no device bus."""
+    site = find_site(name)
+    film = Film(site, contract(site))
+    with Log(str(path or log_of(name))) as log:
+        film.read(raw for raw in log if not fleet_only or raw.channel == "fleet")
+    return film
+
+
+@cache
+def said_in(name: str) -> list[tuple[int, bool, Message]]:
+    """All messages of a run: time in us of the log, whether it was the fleet bus, and what."""
+    listener, found = Listener(contract(find_site(name))), []
+    with Log(str(log_of(name))) as log:
+        for raw in log:
+            heard = listener.hear(raw)
+            if heard.message is not None:
+                found.append((raw.time_us, heard.is_fleet, heard.message))
+    return found
+
+
+def frames_of(name: str) -> list[RawFrame]:
+    """All frames of a run."""
+    with Log(str(log_of(name))) as log:
+        return list(log)
