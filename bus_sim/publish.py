@@ -56,7 +56,7 @@ class Publishing:
         try:
             address = parse_broker(self._url) if self._url else await self._start_broker()
             await self._start_gateway(address)
-        except BaseException:
+        except BaseException:  # whatever ends it, no process may be left behind
             await self.__aexit__()
             raise
         for line in watch_lines(address, self._site, GatewaySettings(node_id=NODE)):
