@@ -1,7 +1,8 @@
 """``python -m tests.mutate [ROW ...]``: break the product once for each row, and see the row's test fail.
 
-Each mutation of ``docs/systems/*.toml`` is made alone in a copy of the tree, and the row's test runs there. A mutation
-that its test does not find ends the command with status 1. ``--jobs N`` runs several copies side by side.
+All tests run once as things are: one that fails anyway finds nothing. Then each mutation of ``docs/systems/*.toml`` is
+made alone in a copy of the tree, and the row's test runs there. A mutation that its test does not find ends the command
+with status 1. ``--jobs N`` runs several copies side by side.
 """
 
 import argparse
@@ -39,6 +40,10 @@ def main() -> int:
         copies: Queue[Path] = Queue()
         for number in range(max(1, min(options.jobs, len(wanted)))):
             copies.put(_copy(Path(folder) / str(number)))
+        broken = _already_broken(wanted, copies)
+        if broken:
+            print(f"without any mutation: {broken}")
+            return 1
         with ThreadPoolExecutor(copies.qsize()) as pool:
             survived = [told for told in pool.map(lambda row: _judge(row, copies), wanted) if told]
     print(f"{len(wanted) - len(survived)} of {len(wanted)} mutations were found by their rows' tests")
@@ -62,6 +67,17 @@ def _copy(target: Path) -> Path:
     return target
 
 
+def _already_broken(rows: list[Row], copies: Queue[Path]) -> str | None:
+    """What the first failing test says where one fails without a mutation, else None."""
+    tests = sorted({row.test for row in rows if row.test is not None})
+    if not tests:
+        return None
+    copy = copies.get()
+    status, why = _run(tests, copy, LIMIT_S * len(tests))
+    copies.put(copy)
+    return None if status == 0 else f"pytest's status {status}: {why}"
+
+
 def _judge(row: Row, copies: Queue[Path]) -> str | None:
     """None where the test failed with the mutation; else one line."""
     assert row.mutation is not None and row.test is not None
@@ -72,7 +88,7 @@ def _judge(row: Row, copies: Queue[Path]) -> str | None:
     whole = file.read_text(encoding="utf-8")
     try:
         file.write_text(whole.replace(row.mutation.old, row.mutation.new), encoding="utf-8")
-        status, why = _run(row.test, copy)
+        status, why = _run([row.test], copy)
     finally:
         file.write_text(whole, encoding="utf-8")
         copies.put(copy)
@@ -83,9 +99,9 @@ def _judge(row: Row, copies: Queue[Path]) -> str | None:
     )
 
 
-def _run(test: str, copy: Path) -> tuple[int | None, str]:
+def _run(tests: list[str], copy: Path, limit_s: int = LIMIT_S) -> tuple[int | None, str]:
     """Pytest's status, None after a time-out; and the first error that it tells, to judge by whether it is the one."""
-    words = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", test]
+    words = [sys.executable, "-B", "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *tests]
     try:
         run = subprocess.run(
             words,
@@ -93,12 +109,13 @@ def _run(test: str, copy: Path) -> tuple[int | None, str]:
             env={**os.environ, "PYTHONPATH": str(copy), "COLUMNS": "200"},
             capture_output=True,
             check=False,
-            timeout=LIMIT_S,
+            timeout=limit_s,
             text=True,
         )
     except subprocess.TimeoutExpired:
-        return None, f"not over after {LIMIT_S} s"
-    told = [line[1:].strip() for line in run.stdout.splitlines() if line.startswith("E ")]
+        return None, f"not over after {limit_s} s"
+    begins = "E " if len(tests) == 1 else "FAILED "
+    told = [line.removeprefix(begins).strip() for line in run.stdout.splitlines() if line.startswith(begins)]
     return run.returncode, next(iter(told), run.stdout.strip().rpartition("\n")[2])[:160]
 
 

@@ -65,7 +65,7 @@ def test_p01_every_machine_runs_the_same_code_and_says_so(whole: Scene) -> None:
     assert len({(beat.contract, beat.site_digest) for beat in beats}) == 1
 
 
-@pytest.mark.parametrize("name", ["MR1", "MR2", "ER2"])
+@pytest.mark.parametrize("name", ["MR1", "MR2", "ER1", "ER2"])
 def test_p01_a_machine_dies_and_the_others_park_the_car(name: str) -> None:
     scene = without(name)
     assert scene.simulation.plant.oracle.finish() == []

@@ -93,6 +93,9 @@ class Body:
         if self.place is BodyPlace.IN_NODE:
             self.stays.append((self.node, self.since_us, now_us))
         self._plant.check_onto(self, self.node, end)
+        if end not in self._plant.site.graph.neighbours[self.node]:
+            # There is nothing to drive on: the oracle has noted the order, and the body stays.
+            return
         self.behind, self.node, self.place = self.node, end, BodyPlace.ON_EDGE
         self._offset_mm = 0.0
         self._move(now_us)

@@ -1,8 +1,9 @@
 """A fleet on the smallest bus there is: messages one after the other, each heard by all others after a while.
 
-Each message goes over the wire as the frames of ``dbc/fleet.dbc``: what is heard, and what a test looks at, is decoded.
-``Bus.lose`` may take a message from a single receiver, as an inconsistent omission or a full receive queue does. Time
-begins a second before bus time wraps on the wire, so every run crosses the wrap.
+Each message goes over the wire as the frames of ``dbc/fleet.dbc``, put together again by each machine for itself; what
+a test looks at is decoded. ``Bus.lose`` may take a frame of a message from a single receiver, as an inconsistent
+omission or a full receive queue does: the rest of it is inert. Time begins a second before bus time wraps on the wire,
+so every run crosses the wrap.
 """
 
 import heapq
@@ -203,7 +204,7 @@ class Machine:
         return self.carry_out(list(self.negotiation.open(what, now_us)), now_us)
 
 
-#: (message, receiver) to whether this receiver misses it.
+#: (message, receiver) to whether this receiver misses a frame of it.
 Loss = Callable[[Message, int], bool]
 
 
@@ -232,6 +233,8 @@ class Bus:
         self._free_us = 0
         self._sequence = itertools.count()
         self._arrivals: list[tuple[int, int, Message]] = []
+        self._decoders = {node: Decoder(fleet_codec()) for node in self.machines}
+        self._losses = 0
 
     def post(self, messages: list[Message]) -> None:
         """Put messages on the bus; each takes the latency, one after the other."""
@@ -267,9 +270,20 @@ class Bus:
         return min((time for time in times if time is not None), default=None)
 
     def _deliver(self, message: Message) -> None:
+        frames = fleet_codec().encode(message)
         for node, machine in self.machines.items():
-            if node != message.sender and not self.lose(message, node):
-                self.post(machine.receive(message, self.now_us))
+            if node == message.sender:
+                continue
+            missed = self._miss(len(frames)) if self.lose(message, node) else None
+            for number, frame in enumerate(frames):
+                heard = self._decoders[node].feed(frame, self.now_us) if number != missed else None
+                if heard is not None:
+                    self.post(machine.receive(heard, self.now_us))
+
+    def _miss(self, frames: int) -> int:
+        """Which frame of a message is lost: each in turn."""
+        self._losses += 1
+        return self._losses % frames
 
     # --- what was said -----------------------------------------------------------------------------------------
 

@@ -170,19 +170,23 @@ def test_p09_who_cannot_do_it_is_silent(cost: dict[int, int | None]) -> None:
 
 def test_p10_committed_from_the_bid_until_another_is_better() -> None:
     robot = Machine(11, Costs({1: 1_000}))
-    call = a_call()
-    robot.receive(call, START_US)
-    due_us = robot.next_wake()
-    assert due_us is not None
-    (bid,) = robot.wake(due_us)
-    key = CallKey(CALLER, call.call)
-    assert robot.committed == {key}
+    bus = Bus([caller(), robot])
+    bus.call(terms())
+    bus.run(0.1)
+    (bid,) = bus.bids()
+    (call,) = bus.calls()
     assert bid == Bid(11, CALLER, call.call, (call.deadline_ms + 1_000) % BUS_MS_MODULUS, 0)
-    robot.receive(replace(bid, sender=12), due_us + 1)
-    assert robot.committed == {key}, "an equal bid of a higher node-ID is not better"
-    robot.receive(replace(bid, sender=10), due_us + 2)
+    assert robot.committed == {key_of(bus)}
+    bus.post([replace(bid, sender=12)])
+    bus.run(0.01)
+    assert robot.committed == {key_of(bus)}, "an equal bid of a higher node-ID is not better"
+    bus.post([replace(bid, sender=10)])
+    bus.run(0.01)
     assert robot.committed == set()
     assert robot.released == [Reason.BEATEN]
+    bus.run(2)
+    assert [award.winner for award in bus.awards()][:1] == [10]
+    assert bus.assigned() == []
 
 
 def test_p10_the_deadline_makes_the_standing_bid_a_task() -> None:
