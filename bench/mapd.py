@@ -1,21 +1,27 @@
 """Pick-up and delivery on the small warehouse: service time and makespan of the auction beside Token Passing.
 
-    python bench/mapd.py [--robots N] [--rate TASKS_A_STEP]
+    python bench/mapd.py [--robots N] [--rate TASKS_A_STEP] [--bus]
 
-All 500 tasks of each file that ships. The times of Token Passing are those of Ma, Li, Kumar and Koenig (AAMAS 2017).
-Deterministic but for the processor time, which is given for all robots together: on board each plans for itself.
+By the robots' decision functions alone, or with ``--bus`` by their controllers on the virtual CAN bus. All 500 tasks of
+each file that ships. The times of Token Passing are those of Ma, Li, Kumar and Koenig (AAMAS 2017). Deterministic but
+for the processor time, which is given for all machines together: on board each plans for itself.
 """
 
 import argparse
 import time
 from importlib.resources import as_file, files
+from itertools import pairwise
 
 from bus_sim.importers.command import import_files
 from bus_sim.importers.draft import site_text
 from bus_sim.importers.mapf import Wanted
+from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import TOKEN_PASSING
+from bus_sim.systems.mapd.run import play_day
 from bus_sim.systems.mapd.steps import Day
+from bus_sim.systems.registry import SystemOptions
 from onboard.config.site import parse_site
+from onboard.kinds.mapd.messages import StepRound
 from onboard.kinds.mapd.site import Mapd
 
 
@@ -31,6 +37,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--robots", type=int, choices=[10, 30], help="only with so many robots")
     parser.add_argument("--rate", choices=["0.5", "2", "10"], help="only so many tasks a step")
+    parser.add_argument("--bus", action="store_true", help="controllers on the virtual bus: minutes a file")
     args = parser.parse_args()
     print("tasks a step  robots  service time   TP  below TP  makespan  served  processor")
     for (rate, robots), published in TOKEN_PASSING.items():
@@ -38,14 +45,40 @@ def main() -> None:
             continue
         site = site_of(robots, rate)
         began = time.process_time()
-        day = Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
+        service, makespan, served, more = _on_the_bus(site) if args.bus else _alone(site)
         spent = time.process_time() - began
-        below = 100 * (1 - day.service_time / published)
+        below = 100 * (1 - service / published)
         print(
-            f"{rate:>12}  {robots:6}  {day.service_time:12.1f}  {published:5.1f}  {below:6.1f} %  {day.makespan:8}"
-            f"  {len(day.served):6}  {spent:7.1f} s",
+            f"{rate:>12}  {robots:6}  {service:12.1f}  {published:5.1f}  {below:6.1f} %  {makespan:8}"
+            f"  {served:6}  {spent:7.1f} s{more}",
             flush=True,
         )
+
+
+def _alone(site: Mapd) -> tuple[float, int, int, str]:
+    day = Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
+    return day.service_time, day.makespan, len(day.served), ""
+
+
+def _on_the_bus(site: Mapd) -> tuple[float, int, int, str]:
+    """Besides: frames, their share of the bus's time, the longest step, and whether the day alone was the same."""
+    played = play_day(site, SystemOptions(quiet=True))
+    plant = played.plant
+    assert isinstance(plant, UnitPlant)
+    assert played.is_good, plant.violations
+    release = {task.number: task.release for task in site.tasks}
+    service = sum(step - release[number] for number, step in plant.served.items()) / len(plant.served)
+    alone = Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run()
+    begun_us: dict[int, int] = {}
+    for time_us, one in played.messages:
+        if isinstance(one, StepRound):
+            begun_us.setdefault(one.step, time_us)
+    longest_us = max(later - earlier for earlier, later in pairwise(begun_us.values()))
+    statistics = played.run.fleet.statistics()
+    same = "as alone" if plant.served == alone.served else "NOT as alone"
+    loads = f"{100 * statistics.mean_load:.1f} % (worst second {100 * statistics.worst_second_load:.1f} %)"
+    more = f"  {statistics.frames} frames, load {loads}, longest step {longest_us / 1e6:.2f} s, {same}"
+    return service, max(plant.served.values()), len(plant.served), more
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from onboard.core.holon import Holon, next_boot
 from onboard.io.broker_address import is_mqtt_installed
 from onboard.io.console import ConsoleTelemetry
 from onboard.io.journal import FileJournal
+from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.io.watchdog import SystemdWatchdog
 from onboard.kinds.registry import factory_for, system_of
@@ -57,6 +58,12 @@ def build_parser() -> argparse.ArgumentParser:
         "--machine", type=Path, required=True, metavar="FILE", help="machine file (docs/machine-file.md)"
     )
     parser.add_argument("--check", action="store_true", help="check the machine and site file, say so, and stop")
+    parser.add_argument(
+        "--networkd",
+        type=Path,
+        metavar="DIR",
+        help="write systemd-networkd's settings for the machine's CAN interfaces into this folder, and stop",
+    )
     parser.add_argument("--journal", type=Path, metavar="DIR", help="journal directory instead of the file's")
     add_bus_arguments(parser)
     return parser
@@ -82,6 +89,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         site = config.site
         print(f"{args.machine}: {config.machine.name} of site {site.name} (digest {site.digest:04X}): in order")
         return 0
+    if args.networkd is not None:
+        return _networkd(config, fleet_settings, args.networkd)
     try:
         return asyncio.run(run(config, fleet_settings, args.journal or config.journal))
     except BusOpenError as error:
@@ -96,6 +105,16 @@ def _trace(words: list[str]) -> int:
     from onboard.trace.cli import main as trace  # noqa: PLC0415  # a controller must not carry it
 
     return trace(words)
+
+
+def _networkd(config: MachineConfig, fleet_settings: BusSettings, to: Path) -> int:
+    try:
+        written = write_network_files([config.device_bus, fleet_settings], to)
+    except OSError as error:
+        print(f"onboard: --networkd {to}: {error.strerror}; name a folder that can be written", file=sys.stderr)
+        return 2
+    print("\n".join(str(path) for path in written))
+    return 0
 
 
 def _web(words: list[str]) -> int:

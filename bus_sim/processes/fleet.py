@@ -1,19 +1,17 @@
 """Every machine of a site as an operating-system process that runs the ordinary ``onboard`` program."""
 
 import asyncio
-import os
 import resource
 import signal
-import sys
 import tempfile
-from asyncio.subprocess import DEVNULL, Process
+from asyncio.subprocess import Process
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
-import onboard
 from bus_sim.processes.plan import ProcessPlan, Span, machine_file, spans_of
+from bus_sim.processes.spawn import log_of, start_machine
 from bus_sim.run import Simulation
 
 #: How long a process may take to end once it was told to, s: two closings of a connection and a journal write.
@@ -114,19 +112,7 @@ class ProcessFleet:
         return max(0.0, at_s - self._since_s())
 
     async def _start(self, name: str) -> _Running:
-        root = str(Path(onboard.__file__).parents[1])
-        paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
-        with self._log(name).open("ab") as log:
-            process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-m", "onboard", "--machine", f"{name}.toml"),
-                cwd=self._directory,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},
-                stdin=DEVNULL,
-                stdout=DEVNULL,
-                stderr=log,
-                # A key pressed in this terminal ends the run, and the run ends its processes.
-                start_new_session=True,
-            )
+        process = await start_machine(self._directory, name)
         running = _Running(process, asyncio.get_running_loop().create_task(process.wait()))
         self._running[name] = running
         self._started += 1
@@ -146,7 +132,7 @@ class ProcessFleet:
             self._fail(name, f"was told to end, {_status(running.ended.result())}")
 
     def _fail(self, name: str, what: str) -> None:
-        words = self._log(name).read_text(encoding="utf-8", errors="replace").split("\n")
+        words = log_of(self._directory, name).read_text(encoding="utf-8", errors="replace").split("\n")
         last = next((line.removeprefix("onboard: ") for line in reversed(words) if line.strip()), "it said nothing")
         self.failures.append(f"{name}: its process {what}; last words: {last}")
         self.is_over = True
@@ -159,9 +145,6 @@ class ProcessFleet:
 
     def _tell(self, what: str) -> None:
         self._console.print(f"{self._since_s():7.1f} s  {what}", highlight=False, soft_wrap=True)
-
-    def _log(self, name: str) -> Path:
-        return self._directory / f"{name}.log"
 
     def _write_files(self, host: str, port: int) -> None:
         try:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from onboard.config.machine_text import BusTable, Value, machine_text
 from onboard.config.problems import nearest
 
 #: A controller whose server has been away for so long ends by itself, s: no process outlives a killed simulator.
@@ -102,8 +103,6 @@ def _spans(moments: list[Moment]) -> list[Span]:
 
 def machine_file(name: str, host: str, port: int) -> str:
     """The machine file of a process: the served fleet bus, and its own device bus."""
-    where = f'interface = "socketcand-asyncio"\nhost = "{host}"\nport = {port}\ngive_up_s = {GIVE_UP_S}\n'
-    return (
-        f'[machine]\nname = "{name}"\nsite = "site.toml"\n\n'
-        f'[fleet_bus]\nchannel = "fleet"\n{where}\n[device_bus]\nchannel = "{name}"\n{where}'
-    )
+    where: dict[str, Value] = {"host": host, "port": port, "give_up_s": GIVE_UP_S}
+    fleet, devices = (BusTable("socketcand-asyncio", channel, where) for channel in ("fleet", name))
+    return machine_text(name, "site.toml", fleet, devices)

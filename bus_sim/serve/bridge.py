@@ -13,7 +13,7 @@ from onboard.io.open_bus import OpenBus, cast, open_bus
 from onboard.io.settings import BusSettings
 from onboard.ports.bus import Bus
 
-_FORM = "[MACHINE=]INTERFACE:CHANNEL[,NAME=VALUE...], such as socketcan:vcan0"
+_FORM = "INTERFACE:CHANNEL[,NAME=VALUE...], such as socketcan:vcan0, or MR1=socketcan:vcan1 for a device bus"
 
 
 class Joint(NamedTuple):

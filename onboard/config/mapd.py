@@ -8,14 +8,26 @@ from onboard.config.problems import nearest
 from onboard.config.reader import Table
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
-from onboard.kinds.mapd.site import FAR, FREE, Floor, Line, Mapd, Task, grid_floor, lasting_rests, network_floor
+from onboard.kinds.mapd.messages import MOST_WAYS
+from onboard.kinds.mapd.site import (
+    FAR,
+    FREE,
+    Floor,
+    Line,
+    Mapd,
+    Task,
+    cell_station,
+    grid_floor,
+    lasting_rests,
+    network_floor,
+)
 
 if TYPE_CHECKING:
     from onboard.config.systems import Common
 
 _NOWHERE = Segment(0, 0)
-#: A cell is two bytes in a call, and the last numbers mean something else there.
-MAX_CELLS = 65_000
+#: A cell's token is that of a station, of which there are so many (kinds/mapd/rights.py).
+MAX_CELLS = 64_000
 #: Longest line of a network, steps.
 MAX_STEPS = 1_000
 #: Step of the latest release: with steps of a second more than a day.
@@ -32,8 +44,13 @@ def read_mapd(root: Table, common: "Common") -> Mapd:
         floor = grid_floor(rows) if rows else network_floor(points, lines, zones)
         if floor.size > MAX_CELLS:
             root.bad("map" if rows else "network", floor.size, "too many cells", f"have at most {MAX_CELLS}")
+            floor = None
+        elif max(map(len, floor.ways)) > MOST_WAYS:
+            crowded = max(range(floor.size), key=lambda cell: len(floor.ways[cell]))
+            what = f"{len(floor.ways[crowded])} ways lead from it"
+            root.bad("network", floor.names[crowded], what, f"have at most {MOST_WAYS}, by a point beside it")
     cells = {} if floor is None else {name: cell for cell, name in enumerate(floor.names) if _open(floor, cell)}
-    fleet, homes = _read_machines(root, cells if floor is not None else None)
+    fleet, homes = _read_machines(root, cells if floor is not None else None, floor)
     demand = root.table("demand")
     endpoints = _read_endpoints(demand, cells if floor is not None else None)
     tasks = _read_tasks(demand, cells if floor is not None else None, endpoints)
@@ -46,6 +63,7 @@ def read_mapd(root: Table, common: "Common") -> Mapd:
         bitrate=common.bitrate,
         machines=dict(sorted(fleet.by_node.items())),
         timing=timing,
+        stewards=_stewards(fleet, floor),
         rows=rows,
         points=points,
         lines=lines,
@@ -55,6 +73,14 @@ def read_mapd(root: Table, common: "Common") -> Mapd:
         tasks=tasks,
         step_ms=step_ms,
     )
+
+
+def _stewards(fleet: Fleet, floor: Floor | None) -> dict[int, int]:
+    """The desk has the rights to all cells but the robots' first ones, until somebody asks for them."""
+    desks = [node for node, one in fleet.by_node.items() if one.kind is KindCode.DESK]
+    if floor is None or not desks:
+        return {}
+    return dict.fromkeys(range(1, cell_station(floor.size - 1).track + 1), desks[0])
 
 
 def _open(floor: Floor, cell: int) -> bool:
@@ -134,7 +160,7 @@ def _names(table: Table, key: str, found: list[str]) -> list[str]:
     return found
 
 
-def _read_machines(root: Table, cells: dict[str, int] | None) -> tuple[Fleet, dict[int, int]]:
+def _read_machines(root: Table, cells: dict[str, int] | None, floor: Floor | None) -> tuple[Fleet, dict[int, int]]:
     fleet = Fleet()
     homes: dict[int, int] = {}
     for table in root.tables("desks"):
@@ -145,12 +171,16 @@ def _read_machines(root: Table, cells: dict[str, int] | None) -> tuple[Fleet, di
         if cell is not None and cell in homes.values():
             table.bad("home", name, "another robot's home", "give each robot a home of its own")
         before = len(fleet.by_node)
-        fleet.add(table, KindCode.VEHICLE, _NOWHERE)
+        # The right to its first cell is the robot's own from the beginning.
+        own = None if cell is None or floor is None else cell_station(floor.resources[cell])
+        fleet.add(table, KindCode.VEHICLE, _NOWHERE, own)
         if len(fleet.by_node) > before and cell is not None:
             homes[table.values["node"]] = cell
     for key, words in (("robots", "robot"), ("desks", "order desk")):
         if not root.values.get(key):
             root.bad(key, None, f"no {words}", f"add at least one [[{key}]] table")
+    if sum(one.kind is KindCode.DESK for one in fleet.by_node.values()) > 1:
+        root.bad("desks", len(root.values["desks"]), "more than one desk", "keep one: it opens every step")
     return fleet, homes
 
 

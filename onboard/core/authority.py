@@ -168,6 +168,16 @@ class TokenBook:
         self.changes += 1
         return [self._record("token_held", key, 1, self.node_id)]
 
+    def retire(self, key: TokenKey) -> None:
+        """Forget the token of a car that left so long ago that no frame about it can still be under way.
+
+        Its number comes again after 65,535 others; what was never retired is remembered for good.
+        """
+        if key not in self.leaving and key not in self.wanted:
+            for table in (self.seen, self.holder, self.held, self._genesis):
+                table.pop(key, None)
+            self.changes += 1
+
     def want(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Ask for a token until it is granted or no longer wanted. Nothing happens where it is held or asked for."""
         if self.holds(key) or key in self.wanted or self._is_own_at_first(key):

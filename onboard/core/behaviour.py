@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.authority import TokenBook, TokenKey, car_token
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect
 from onboard.core.messages import Message
@@ -37,6 +37,7 @@ class Fleet:
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)
+        self.mirror.on_forgotten.append(lambda car: self.tokens.retire(car_token(*car)))
 
     @property
     def node_id(self) -> int:

@@ -157,6 +157,7 @@ class OperatorAction(IntEnum):
     PRESS_KEY = 0
     INSERT_TICKET = 1
     CANCEL = 2
+    URGENT_TICKET = 3
 
 
 class DriveMode(IntEnum):

@@ -3,6 +3,7 @@
 A wrong mirror costs time, never safety: what moves is guarded by tokens.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, OUTSIDE, Grade, KindCode, MachineState, Reason
@@ -77,6 +78,8 @@ class Mirror:
     reservations: Reservations = field(default_factory=Reservations)
     order: PassingOrder = field(init=False)
     obstacles: Obstacles = field(init=False)
+    #: Who wants to know that a car which left long ago is remembered no longer.
+    on_forgotten: list[Callable[[Reference], object]] = field(default_factory=list)
     _digest: int | None = None
 
     def __post_init__(self) -> None:
@@ -166,8 +169,10 @@ class Mirror:
         if len(self.cars) <= MAX_GONE_CARS:
             return
         gone = [car for car, record in self.cars.items() if record.station == OUTSIDE]
-        for car in gone[: len(gone) - MAX_GONE_CARS]:
+        for car in gone[: max(0, len(gone) - MAX_GONE_CARS)]:
             del self.cars[car]
+            for listener in self.on_forgotten:
+                listener(car)
 
     def others_standing(self) -> list[Segment]:
         """Where the plans of all other machines end: there they stand until they plan anew; obstacles stand now."""

@@ -1,4 +1,4 @@
-"""``onboard gateway``: publish a whole site to a broker from any bus that is only listened to."""
+"""``onboard gateway``: publish a whole site to a broker from any bus; it only listens unless it takes orders."""
 
 import argparse
 import asyncio
@@ -29,6 +29,8 @@ exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the comman
 examples:
   onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1
       listens to a real bus; terminal reports are kept in ./spool until the broker has them
+  onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1 --orders 251
+      the same, and takes orders (docs/mqtt.md)
   onboard gateway -i socketcand-asyncio -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site mysite.toml \\
           --mqtt mqtts://broker.example --mqtt-ca ca.pem --mqtt-cert gateway.pem --mqtt-key gateway.key --vda5050 3.0
 """
@@ -52,6 +54,12 @@ def build_parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="where terminal reports wait for the broker (default: ./%(default)s)",
     )
+    parser.add_argument(
+        "--orders",
+        type=int,
+        metavar="NODE",
+        help="take orders too, and speak on the bus under this node-ID, 251 to 255, that nobody else there has",
+    )
     add_mqtt_arguments(parser, required=True)
     add_bus_arguments(parser)
     return parser
@@ -65,7 +73,7 @@ def main(argv: Sequence[str]) -> int:
         parser.error("name a bus: -i INTERFACE -c CHANNEL")
     try:
         site = load_site(args.site)
-        settings = gateway_settings(args)
+        settings = gateway_settings(args, node_id=args.orders)
         address = broker_address(args)
         bus = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         return asyncio.run(_run(site, settings, address, bus, args.spool))
@@ -88,7 +96,8 @@ async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bu
             system = system_of(site)
             codec = codecs(system.name, system.messages).fleet
             client = f"{settings.prefix}-{level(site.name)}"
-            gateway = Gateway(site, codec, broker, settings, reports=reports, wall_us=wall_us, client=client)
+            send = opened.send if settings.node_id is not None else None
+            gateway = Gateway(site, codec, broker, settings, reports=reports, wall_us=wall_us, client=client, send=send)
             # What a node of this computer sends on the same interface is heard as well.
             opened.subscribe(gateway.on_frame, gateway.on_frame)
             print("\n".join(watch_lines(address, site, settings)), flush=True)

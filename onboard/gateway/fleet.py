@@ -88,7 +88,14 @@ class FleetTopics:
         told |= {"what": record.operation.name.lower(), "phase": LIFE[record.phase], "calls": record.calls}
         if record.owner:
             told["owner"] = view.name(record.owner)
-        call = next((one for one in reversed(view.calls.values()) if one.call.task == reference), None)
+        call = next(
+            (
+                one
+                for one in reversed(view.calls.values())
+                if one.call.task == reference and one.call.operation in WHOLE
+            ),
+            None,
+        )
         if call is not None:
             shown = self._call(call)
             told |= {key: shown[key] for key in ("car", "from", "to") if shown[key] is not None}

@@ -7,9 +7,12 @@ between which everything else on the loop has its turn; each link sends in a tas
 import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable
+from functools import partial
 
 from onboard.core.frame import Frame
+from onboard.core.messages import Message
 from onboard.core.site import Site
+from onboard.gateway.desk import OrderDesk
 from onboard.gateway.link import Link, LinkWords
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.reports import Reports
@@ -41,7 +44,12 @@ class Gateway:
         reports: Reports | None = None,
         wall_us: Callable[[], int] | None = None,
         client: str = "onboard",
+        send: Callable[[Frame], bool] | None = None,
     ) -> None:
+        """With ``send``, which puts a frame on the fleet bus, orders are taken under the settings' node-ID.
+
+        That needs ``reports`` as well.
+        """
         self._loop = asyncio.get_running_loop()
         self.frames = 0
         self.frames_dropped = 0
@@ -56,6 +64,10 @@ class Gateway:
         self._stopping = False
         self._to_keep: deque[tuple[str, Publication]] = deque()
         self._set_clock()
+        self.desk: OrderDesk | None = None
+        if send is not None and reports is not None and settings.node_id is not None:
+            transmit = partial(_transmit, codec, send)
+            self.desk = OrderDesk(site, self.publisher, reports, transmit, self._post, self._now_us())
         self.links = {name: self._link(broker, client, name) for name in self.publisher.links}
 
     # --- in ------------------------------------------------------------------------------------------------------
@@ -96,10 +108,15 @@ class Gateway:
                 self._news.clear()
                 await self._work_off()
                 await self._wait()
+        except asyncio.CancelledError:
+            # As if the power were cut: no goodbyes.
+            for task in links:
+                task.cancel()
+            raise
         finally:
             for link in self.links.values():
                 link.stop()
-            await asyncio.gather(*links)
+            await asyncio.gather(*links, return_exceptions=True)
 
     async def _work_off(self) -> None:
         """Decode and publish what waits, in turns."""
@@ -109,16 +126,23 @@ class Gateway:
                 message = self._decoder.feed(frame, time_us)
                 if message is not None:
                     self._post(self.publisher.feed(message, time_us))
+                    if self.desk is not None:
+                        await self.desk.feed(message, time_us)
             await self._keep_reports()
             await asyncio.sleep(0)
         now_us = self._now_us()
         if self.publisher.next_wake() <= now_us:
             self._set_clock()
             self._post(self.publisher.wake(now_us))
+        if self.desk is not None:
+            await self.desk.work(now_us)
+            await self._keep_reports()
 
     async def _wait(self) -> None:
         """Until something is heard or due."""
-        rest_s = (self.publisher.next_wake() - self._now_us()) / 1e6
+        due_us = self.desk.next_wake() if self.desk is not None else None
+        next_us = self.publisher.next_wake() if due_us is None else min(due_us, self.publisher.next_wake())
+        rest_s = (next_us - self._now_us()) / 1e6
         timer = self._loop.call_later(max(0.0, rest_s), self._news.set)
         await self._news.wait()
         timer.cancel()
@@ -149,8 +173,22 @@ class Gateway:
             lambda: publisher.hello(name, self._now_us()),
             lambda: publisher.goodbye(name, self._now_us()),
         )
-        of_fleet = name == FLEET
-        return Link(broker, f"{client}-{name or 'fleet'}", words, reports=self.reports if of_fleet else None)
+        if name != FLEET:
+            return Link(broker, f"{client}-{name}", words)
+        subscriptions = self.desk.inbox.subscriptions if self.desk is not None else ()
+        return Link(
+            broker,
+            f"{client}-fleet",
+            words,
+            reports=self.reports,
+            subscriptions=subscriptions,
+            on_order=self._on_order,
+        )
+
+    def _on_order(self, publication: Publication) -> None:
+        if self.desk is not None:
+            self.desk.on_publication(publication)
+            self._news.set()
 
     def _set_clock(self) -> None:
         if self._wall_us is not None:
@@ -158,3 +196,8 @@ class Gateway:
 
     def _now_us(self) -> int:
         return round(self._loop.time() * 1_000_000)
+
+
+def _transmit(codec: Codec, send: Callable[[Frame], bool], message: Message) -> None:
+    for frame in codec.encode(message):
+        send(frame)

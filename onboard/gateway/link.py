@@ -110,6 +110,7 @@ class Link:
                 await self._send(session, listening)
             finally:
                 listening.cancel()
+                await asyncio.wait([listening])
             await self._publish(session, self._words.goodbye())
 
     async def _send(self, session: Session, listening: "asyncio.Future[None]") -> None:
@@ -119,8 +120,10 @@ class Link:
             while not self._stopping.is_set() and await self._send_one(session):
                 pass
             news = asyncio.ensure_future(self._news.wait())
-            await asyncio.wait((news, listening), return_when=asyncio.FIRST_COMPLETED)
-            news.cancel()
+            try:
+                await asyncio.wait((news, listening), return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                news.cancel()
             if listening.done():
                 listening.result()
                 raise BrokerError("the connection has ended")

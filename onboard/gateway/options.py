@@ -50,9 +50,13 @@ def broker_address(args: argparse.Namespace) -> BrokerAddress:
     )
 
 
-def gateway_settings(args: argparse.Namespace, serials: frozenset[str] = frozenset()) -> GatewaySettings:
+def gateway_settings(
+    args: argparse.Namespace, serials: frozenset[str] = frozenset(), node_id: int | None = None
+) -> GatewaySettings:
     """What is published. Raises ``GatewayError``."""
-    return GatewaySettings(version=args.vda5050, manufacturer=args.manufacturer, prefix=args.prefix, serials=serials)
+    return GatewaySettings(
+        version=args.vda5050, manufacturer=args.manufacturer, prefix=args.prefix, serials=serials, node_id=node_id
+    )
 
 
 def _password(path: Path | None) -> str | None:

@@ -62,7 +62,7 @@ class Publisher:
         self._due = {node: _Due(now_us + settings.state_us) for node in self._told_of}
         self._fixed: dict[str, Json] = {}
         self._indicators_us = now_us + settings.indicators_us
-        self._root = f"{settings.prefix}/{level(site.name)}"
+        self.root = f"{settings.prefix}/{level(site.name)}"
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -84,14 +84,12 @@ class Publisher:
     def hello(self, link: str, now_us: int) -> list[Publication]:
         """What a link says first: how it is connected, and what never changes."""
         if link == FLEET:
-            fixed = [self._publication(topic, told, retain=True) for topic, told in self._fixed.items()]
+            fixed = [self.publication(topic, told, retain=True) for topic, told in self._fixed.items()]
             return [self._link_state(link, Connection.ONLINE, now_us), *fixed]
         node = self._node(link)
         connection = self._connection_of(node, now_us)
         self._due[node].connection = connection
-        machine = self.site.machines[node]
-        sheet = factsheet(self.settings.dialect, self.site, machine, self.settings)
-        found = [self._link_state(link, connection, now_us), self._vda(node, "factsheet", sheet, now_us, retain=True)]
+        found = [self._link_state(link, connection, now_us), self._factsheet(node, now_us)]
         return [*found, self._state(node, now_us)] if connection is not Connection.OFFLINE else found
 
     def goodbye(self, link: str, now_us: int) -> Publication:
@@ -123,6 +121,12 @@ class Publisher:
             return []
         self._due[node].essence = {}
         return list(self._tell_state(node, self._due[node], now_us))
+
+    def tell_factsheet(self, node: int, now_us: int) -> list[Outgoing]:
+        """The factsheet again."""
+        if node not in self._due:
+            return []
+        return [Outgoing(self._serial(node), self._factsheet(node, now_us))]
 
     def wants(self, node: int, now_us: int) -> None:
         """Something about a machine's order has changed that the bus does not tell."""
@@ -159,7 +163,7 @@ class Publisher:
             self._indicators_us = now_us + self.settings.indicators_us
             if not self.settings.serials:
                 told = self.fleet.indicators(now_us)
-                yield Outgoing(FLEET, self._publication("indicators", told, retain=True))
+                yield Outgoing(FLEET, self.publication("indicators", told, retain=True))
 
     def _of_fleet(self, message: Message, now_us: int) -> Iterator[Outgoing]:
         for topic, told in self.fleet.feed(message, now_us):
@@ -168,7 +172,7 @@ class Publisher:
                 continue
             if retain:
                 self._fixed[topic] = told
-            yield Outgoing(FLEET, self._publication(topic, told, retain=retain))
+            yield Outgoing(FLEET, self.publication(topic, told, retain=retain))
         if isinstance(message, TaskReport) and message.phase in _TERMINAL:
             yield from self._report(message, now_us)
 
@@ -182,7 +186,7 @@ class Publisher:
         name = f"{vda.reference_text(report.task)}-{report.phase.name.lower()}"
         told |= {"id": f"{told['at'][:10]}-{name}", "phase": report.phase.name.lower()}
         told |= {"by": self.fleet.picture.view.name(report.sender), "reason": report.reason.name}
-        yield Outgoing(FLEET, self._publication("report", told, qos=1), name)
+        yield Outgoing(FLEET, self.publication("report", told, qos=1), name)
 
     def _moved(self, node: int, now_us: int) -> Iterator[Outgoing]:
         due, where = self._due[node], self.machines.where(node)
@@ -202,6 +206,10 @@ class Publisher:
             return
         due.essence, due.told_us, due.state_us = essence, now_us, now_us + self.settings.state_us
         yield Outgoing(self._serial(node), self._vda(node, "state", content, now_us))
+
+    def _factsheet(self, node: int, now_us: int) -> Publication:
+        sheet = factsheet(self.settings.dialect, self.site, self.site.machines[node], self.settings)
+        return self._vda(node, "factsheet", sheet, now_us, retain=True)
 
     def _state(self, node: int, now_us: int) -> Publication:
         return self._vda(node, "state", self._content(node, now_us), now_us)
@@ -227,12 +235,13 @@ class Publisher:
 
     def _link_state(self, link: str, connection: Connection, now_us: int) -> Publication:
         if link == FLEET:
-            return self._publication("status", {"state": connection.value}, qos=1, retain=True)
+            return self.publication("status", {"state": connection.value}, qos=1, retain=True)
         told = vda.connection(self.settings.dialect, connection)
         return self._vda(self._node(link), "connection", told, now_us, qos=1, retain=True)
 
-    def _publication(self, topic: str, told: Json, *, qos: int = 0, retain: bool = False) -> Publication:
-        return Publication(f"{self._root}/{topic}", _bytes(told), qos, retain)
+    def publication(self, topic: str, told: Json, *, qos: int = 0, retain: bool = False) -> Publication:
+        """One message of the fleet's own topics; ``topic`` below PREFIX/SITE."""
+        return Publication(f"{self.root}/{topic}", _bytes(told), qos, retain)
 
     def _vda(self, node: int, name: str, told: Json, now_us: int, *, qos: int = 0, retain: bool = False) -> Publication:
         dialect, maker, serial = self.settings.dialect, self.settings.manufacturer, self._serial(node)

@@ -7,7 +7,7 @@ without a word (MQTT's QoS 1: at least once).
 
 import base64
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Protocol
 
 from onboard.ports.broker import Publication
@@ -33,11 +33,16 @@ class Reports:
 
     def __init__(self, journal: CompactJournal) -> None:
         self.given_up = 0
+        #: Records of others in the journal as they were found, oldest first.
         self.others: list[Entry] = []
+        #: What of them counts when the journal is written anew.
+        self.keep: Callable[[], Iterable[Entry]] = lambda: self.others
         self.pending: OrderedDict[str, Publication] = OrderedDict()
         self._known: OrderedDict[str, None] = OrderedDict()
         self._journal = journal
         self._records = 0
+        #: Records that counted when the journal was last written anew.
+        self._kept = 0
         for entry in journal.replay():
             self._records += 1
             name = str(entry.get("name", ""))
@@ -70,14 +75,14 @@ class Reports:
         """One more record, and the journal anew where it has grown too long. Raises ``OSError``."""
         await self._journal.append(entry)
         self._records += 1
-        if self._records > SLACK_RECORDS + len(self.pending) + len(self._known) + len(self.others):
+        if self._records > SLACK_RECORDS + 2 * self._kept:
             kept = list(self.entries())
             await self._journal.compact(kept)
-            self._records = len(kept)
+            self._records = self._kept = len(kept)
 
     def entries(self) -> Iterator[Entry]:
         """What counts, oldest first."""
-        yield from self.others
+        yield from self.keep()
         for name in self._known:
             yield {"record": "delivered", "name": name}
         for name, publication in self.pending.items():

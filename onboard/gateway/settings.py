@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 
+from onboard.core.codes import MAX_NODE_ID
 from onboard.gateway.dialect import DIALECTS, Dialect
 
 #: Characters of a topic level: those of a serial number in VDA 5050 2.1, section 6.4.
@@ -18,7 +19,8 @@ class GatewaySettings:
     """Topics, version and rates of a gateway; times in microseconds. The rates are ours where no source is named.
 
     ``epoch_us`` is the wall time (us since 1970) at loop time 0, for the time stamps. ``serials`` names the machines
-    that are told of; empty for all of the site. ``node_id`` is the gateway's own on the bus, 251 to 255 (core/codes).
+    that are told of; empty for all of the site. ``node_id`` is the gateway's own on the bus, 251 to 255 (core/codes),
+    where it takes orders; None where it only listens.
     """
 
     version: str = "2.1"
@@ -26,7 +28,7 @@ class GatewaySettings:
     prefix: str = "onboard"
     epoch_us: int = 0
     serials: frozenset[str] = frozenset()
-    node_id: int = 255
+    node_id: int | None = None
     #: A state at least so often (VDA 5050 2.1, section 6.10: 30 s).
     state_us: int = 30_000_000
     #: Two states of one machine are so far apart at least; changes between them are told together.
@@ -38,6 +40,8 @@ class GatewaySettings:
         """Raise ``GatewayError`` for a version that is not known or a name that cannot be a level of a topic."""
         if self.version not in DIALECTS:
             raise GatewayError(f"--vda5050 {self.version}: not known; one of {', '.join(DIALECTS)}")
+        if self.node_id is not None and not MAX_NODE_ID < self.node_id <= 255:
+            raise GatewayError(f"--orders {self.node_id}: no node-ID of a gateway; from {MAX_NODE_ID + 1} to 255")
         for option, value in (("--manufacturer", self.manufacturer), ("--prefix", self.prefix)):
             if not _LEVEL.fullmatch(value):
                 raise GatewayError(f"{option} {value!r}: not a level of a topic; letters, digits and _ . : - only")

@@ -23,6 +23,9 @@ from onboard.kinds.graph.desk import DeskFactory as VisitDeskFactory
 from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
 from onboard.kinds.graph.robot import RobotFactory as GraphRobotFactory
 from onboard.kinds.graph.site import FactoryGraph
+from onboard.kinds.mapd.factories import OrderDeskFactory as CallDeskFactory
+from onboard.kinds.mapd.factories import UnitRobotFactory
+from onboard.kinds.mapd.messages import MESSAGES as MAPD_MESSAGES
 from onboard.kinds.mapd.site import Mapd
 from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
@@ -70,8 +73,7 @@ _SYSTEMS: dict[str, System] = {
             {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
             TURNING_MESSAGES,
         ),
-        # Played without a bus so far (docs/import.md): no machine of it has a controller yet.
-        System(Mapd.system, {}),
+        System(Mapd.system, {KindCode.VEHICLE: UnitRobotFactory(), KindCode.DESK: CallDeskFactory()}, MAPD_MESSAGES),
     )
 }
 

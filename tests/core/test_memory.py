@@ -2,11 +2,12 @@
 
 import pytest
 
-from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState
+from onboard.core.authority import car_token
+from onboard.core.codes import CONTRACT_VERSION, OUTSIDE, KindCode, MachineState, TokenKind
 from onboard.core.effects import Halt
 from onboard.core.holon import Holon
-from onboard.core.messages import CarAt, Heartbeat, Reference, SyncRequest
-from onboard.core.mirror import Mirror
+from onboard.core.messages import CarAt, Heartbeat, Reference, SyncRequest, TokenGrant, TokenHeld
+from onboard.core.mirror import MAX_GONE_CARS, Mirror
 from onboard.kinds.registry import factory_for
 from tests.core.walkers import Alley
 from tests.sites import one_floor
@@ -84,3 +85,33 @@ def test_one_version_of_a_cars_token_has_one_custodian() -> None:
     assert mirror.on_car(CarAt(1, car, other, 3, 2500)), "the custodian itself may move it"
     assert mirror.on_car(CarAt(11, car, place, 4, 2500))
     assert mirror.cars[car].custodian == 11
+
+
+def test_cars_that_left_long_ago_leave_nothing_behind() -> None:
+    """A machine runs for years: what it knows of tokens and winners is bounded by the cars that are there."""
+    machine = holon(1)
+    for number in range(1, 4 * MAX_GONE_CARS):
+        car = Reference(STEWARD, number)
+        machine.receive(TokenHeld(ROBOT, TokenKind.CAR, car_token(*car).number, 2), 10)
+        machine.receive(CarAt(ROBOT, car, SITE.places[0].number, 2, 2500), 10)
+        machine.receive(TokenGrant(ROBOT, TokenKind.CAR, car_token(*car).number, 3, STEWARD), 10)
+        machine.receive(CarAt(ROBOT, car, OUTSIDE, 4, 2500), 10)
+    for table in (machine.mirror.cars, machine.tokens.seen, machine.tokens.held, machine.tokens.holder):
+        assert len(table) <= MAX_GONE_CARS + 1
+    first = Reference(STEWARD, 1)
+    machine.tokens.create(car_token(*first))
+    assert machine.mirror.on_car(CarAt(STEWARD, first, SITE.places[0].number, 1, 2500)), "numbers come again"
+
+
+def test_cars_that_are_there_are_never_forgotten_however_many_have_left() -> None:
+    mirror = Mirror(SITE, 1)
+    forgotten: list[Reference] = []
+    mirror.on_forgotten.append(forgotten.append)
+    for number in range(1, MAX_GONE_CARS):
+        mirror.on_car(CarAt(1, Reference(1, number), SITE.places[0].number, 1, 2500))
+    for number in range(1, MAX_GONE_CARS):
+        mirror.on_car(CarAt(1, Reference(2, number), OUTSIDE, 1, 2500))
+    assert forgotten == []
+    for number in range(MAX_GONE_CARS, MAX_GONE_CARS + 3):
+        mirror.on_car(CarAt(1, Reference(2, number), OUTSIDE, 1, 2500))
+    assert forgotten == [Reference(2, 1), Reference(2, 2)]

@@ -9,6 +9,7 @@ import bus_sim
 from bus_sim.cli import main
 from onboard.cli import main as onboard_main
 from onboard.config.site import load_site
+from onboard.kinds import registry
 from onboard.kinds.mapd.site import Mapd
 
 DATA = Path(bus_sim.__file__).parent / "data"
@@ -206,6 +207,7 @@ SITE_MISTAKES = {
     ('rows = ["e.e", ".@.", "r.e"]', 'rows = ["e@e", ".@.", "r@e"]'): "no way from and to",
     ('"0,2", "2,2"]', '"0,2", "0,2"]'): "named twice",
     ("node = 11", "node = 1"): "node-ID of Desk already",
+    ("[[robots]]", '[[desks]]\nname = "D2"\nnode = 2\n\n[[robots]]'): "more than one desk",
     ("[map]", "[nap]"): "neither or both of [map] and [network]",
 }
 
@@ -228,7 +230,7 @@ def test_a_mistake_in_a_site_file_gets_a_line(
 @pytest.mark.parametrize(
     ("arguments", "wanted"),
     [
-        (["run", "SITE", "--fault", "crash:target=R1,at_s=3"], "--fault: s is played without a bus"),
+        (["run", "SITE", "--fault", "linger:car=1,for_s=3"], "only a car park has it, and s is a mapd"),
         (["campaign", "SITE"], "a mapd, and campaigns bring cars; name a car park"),
         (["compare", "SITE"], "a mapd, and only car parks are compared; name a car park"),
     ],
@@ -244,9 +246,10 @@ def test_what_such_a_site_cannot_do_is_said_in_one_line(
     assert said.count("\n") == 1
 
 
-def test_a_machine_of_such_a_site_says_that_it_has_no_controller(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_machine_without_a_behaviour_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setitem(registry._SYSTEMS, "mapd", registry.System("mapd", {}))
     (tmp_path / "s.toml").write_text(SITE)
     machine = tmp_path / "machine.toml"
     machine.write_text(MACHINE)

@@ -19,6 +19,8 @@ from onboard.wire.codec import codecs
 from onboard.wire.decoder import Decoder
 
 SCHEMAS = Path(__file__).parent / "schemas"
+#: What comes in is checked on board, so these schemas are in the package.
+OWN = Path(__file__).parents[2] / "onboard" / "gateway" / "schemas"
 VERSIONS = {"2.1": "2.1.0", "3.0": "3.0.0"}
 #: 2026-03-01 06:00:00 UTC
 EPOCH_US = 1_772_344_800_000_000
@@ -56,7 +58,8 @@ def published(site_name: str, log: Path, **settings: Any) -> list[tuple[int, Out
 @cache
 def validator(version: str, name: str) -> Draft202012Validator:
     """The validator of one message of a version."""
-    schema = json.loads((SCHEMAS / VERSIONS[version] / f"{name}.schema").read_text(encoding="utf-8"))
+    folder = OWN if name in ("order", "instantActions") else SCHEMAS
+    schema = json.loads((folder / VERSIONS[version] / f"{name}.schema").read_text(encoding="utf-8"))
     return Draft202012Validator(schema, format_checker=Draft202012Validator.FORMAT_CHECKER)
 
 

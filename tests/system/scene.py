@@ -1,7 +1,7 @@
 """A whole site in virtual time for one test, with everything said on any of its buses written down."""
 
 import asyncio
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
@@ -93,17 +93,26 @@ def play(
     extra_s: float = 60,
     plant: Callable[[Simulation], None] | None = None,
     without: frozenset[str] = frozenset(),
+    after: Callable[[], Awaitable[None]] | None = None,
 ) -> Scene:
     """Run a site until all customers are served (or the limit), then a little longer.
 
-    ``plant`` is called before power-up, ``before`` right after it. Machines named in ``without`` are not started.
+    ``plant`` is called before power-up, ``before`` right after it, ``after`` at the end, on the loop still. Machines
+    named in ``without`` are not started.
     """
     loop = VirtualTimeLoop()
     options = RunOptions(seed=seed, faults=tuple(faults), without=without)
     try:
-        return loop.run_until_complete(_play(site, demand, options, limit_s, before, loop, extra_s, plant))
+        scene = loop.run_until_complete(_play(site, demand, options, limit_s, before, loop, extra_s, plant))
+        if after is not None:
+            loop.run_until_complete(_finish(after))
+        return scene
     finally:
         loop.close()
+
+
+async def _finish(after: Callable[[], Awaitable[None]]) -> None:
+    await after()
 
 
 async def _play(

@@ -2,8 +2,8 @@
 
 import pytest
 
-from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, Reason, TaskPhase
-from onboard.core.messages import Message, Reference
+from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.core.messages import BusTime, Heartbeat, Message, Reference
 from tests.trace.checking import (
     MR1,
     MR2,
@@ -90,6 +90,27 @@ def test_a_call_that_is_never_closed_is_found() -> None:
 
 def test_a_call_whose_initiator_started_anew_is_over() -> None:
     assert tell(STORY[:3]).say(3, power_up(2)).say(5, power_up(2)).broken() == {}
+
+
+def test_while_bus_time_has_jumped_no_call_is_due() -> None:
+    """Its machine waits for a second word of the new time before it decides anything."""
+    jumped = tell(STORY[:3]).say(1.9, BusTime(1, 101_900_000))
+    assert jumped.broken(9) == {}
+    assert jumped.broken(20) == {"calls-closed": 1}
+
+
+@pytest.mark.parametrize(("restarted", "broken"), [(False, {"one-owner": 1}), (True, {})])
+def test_done_is_told_again_only_after_a_restart(restarted: bool, broken: dict[str, int]) -> None:
+    tape = tell(STORY)
+    if restarted:
+        tape.say(51, Heartbeat(MR1, 1, 1, 0, 2, KindCode.ROBOT, MachineState.STARTING))
+    assert tape.say(52, report(MR1, TaskPhase.DONE, PLACE)).broken(54) == broken
+
+
+def test_who_was_off_together_with_all_others_may_say_again_that_a_car_was_put_down() -> None:
+    """The log begins anew with the bus time: what was said before is not known."""
+    tape = tell([(1, [call(1, 2)]), (1.5, [bid(MR1, 50_000)]), (2, [award(MR1)])])
+    assert tape.say(5, report(MR1, TaskPhase.DONE, PLACE)).broken(8) == {}
 
 
 def test_a_winner_may_give_the_task_back_before_it_was_heard() -> None:

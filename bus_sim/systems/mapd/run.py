@@ -1,46 +1,62 @@
-"""``bus-sim run`` on a pick-up and delivery site: the day step by step, without frames, and its figures."""
+"""``bus-sim run`` on a pick-up and delivery site: what came of it, in steps and in seconds."""
 
-import json
 import sys
-from typing import TYPE_CHECKING
+from statistics import fmean
+from typing import TYPE_CHECKING, cast
 
-from bus_sim.demand import DemandError
-from bus_sim.systems.mapd.steps import Day
+from bus_sim.run import BusRun
+from bus_sim.systems.mapd.plant import UnitPlant, make_plant
+from bus_sim.systems.mapd.show import picture
+from bus_sim.systems.session import Played, SystemPlant, conclude, play
 from onboard.core.site import Site
+from onboard.kinds.mapd.messages import PathHead, StepAward, StepRound, TransportBid, TransportCall
 from onboard.kinds.mapd.site import Mapd
 
 if TYPE_CHECKING:
     from bus_sim.systems.registry import SystemOptions
 
-#: A day that has not ended by then has somebody who waits for ever.
-MOST_STEPS = 200_000
-
 
 def run_mapd(site: Site, options: "SystemOptions") -> int:
-    """Play the site's tasks; 1 where one was not served. The judge raises where robots met.
-
-    Raises ``DemandError`` for a fault asked for.
-    """
+    """Play the site's tasks on the virtual bus; 1 where one was not served, or where robots met."""
     assert isinstance(site, Mapd)
-    if options.faults:
-        raise DemandError(f"--fault: {site.name} is played without a bus, so nothing can fail on it; leave it out")
-    limit = MOST_STEPS if options.limit_s is None else round(options.limit_s * 1000 / site.step_ms)
-    day = Day(site.floor, list(site.homes.values()), site.rests, site.tasks).run(limit)
-    figures: dict[str, object] = {
-        "site": site.name,
+    played = play_day(site, options)
+    if not options.quiet:
+        sys.stdout.write(picture(cast("UnitPlant", played.plant)) + "\n\n")
+    return conclude(played, site, options, figures(played), options.quiet)
+
+
+def play_day(site: Mapd, options: "SystemOptions") -> Played:
+    """The run, judged once more step by step at its end."""
+
+    def show(_: BusRun, plant: SystemPlant) -> str:
+        return picture(cast("UnitPlant", plant))
+
+    played = play(site, options, make_plant, show)
+    cast("UnitPlant", played.plant).check_steps()
+    return played
+
+
+def figures(played: Played) -> dict[str, object]:
+    """Service time and makespan in steps and seconds, and what was said for them."""
+    plant = cast("UnitPlant", played.plant)
+    site, said = plant.site, [message for _, message in played.messages]
+    served = [one for one in plant.goods.values() if one.served_step is not None and one.served_us is not None]
+    steps = [one.served_step - one.task.release for one in served if one.served_step is not None]
+    seconds = [(one.served_us - one.ordered_us) / 1e6 for one in served if one.served_us is not None]
+    counts = {
+        kind: sum(isinstance(one, kind) for one in said) for kind in (TransportCall, TransportBid, StepAward, PathHead)
+    }
+    return {
         "robots": len(site.homes),
         "tasks": len(site.tasks),
-        "served": len(day.served),
-        "steps": day.step,
+        "served": len(served),
         "step_ms": site.step_ms,
-        "searches": day.searches,
-        "kept_former_path": day.failures,
+        "steps": max((one.step for one in said if isinstance(one, StepRound)), default=0),
+        "mean_service_steps": round(fmean(steps), 2) if steps else 0.0,
+        "makespan_steps": max((one.served_step or 0 for one in served), default=0),
+        "mean_service_s": fmean(seconds) if seconds else 0.0,
+        "calls": counts[TransportCall],
+        "bids": counts[TransportBid],
+        "awards": counts[StepAward],
+        "paths": counts[PathHead],
     }
-    if day.served:
-        figures |= {"mean_service_steps": round(day.service_time, 2), "makespan_steps": day.makespan}
-    if options.json is not None:
-        options.json.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
-    if not options.quiet:
-        sys.stdout.write("without a bus: the robots' own decisions, step by step; no trace is written\n")
-        sys.stdout.writelines(f"{name.replace('_', ' ')}: {value}\n" for name, value in figures.items())
-    return 0 if day.is_over else 1

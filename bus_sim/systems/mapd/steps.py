@@ -52,6 +52,8 @@ class Day:
         self.waiting = sorted(self.tasks, key=lambda task: (task.release, task.number))[::-1]
         self.open: dict[int, Task] = {}
         self.fresh = False
+        # Whether somebody who planned right at its pick-up took the goods: the others see that in the next step.
+        self._is_news = False
         self.history.append(tuple(self.homes))
 
     @property
@@ -85,7 +87,7 @@ class Day:
         return self.paths.by_robot[robot.number].at(self.step)
 
     def _arrive(self) -> None:
-        self.fresh = False
+        self.fresh, self._is_news = self._is_news, False
         while self.waiting and self.waiting[-1].release <= self.step:
             task = self.waiting.pop()
             self.open[task.number] = task
@@ -156,6 +158,7 @@ class Day:
             robot.free_at = next(step for step, cell in path.steps() if cell == task.delivery and step >= picked)
             if picked == self.step:
                 self._pick_up(robot, task)
+                self._is_news = True
 
     def _judge(self) -> None:
         """Note where all stand. Raises ``AssertionError`` where two met, whatever their paths say."""

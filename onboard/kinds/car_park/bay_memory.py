@@ -14,6 +14,7 @@ from onboard.core.codes import Operation
 from onboard.core.effects import Record
 from onboard.core.messages import CarAt, Reference
 from onboard.core.serial import successor
+from onboard.kinds.car_park.bay_task import queue_ticket
 
 Entry = Mapping[str, str | int]
 
@@ -36,9 +37,10 @@ def winner_record(car: Reference, winner: int, task: Reference, version: int) ->
     return Record(entry | {"task_origin": task.origin, "task": task.number, "version": version})
 
 
-def ticket_record(car: Reference) -> Record:
-    """A ticket came; its car is to be fetched."""
-    return Record({"record": "ticket", "car_origin": car.origin, "car": car.number})
+def ticket_record(car: Reference, *, urgent: bool) -> Record:
+    """A ticket came; its car is to be fetched, an urgent one before those that wait."""
+    entry: dict[str, str | int] = {"record": "ticket", "car_origin": car.origin, "car": car.number}
+    return Record(entry | {"urgent": 1} if urgent else entry)
 
 
 def job_record(task: Reference, operation: Operation, car: Reference, wheelbase_mm: int) -> Record:
@@ -96,7 +98,7 @@ class BayMemory:
             case "winner":
                 self._take_winner(entry)
             case "ticket":
-                self.tickets.append(_car(entry))
+                queue_ticket(self.tickets, _car(entry), urgent="urgent" in entry)
             case "job":
                 operation = Operation(int(entry["operation"]))
                 task = Reference(int(entry["task_origin"]), int(entry["task"]))

@@ -1,5 +1,6 @@
 """The one task that uses a compartment's bay, and what is said about it: its call and its award."""
 
+from collections import deque
 from dataclasses import dataclass
 from enum import Enum
 
@@ -30,6 +31,7 @@ DESK_INPUT = {
     OperatorAction.PRESS_KEY: DeskInput.KEY,
     OperatorAction.INSERT_TICKET: DeskInput.TICKET,
     OperatorAction.CANCEL: DeskInput.CANCEL,
+    OperatorAction.URGENT_TICKET: DeskInput.TICKET,
 }
 #: The custodian's word that the winner is lost is answered so often with the newest award, before it counts. Ours.
 REMINDERS = 3
@@ -81,6 +83,18 @@ class BayTask:
     def award(self, sender: int) -> Award:
         """The newest award, to be said again."""
         return Award(sender, self.call, self.winner, self.task, self.version, CallResult.AWARDED, Reason.NONE)
+
+
+def queue_ticket(tickets: deque[Reference], car: Reference, *, urgent: bool) -> bool:
+    """Put a ticket behind those that wait, or an urgent one, new or not, before them; whether that changed anything."""
+    if urgent and tickets and tickets[0] == car:
+        return False
+    if car in tickets and not urgent:
+        return False
+    if car in tickets:
+        tickets.remove(car)
+    tickets.insert(0 if urgent else len(tickets), car)
+    return True
 
 
 def withdrawal(node: int, report: TaskReport) -> list[Effect]:

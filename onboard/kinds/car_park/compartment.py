@@ -23,6 +23,7 @@ from onboard.core.codes import (
     LightColour,
     MachineState,
     Operation,
+    OperatorAction,
     Reason,
     TaskPhase,
     TokenKind,
@@ -147,13 +148,14 @@ class Compartment:
             self.bay = message
         elif isinstance(message, DeskEvent) and message.sequence != self._desk_sequence:
             self._desk_sequence = message.sequence
-            return self._at_desk(message.event, message.car, now_us)
+            return self._at_desk(message.event, message.car)
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
         if isinstance(message, OperatorOrder) and message.compartment == self.fleet.node_id:
-            return self._at_desk(DESK_INPUT[message.action], message.car, now_us)
+            urgent = message.action is OperatorAction.URGENT_TICKET
+            return self._at_desk(DESK_INPUT[message.action], message.car, urgent=urgent)
         if isinstance(message, TaskReport):
             return self._on_report(message, now_us)
         if isinstance(message, TokenRequest) and self.job is not None:
@@ -277,22 +279,20 @@ class Compartment:
 
     # --- the desk ----------------------------------------------------------------------------------------------
 
-    def _at_desk(self, event: DeskInput, car: Reference, now_us: int) -> list[Effect]:
+    def _at_desk(self, event: DeskInput, car: Reference, *, urgent: bool = False) -> list[Effect]:
         if event is DeskInput.KEY:
             self._key_pressed = True
             return []
         # Whoever cancels wants the car back at once: the same as coming for it.
-        return self._take_ticket(car)
+        return self._take_ticket(car, urgent=urgent)
 
-    def _take_ticket(self, car: Reference) -> list[Effect]:
+    def _take_ticket(self, car: Reference, *, urgent: bool = False) -> list[Effect]:
         record = self.fleet.mirror.cars.get(car)
         if record is None or record.station == OUTSIDE:
             return [self._desk(DeskText.UNKNOWN_TICKET, car)]
         in_hand = self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE
-        if not in_hand and car not in self.tickets:
-            self.tickets.append(car)
-            return [ticket_record(car), self._desk(DeskText.PLEASE_WAIT, car)]
-        return [self._desk(DeskText.PLEASE_WAIT, car)]
+        new = not in_hand and bay_task.queue_ticket(self.tickets, car, urgent=urgent)
+        return [*([ticket_record(car, urgent=urgent)] if new else []), self._desk(DeskText.PLEASE_WAIT, car)]
 
     def _desk(self, text: DeskText, car: Reference) -> Effect:
         self._sequence = successor(self._sequence, 8)

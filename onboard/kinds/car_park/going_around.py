@@ -57,14 +57,16 @@ class GoingAround:
 
     def next_wake(self) -> int | None:
         """When to try again, or to say again what was given back."""
-        times = [due_us for _, _, due_us in self.given_back.values()]
-        if self._retry_at_us is not None:
-            times.append(self._retry_at_us)
-        return min(times, default=None)
+        times = [self.next_word(), self._retry_at_us]
+        return min((time for time in times if time is not None), default=None)
+
+    def next_word(self) -> int | None:
+        """When a task that was given back is to be named again, bus time in us."""
+        return min((due_us for _, _, due_us in self.given_back.values()), default=None)
 
     def advance(self, now_us: int) -> list[Effect]:
         """Look whether the plan leads through an obstacle, where anything about them has changed."""
-        effects = self._say_again(now_us)
+        effects = self.say_again(now_us)
         if self.fleet.admissions != self._admissions:
             self._admissions = self.fleet.admissions
             self._since_us = self._retry_at_us = now_us
@@ -206,7 +208,8 @@ class GoingAround:
             return True
         return any(obstacles.is_at(slot) and not tokens.holds(segment_token(slot)) for slot in slots)
 
-    def _say_again(self, now_us: int) -> list[Effect]:
+    def say_again(self, now_us: int) -> list[Effect]:
+        """Name what was given back once more, where that is due."""
         effects: list[Effect] = []
         for task, (reason, left, due_us) in list(self.given_back.items()):
             if due_us > now_us:

@@ -129,6 +129,7 @@ class Recovery:
     def forget(self, task: Reference) -> None:
         """A task is another's, or was given back."""
         self.works = [work for work in self.works if work.call.task != task]
+        self.versions.pop(task, None)
 
 
 def _task(entry: Entry) -> Reference:

@@ -254,7 +254,7 @@ class Robot:
     def advance(self, now_us: int) -> list[Effect]:
         """Carry on with the step in hand."""
         if self._fault is not Reason.NONE:
-            return []
+            return self.going_around.say_again(now_us)
         if self.program.standing is None:
             # On its way to a mark after a restart, or nowhere known.
             return self.carriage.advance(now_us) if self.carriage.goal is not None else []
@@ -278,9 +278,14 @@ class Robot:
         return effects
 
     def next_wake(self) -> int | None:
-        """The drive's next order, the end of a planned wait, or of a pause after a restart."""
+        """The drive's next order, the end of a planned wait, or of a pause after a restart.
+
+        Who has failed only says again what it gives back.
+        """
+        if self._fault is not Reason.NONE:
+            return self.going_around.next_word()
         times = [self.carriage.next_wake(), self._recover_at_us]
-        if self._recover_at_us is None and self.program.standing is not None and self._fault is Reason.NONE:
+        if self._recover_at_us is None and self.program.standing is not None:
             times.append(self.going_around.next_wake())
         step = self.program.step
         if step is not None and self._begun:
@@ -449,6 +454,7 @@ class Robot:
             effects.append(handled_record(step.work))
             if not taken:
                 self._done.append(step.work.call.task)
+                self.recovery.versions.pop(step.work.call.task, None)
             effects.append(self._report(step.work.call.task, phase, step.work.station.number))
         if step.action is LegAction.RIDE:
             floor = sill(self.fleet.site, step.track, step.to_index).track

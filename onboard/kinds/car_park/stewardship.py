@@ -42,11 +42,18 @@ class Stewardship:
 
     def __post_init__(self) -> None:
         self.fleet.tokens.before_taking = self._before_taking
+        self.fleet.mirror.on_forgotten.append(self._forget)
 
     def replay(self, memory: BayMemory) -> None:
         """Take up what the journal tells of the cars that are in my custody still."""
-        self.winners.update(memory.winners)
-        self.tasks.update(memory.tasks)
+        in_hand = memory.job[2] if memory.job is not None else None
+
+        def is_mine(car: Reference) -> bool:
+            # Of all others their custodians know who may fetch them.
+            return car == in_hand or car_token(*car) in self.fleet.tokens.held
+
+        self.winners.update({car: winner for car, winner in memory.winners.items() if is_mine(car)})
+        self.tasks.update({car: task for car, task in memory.tasks.items() if is_mine(car)})
         custody.replay(self.fleet, memory.cars.values())
 
     def hear(self, message: Message) -> list[Effect]:
@@ -155,6 +162,10 @@ class Stewardship:
             self.winners.pop(custody.car_of(grant), None)
             self.tasks.pop(custody.car_of(grant), None)
         return effects
+
+    def _forget(self, car: Reference) -> None:
+        for table in (self.winners, self.tasks, self._say_at_us):
+            table.pop(car, None)
 
     def _state_anew(self, car: Reference, version: int) -> list[Effect]:
         """Say where a car stands that came into my custody; again with each repeated grant: my word was lost."""

@@ -2,7 +2,7 @@
 
 The mirror of a pick-up and delivery site. Rules as of Ma, Li, Kumar and Koenig (AAMAS 2017): never two robots in one
 cell at one step, never two that change places in one step; a robot may follow another into the cell that
-it leaves.
+it leaves. Ours: never a ring in which each follows the next.
 """
 
 from collections.abc import Iterator, Sequence
@@ -100,7 +100,24 @@ class Paths:
         if to == cell:
             return True
         other = held.get(step * size + taken)
-        return other is None or held.get((step + 1) * size + resources[cell]) != other
+        return other is None or not self._goes_round(other, resources[cell], step)
+
+    def _goes_round(self, robot: int, taken: int, step: int) -> bool:
+        """Whether ``robot``, or one that it follows in this step, moves to what is ``taken`` by the asker now.
+
+        With one other that is a swap. With more, nobody of the ring could be the first to begin: each enters a cell
+        once the one before has begun to leave it.
+        """
+        asked = {robot}
+        while True:
+            to = self.resources[self.by_robot[robot].at(step + 1)]
+            if to == taken:
+                return True
+            ahead = self._held.get(step * self.size + to)
+            if ahead is None or ahead in asked:
+                return False
+            asked.add(ahead)
+            robot = ahead
 
     def may_rest(self, cell: int, step: int) -> bool:
         """Whether one may stay in a cell for ever from a step on."""

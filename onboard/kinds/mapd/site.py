@@ -8,8 +8,20 @@ from onboard.core.codes import KindCode
 from onboard.core.site import Site
 from onboard.kinds.mapd.auction import Task
 from onboard.kinds.mapd.floor import FAR, FREE, Floor, Line, grid_floor, lasting_rests, network_floor
+from onboard.kinds.mapd.rights import cell_station
 
-__all__ = ["FAR", "FREE", "Floor", "Line", "Mapd", "Task", "grid_floor", "lasting_rests", "network_floor"]
+__all__ = [
+    "FAR",
+    "FREE",
+    "Floor",
+    "Line",
+    "Mapd",
+    "Task",
+    "cell_station",
+    "grid_floor",
+    "lasting_rests",
+    "network_floor",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +52,26 @@ class Mapd(Site):
     def rests(self) -> frozenset[int]:
         """Where robots may stand for ever: homes first, then endpoints, as many as shut nobody in."""
         return lasting_rests(self.floor, [*self.homes.values(), *self.endpoints], self.endpoints)
+
+    @property
+    def step_us(self) -> int:
+        """How long a step takes at least, in us."""
+        return self.step_ms * 1000
+
+    @property
+    def bid_window_us(self) -> int:
+        """How long bids for a step may come, in us: two fifths of it. Ours."""
+        return self.step_us * 2 // 5
+
+    @property
+    def travel_us(self) -> int:
+        """How long a body takes to the next cell, in us: half a step. Ours."""
+        return self.step_us // 2
+
+    @cached_property
+    def desk(self) -> int:
+        """Node-ID of the order desk."""
+        return min(node for node, one in self.machines.items() if one.kind is KindCode.DESK)
 
     @cached_property
     def robots(self) -> tuple[int, ...]:

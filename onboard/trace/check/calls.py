@@ -116,7 +116,8 @@ class CallsClosed(_CallRule):
             # A sign of the same life after the time is over: before it, the initiator may have died without a word.
             lived_us = self.picture.heard_us.get(seen.call.sender, 0)
             # A caller whose clock is behind may name a deadline that is over when the call is heard.
-            late = lived_us - max(seen.due_us, seen.event.time_us) > CLOSED_WITHIN_US
+            due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us)
+            late = lived_us - due_us > CLOSED_WITHIN_US
             if late and self.picture.is_alive(seen.call.sender, seen.boot):
                 seen.told = True
                 self.find(seen.event, (seen.call.sender,), f"call {seen.call.call} was never closed")

@@ -128,6 +128,8 @@ class OneCustodian(Rule):
         self._open: list[tuple[Event[TaskReport], int]] = []
         #: The place that each machine named last: a report may be long held up, while nobody acknowledges frames.
         self._named: dict[int, int] = {}
+        #: What each machine has told itself to have taken: a report may be said again after the whole site was off.
+        self._loaded: OrderedDict[tuple[int, Reference], None] = OrderedDict()
 
     def handlers(self) -> Handlers:
         """Statements about cars, and reports that a car was put down."""
@@ -166,8 +168,15 @@ class OneCustodian(Rule):
             self.find(event, (said.sender, custodian or 0), what)
 
     def _on_report(self, event: Event[TaskReport]) -> None:
-        if event.message.phase is TaskPhase.DONE:
+        report = event.message
+        if report.phase is TaskPhase.LOADED:
+            self._loaded[report.sender, report.task] = None
+            if len(self._loaded) > MOST_CARS:
+                self._loaded.popitem(last=False)
+        elif report.phase is TaskPhase.DONE and (report.sender, report.task) in self._loaded:
             self._open.append((event, event.time_us))
+        elif report.phase is TaskPhase.DONE:
+            self.picture.unjudged += 1
 
 
 def _where(station: int) -> str:

@@ -12,6 +12,10 @@ from onboard.trace.check.tokens_seen import TokensSeen
 
 #: A machine that was not heard for so long counts as silent, us: three missing heartbeats (dbc/fleet.dbc).
 SILENT_US = 7_000_000
+#: No bus delay explains that bus time and the log differ by more than this from before, us.
+JUMP_US = 100_000
+#: A clock that is far off is set anew by the second word, and that comes within two periods of 5 s, us.
+SETTLING_US = 11_000_000
 
 
 class Picture:
@@ -34,6 +38,8 @@ class Picture:
         self.unjudged = 0
         #: Until then machines were broken on purpose, us of the log: no rule of liveness counts time before it.
         self.excused_us = 0
+        #: Bus time has jumped: until then (us of the log) machines wait for a second word, and decide no call.
+        self.clock_settles_us = 0
         self._site = site
 
     @property
@@ -82,7 +88,9 @@ class Picture:
         self.now_us = time_us = event.time_us
         match event.message:
             case BusTime(bus_time_us=bus_us):
-                self.offset_us = time_us - bus_us
+                before_us, self.offset_us = self.offset_us, time_us - bus_us
+                if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
+                    self.clock_settles_us = time_us + SETTLING_US
             case TokenGrant() as grant:
                 self.tokens.on_grant(grant, time_us)
             case TokenHeld() as held:

@@ -4,9 +4,10 @@ from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
 from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
+from onboard.kinds.mapd.messages import MESSAGES as MAPD_MESSAGES
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
 from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
-from onboard.trace.check import cell, graph, turning
+from onboard.trace.check import cell, graph, mapd, turning
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.checks import RULES, Checks
 from onboard.trace.check.rights import OneHolder
@@ -22,6 +23,7 @@ SYSTEM_RULES: dict[str, tuple[type[Rule], ...]] = {
     "car-park": RULES,
     "cell": cell.RULES,
     "graph": graph.RULES,
+    "mapd": mapd.RULES,
     "terminal": TERMINAL_RULES,
     "turning": turning.RULES,
 }
@@ -29,6 +31,7 @@ SYSTEM_RULES: dict[str, tuple[type[Rule], ...]] = {
 SYSTEM_MESSAGES: dict[str, tuple[type[Message], ...]] = {
     "cell": CELL_MESSAGES,
     "graph": GRAPH_MESSAGES,
+    "mapd": MAPD_MESSAGES,
     "terminal": TERMINAL_MESSAGES,
     "turning": TURNING_MESSAGES,
 }

@@ -1,0 +1,77 @@
+"""``python -m deploy``: what people put on boards."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import onboard
+from deploy.archive import build_archive
+from deploy.fleet import write_fleet
+from deploy.package import build_package
+from deploy.wheels import DeployError
+from onboard.config.problems import ConfigError
+
+HELP = """\
+exit status:
+  0  done; each file written is one line
+  2  a mistake, or something that is missing; one line says what to do
+
+examples:
+  python -m deploy archive                 dist/onboard.pyz, which any Python 3.11 or newer runs
+  python -m deploy deb                     a Debian package with the service
+  python -m deploy machines mysite.toml    dist/machines/NAME/, the files for every board's boot partition
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The command line of ``python -m deploy``."""
+    parser = argparse.ArgumentParser(
+        prog="python -m deploy",
+        description="Build what is put on boards (deploy/README.md).",
+        epilog=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    archive = commands.add_parser("archive", help="the program and its libraries in one file")
+    archive.add_argument("--out", type=Path, default=Path("dist/onboard.pyz"), metavar="FILE")
+    deb = commands.add_parser("deb", help="a Debian package of it, with the systemd service")
+    name = f"dist/onboard-fleet_{onboard.__version__}_all.deb"
+    deb.add_argument("--out", type=Path, default=Path(name), metavar="FILE")
+    machines = commands.add_parser("machines", help="the machine files of a whole fleet")
+    machines.add_argument("site", type=Path, help="site file (docs/site-file.md)")
+    machines.add_argument("--out", type=Path, default=Path("dist/machines"), metavar="DIR")
+    machines.add_argument("--fleet", default="can0", metavar="CHANNEL", help="interface of the fleet bus (can0)")
+    machines.add_argument(
+        "--device", default="can1", metavar="CHANNEL", help="of the device bus; may be the same (can1)"
+    )
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit status."""
+    args = build_parser().parse_args(argv)
+    try:
+        for path in _build(args):
+            print(path)
+    except ConfigError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except DeployError as error:
+        print(f"deploy: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"deploy: {error.filename}: {error.strerror}; name another place with --out", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _build(args: argparse.Namespace) -> list[Path]:
+    if args.command == "machines":
+        return write_fleet(args.site, args.out, args.fleet, args.device)
+    args.out.parent.mkdir(parents=True, exist_ok=True)
+    return [build_archive(args.out) if args.command == "archive" else build_package(args.out)]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

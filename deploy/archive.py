@@ -1,0 +1,47 @@
+"""``onboard.pyz``: the program and its pinned wheels in one file that any Python of version 3.11 or newer runs.
+
+The same sources give the same bytes. The wheels' compiled parts are left out, for they cannot be loaded from an archive
+and tie it to one processor; both libraries that have some carry the same in Python.
+"""
+
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from deploy.wheels import pinned_wheels
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("dbc", "onboard")
+#: The first moment that a ZIP archive can name.
+_TIME = (1980, 1, 1, 0, 0, 0)
+_MAIN = b"import sys\n\nfrom onboard.cli import main\n\nsys.exit(main())\n"
+_SHEBANG = b"#!/usr/bin/env python3\n"
+
+
+def build_archive(to: Path) -> Path:
+    """Write the archive. Raises ``DeployError`` where a wheel cannot be had, ``OSError``."""
+    to.parent.mkdir(parents=True, exist_ok=True)
+    with to.open("wb") as file:
+        file.write(_SHEBANG)
+        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in sorted(_contents()):
+                entry = zipfile.ZipInfo(name, _TIME)
+                entry.external_attr = 0o644 << 16
+                archive.writestr(entry, content, zipfile.ZIP_DEFLATED, 9)
+    to.chmod(0o755)
+    return to
+
+
+def _contents() -> Iterator[tuple[str, bytes]]:
+    yield "__main__.py", _MAIN
+    for package in PACKAGES:
+        for file in (ROOT / package).rglob("*"):
+            if file.is_file() and "__pycache__" not in file.parts:
+                yield file.relative_to(ROOT).as_posix(), file.read_bytes()
+    for name in ("LICENSE", "NOTICE", "THIRD_PARTY.md"):
+        yield name, (ROOT / name).read_bytes()
+    for wheel in pinned_wheels():
+        with zipfile.ZipFile(wheel) as archive:
+            for name in archive.namelist():
+                if not name.endswith((".so", "/", ".pyi", "/RECORD")):
+                    yield name, archive.read(name)

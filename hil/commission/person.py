@@ -1,0 +1,63 @@
+"""The person who is walked through: asked at a terminal, or by a pipe with one answer a line."""
+
+import asyncio
+import sys
+from typing import Protocol
+
+#: Answers that mean yes and no.
+YES, NO = frozenset({"y", "yes"}), frozenset({"n", "no"})
+#: A question is asked so often before it counts as not answered.
+TRIES = 3
+
+
+class PersonGoneError(Exception):
+    """Nobody answers any more: the terminal or the pipe has ended."""
+
+
+class Person(Protocol):
+    """Who answers."""
+
+    def tell(self, text: str) -> None:
+        """Show a line."""
+
+    async def ask(self, question: str) -> str:
+        """One line, without white space around it. Raises ``PersonGoneError``."""
+
+
+class ConsolePerson:
+    """Standard input and output; the loop goes on while the person thinks."""
+
+    def tell(self, text: str) -> None:
+        """See ``Person``."""
+        print(text, flush=True)
+
+    async def ask(self, question: str) -> str:
+        """See ``Person``."""
+        print(f"{question} ", end="", flush=True)
+        line: str = await asyncio.to_thread(sys.stdin.readline)
+        if not line:
+            raise PersonGoneError
+        if not sys.stdin.isatty():
+            print(line.rstrip(), flush=True)
+        return line.strip()
+
+
+async def is_yes(person: Person, question: str) -> bool:
+    """A question that has two answers; whoever gives neither three times has said no."""
+    for _ in range(TRIES):
+        answer = (await person.ask(f"{question} [y/n]")).lower()
+        if answer in YES | NO:
+            return answer in YES
+        person.tell("Please answer y or n.")
+    return False
+
+
+async def number(person: Person, question: str) -> float | None:
+    """A number, with a comma or a point; None for whoever gives none three times."""
+    for _ in range(TRIES):
+        answer = await person.ask(question)
+        try:
+            return float(answer.replace(",", "."))
+        except ValueError:
+            person.tell("Please answer with a number, such as 60.3.")
+    return None

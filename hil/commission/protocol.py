@@ -1,0 +1,71 @@
+"""What a commissioning leaves behind: a protocol of every step, to be printed and signed."""
+
+import textwrap
+from dataclasses import dataclass, field
+from enum import Enum
+
+_WIDTH = 100
+
+
+class Verdict(Enum):
+    """How a step ended."""
+
+    PASSED = "passed"
+    FAILED = "FAILED"
+    NOT_DONE = "not done"
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One line of the protocol: the step, how it ended, and what was read or seen."""
+
+    step: str
+    verdict: Verdict
+    detail: str
+
+
+@dataclass
+class Protocol:
+    """The steps in the order in which they were done."""
+
+    machine: str
+    site: str
+    begun: str
+    person: str = ""
+    entries: list[Entry] = field(default_factory=list)
+
+    def note(self, step: str, verdict: Verdict, detail: str) -> None:
+        """Add a line."""
+        self.entries.append(Entry(step, verdict, detail))
+
+    @property
+    def is_passed(self) -> bool:
+        """Whether every step was done and none failed."""
+        return bool(self.entries) and all(entry.verdict is Verdict.PASSED for entry in self.entries)
+
+    def text(self) -> str:
+        """The protocol as a text file."""
+        lines = [
+            "COMMISSIONING PROTOCOL",
+            "",
+            f"machine     {self.machine}",
+            f"site        {self.site}",
+            f"begun       {self.begun}",
+            f"person      {self.person or '(no name given)'}",
+            "",
+        ]
+        for number, entry in enumerate(self.entries, 1):
+            head = f"{number:>2}  {entry.verdict.value:<9} {entry.step}: "
+            lines += textwrap.wrap(head + entry.detail, _WIDTH, subsequent_indent=" " * 14)
+        failed = sum(entry.verdict is Verdict.FAILED for entry in self.entries)
+        open_steps = sum(entry.verdict is Verdict.NOT_DONE for entry in self.entries)
+        verdict = "in order" if self.is_passed else f"NOT in order: {failed} failed, {open_steps} not done"
+        lines += [
+            "",
+            f"The machine is {verdict}.",
+            "The control system is no certified safety channel: the emergency stop must work without it.",
+            "",
+            "place, date ______________________________    signature ______________________________",
+            "",
+        ]
+        return "\n".join(lines)

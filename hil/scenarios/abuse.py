@@ -1,0 +1,105 @@
+"""Scenarios of what must not happen to a fleet and does: a node-ID twice, another site's file, a flood."""
+
+from dataclasses import replace
+
+from hil.scenarios.recovery import BEATS_S
+from hil.scenarios.work import AWARD_S, CALL_S, JOIN_S
+from hil.stage import Said, Stage
+from onboard.core.codes import CallResult, DriveMode, MachineState, Reason
+from onboard.core.frame import Frame
+from onboard.core.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    Diagnostic,
+    DriveState,
+    Heartbeat,
+    Message,
+)
+
+#: Frames of a flood: three quarters of a second of a full bus at 500 kbit/s, of eight bytes each.
+FLOOD_FRAMES = 2_400
+#: How many of them wait in the bench's own queue.
+_FLOOD_WINDOW = 16
+#: Of the most urgent message type but one that nobody knows, from node 253: wins every arbitration.
+FLOOD_ID = 0x00FF_00FD
+
+
+async def refuses_duplicate_node_id(stage: Stage) -> None:
+    """Another node speaks under its node-ID: it stops where it is, falls silent, and says why on its console."""
+    await stage.power_on()
+    own = await stage.takes_part(JOIN_S)
+    # Not the very same frame, which would be acknowledged as one where both are sent at once.
+    stage.say(replace(own, boot=own.boot % 255 + 1))
+    # Frames that were under way when the twin spoke.
+    await stage.beats(min(stage.simulation.controllers), 1, BEATS_S)
+    since = stage.mark()
+    await stage.beats(min(stage.simulation.controllers), 3, BEATS_S)
+    heard = stage.own(Message, since)
+    assert not heard, f"it still speaks: {heard[0].message}"
+    said = await stage.device.console()
+    assert "another node sends under this node-ID" in said, f"its console does not tell why: {said[-300:]!r}"
+
+
+async def refuses_wrong_site(stage: Stage) -> None:
+    """With another site's file it joins as an obstacle: it neither bids nor moves, and the others tell why."""
+    await stage.device.power_on(wrong_site(stage.site_text))
+    beat = await stage.first_own(Heartbeat, "heartbeat of the device", JOIN_S)
+    assert beat.message.site_digest != stage.site.digest, "it has the right site file: were the files put there?"
+    await stage.first(Diagnostic, "word of another site", JOIN_S, lambda one: one.reason is Reason.OTHER_SITE)
+    await stage.first_own(
+        Heartbeat, "word that it is an obstacle", JOIN_S, lambda one: one.state is MachineState.OBSTACLE
+    )
+    since = stage.mark()
+    stage.bring_car()
+    call = await stage.first(CallForProposals, "call for a car", CALL_S, lambda one: one.depth == 0, since)
+    await stage.first(Award, "end of the call", AWARD_S, lambda one: one.call == call.message.call, since)
+    assert not stage.own(Bid, since), "it has bid for a task of a site that it does not know"
+    moved = [one for one in stage.said[since:] if _is_motion(one, stage.machine.node_id)]
+    assert not moved, f"it has moved: {moved[0].message}"
+
+
+async def survives_flood(stage: Stage) -> None:
+    """A babbling node takes the whole bus: afterwards it takes part in the same life, and wins as ever."""
+    await stage.power_on()
+    boot = (await stage.takes_part(JOIN_S)).boot
+    await _flood(stage)
+    beat = await stage.takes_part(JOIN_S)
+    assert beat.boot == boot, f"boot counter {beat.boot} after {boot}: it was started again"
+    since = stage.mark()
+    stage.bring_car()
+    call = await stage.first(CallForProposals, "call for a car", CALL_S, lambda one: one.depth == 0, since)
+    award = await stage.first(Award, "award", AWARD_S, lambda one: one.call == call.message.call, since)
+    assert (award.message.result, award.message.winner) == (CallResult.AWARDED, stage.machine.node_id)
+
+
+def wrong_site(text: str) -> str:
+    """The same site with doors that are slower by a tenth of a second: another digest, the same machines."""
+    found = [line for line in text.splitlines() if line.startswith("door_ms")]
+    assert len(found) == 1, "the site file of a bench has one line door_ms"
+    return text.replace(found[0], f"door_ms = {int(found[0].partition('=')[2]) + 100}")
+
+
+def _is_motion(one: Said[Message], node_id: int) -> bool:
+    message = one.message
+    return isinstance(message, DriveState) and message.sender == node_id and message.mode is not DriveMode.STANDING
+
+
+async def _flood(stage: Stage) -> None:
+    """Frames as fast as the bus takes them: one more is queued for each that has left."""
+    frame, left, gone = Frame(FLOOD_ID, b"\xff" * 8), [FLOOD_FRAMES], [0]
+
+    def offer() -> None:
+        if left[0] > 0:
+            left[0] -= 1
+            stage.node.send(frame)
+
+    def on_sent(sent: Frame, _time_us: int) -> None:
+        if sent == frame:
+            gone[0] += 1
+            offer()
+
+    stage.node.subscribe(lambda _frame, _time_us: None, on_sent)
+    for _ in range(_FLOOD_WINDOW):
+        offer()
+    await stage.until(lambda: gone[0] >= FLOOD_FRAMES or None, "end of the flood", BEATS_S)

@@ -1,0 +1,60 @@
+"""Every scenario by name."""
+
+from hil.bench import Capability
+from hil.scenarios.abuse import refuses_duplicate_node_id, refuses_wrong_site, survives_flood
+from hil.scenarios.recovery import leaves_bus_off, survives_reset, survives_unplugging
+from hil.scenarios.scenario import Scenario
+from hil.scenarios.work import bids, joins, moves, wins, yields
+from hil.stage import Stage
+from onboard.core.codes import KindCode, Reason
+
+_ROBOT = frozenset({KindCode.ROBOT})
+_BUS = frozenset({Capability.FLEET_BUS})
+_WORK = frozenset({Capability.FLEET_BUS, Capability.DEVICE_BUS})
+#: What a machine drops when others' words reach it late or in part.
+_LATE = frozenset({Reason.LATE, Reason.INCOMPLETE_SET, Reason.TOKEN_STALE_VERSION})
+
+
+async def _bids(stage: Stage) -> None:
+    await bids(stage)
+
+
+SCENARIOS: tuple[Scenario, ...] = (
+    Scenario("joins", joins, _BUS),
+    Scenario("bids", _bids, _WORK, _ROBOT),
+    Scenario("wins", wins, _WORK, _ROBOT),
+    Scenario("moves under authority", moves, _WORK, _ROBOT),
+    # The bench itself tells the other robot's plan, and nobody answers for its tokens.
+    Scenario("yields", yields, _WORK, _ROBOT, late=True),
+    Scenario("survives a reset", survives_reset, _WORK | {Capability.POWER}, _ROBOT, drops=_LATE, late=True),
+    Scenario("leaves bus-off", leaves_bus_off, _BUS | {Capability.BUS_OFF}, drops=_LATE, wire_errors=True),
+    Scenario(
+        "survives unplugging", survives_unplugging, _BUS | {Capability.CABLE}, drops=_LATE, wire_errors=True, late=True
+    ),
+    # Two nodes with one identifier and other data destroy each other's frames where they meet.
+    Scenario(
+        "refuses a duplicate node-ID",
+        refuses_duplicate_node_id,
+        _BUS | {Capability.CONSOLE},
+        wire_errors=True,
+        late=True,
+        ends=True,
+    ),
+    Scenario(
+        "refuses another site's file",
+        refuses_wrong_site,
+        _WORK | {Capability.FILES},
+        _ROBOT,
+        without=frozenset(),
+        drops=frozenset({Reason.OTHER_SITE}),
+        late=True,
+    ),
+    Scenario(
+        "survives a flood",
+        survives_flood,
+        _WORK,
+        _ROBOT,
+        drops=_LATE | {Reason.UNKNOWN_IDENTIFIER},
+        late=True,
+    ),
+)

@@ -1,0 +1,185 @@
+"""Where orders meet the bus: judged, taken, journalled, said, told back. The one place of the gateway that speaks."""
+
+from collections import deque
+from collections.abc import Callable, Iterable
+
+from onboard.core.messages import CallForProposals, CarAt, Message, TaskReport
+from onboard.core.site import Site
+from onboard.gateway.actions import REFUSED, InstantActions
+from onboard.gateway.dialect import Json, timestamp
+from onboard.gateway.inbox import Inbox, Incoming
+from onboard.gateway.order import Life, Order
+from onboard.gateway.orders import Orders, Outcome, name_of
+from onboard.gateway.publisher import FLEET, Outgoing, Publisher
+from onboard.gateway.reports import Reports
+from onboard.gateway.settings import level
+from onboard.gateway.state import Subject
+from onboard.gateway.wishes import wishes_of
+from onboard.ports.broker import Publication
+
+#: Publications that wait to be judged; of more the newest is refused unread and counted.
+MOST_WAITING = 64
+#: Errors of refused orders that a machine's state tells, the newest so many.
+MOST_ERRORS = 4
+_HEARD = (CallForProposals, CarAt, TaskReport)
+
+
+class OrderDesk:
+    """Takes orders for a site. ``post`` queues what is told, ``send`` puts a message on the bus."""
+
+    def __init__(
+        self,
+        site: Site,
+        publisher: Publisher,
+        reports: Reports,
+        send: Callable[[Message], None],
+        post: Callable[[Iterable[Outgoing]], None],
+        now_us: int,
+    ) -> None:
+        self.overflows = 0
+        self._site, self._publisher, self._reports, self._send, self._post = site, publisher, reports, send, post
+        settings, fleet = publisher.settings, publisher.fleet
+        assert settings.node_id is not None, "who only listens takes no orders"
+        self.inbox = Inbox(settings.dialect, publisher.root, settings.manufacturer)
+        wishes = wishes_of(site, fleet.picture.view, fleet.place)
+        seed = (settings.epoch_us + now_us) // 1_000_000
+        self.orders = Orders(site, wishes, settings.node_id, reports.others, now_us=now_us, seed=seed)
+        reports.keep = self.orders.entries
+        self._waiting: deque[Publication] = deque()
+        self._actions = {machine.name: InstantActions() for machine in site.machines.values()}
+        self._errors: dict[int, deque[Json]] = {}
+
+    def on_publication(self, publication: Publication) -> None:
+        """One publication on a topic subscribed to. Never blocks."""
+        if len(self._waiting) >= MOST_WAITING:
+            self.overflows += 1
+            return
+        self._waiting.append(publication)
+
+    def next_wake(self) -> int | None:
+        """When something is due, us; None for never. What waits is due at once."""
+        return 0 if self._waiting else self.orders.next_wake()
+
+    async def work(self, now_us: int) -> None:
+        """Judge what waits and say what is due."""
+        while self._waiting:
+            await self._judge(self._waiting.popleft(), now_us)
+        await self._perform(self.orders.wake(now_us), now_us)
+
+    async def feed(self, message: Message, now_us: int) -> None:
+        """Take up one message of the fleet bus."""
+        if isinstance(message, _HEARD) and self.orders.open:
+            await self._perform(self.orders.feed(message), now_us)
+
+    # --- in ------------------------------------------------------------------------------------------------------
+
+    async def _judge(self, publication: Publication, now_us: int) -> None:
+        incoming = self.inbox.judge(publication, now_us)
+        if incoming is None:
+            return
+        if incoming.reason:
+            self._refuse(incoming, now_us)
+        elif incoming.kind == "instantActions":
+            await self._act(incoming, now_us)
+        else:
+            outcome = self.orders.take(incoming, self._publisher.settings.epoch_us + now_us, now_us)
+            self.inbox.refused.update(one.reason for one in outcome.refused)
+            await self._perform(outcome, now_us)
+
+    async def _act(self, incoming: Incoming, now_us: int) -> None:
+        known = self._actions.get(incoming.serial)
+        if known is None:
+            self._refuse(self.inbox.refuse(incoming, "UNKNOWN_MACHINE", "no machine of this name travels"), now_us)
+            return
+        node = self._site.machine(incoming.serial).node_id
+        for action in incoming.told["actions"]:
+            if known.is_known(action):
+                continue
+            failure = await self._act_once(node, action["actionType"], now_us)
+            known.close(self._publisher.settings.dialect, action, failure)
+        self._tell_machine(node, now_us)
+        self._post(self._publisher.tell_now(node, now_us))
+
+    async def _act_once(self, node: int, kind: str, now_us: int) -> str:
+        """Why it failed; empty where it was done."""
+        if kind == "factsheetRequest":
+            self._post(self._publisher.tell_factsheet(node, now_us))
+        elif kind == "cancelOrder":
+            outcome, failure = self.orders.cancel(node)
+            await self._perform(outcome, now_us)
+            return failure
+        elif kind != "stateRequest":
+            return REFUSED.get(kind, "not supported")
+        return ""
+
+    # --- out -----------------------------------------------------------------------------------------------------
+
+    async def _perform(self, outcome: Outcome, now_us: int) -> None:
+        """First the journal, then the bus, then whoever asked."""
+        for order in outcome.changed:
+            try:
+                await self._reports.append(order.entry())
+            except OSError:
+                if order.life is Life.ACCEPTED and not order.was_said:
+                    del self.orders.book[order.name]
+                    outcome.refused.append(Incoming("", "", {"id": order.name}, "NOT_DURABLE", "$", "the disk is full"))
+                    continue
+            if order.life is not Life.ACCEPTED or not order.was_said:
+                self._tell(order, now_us)
+        for message in outcome.say:
+            self._send(message)
+        for order in outcome.told:
+            self._post([Outgoing(FLEET, self._answer(order, now_us))])
+        for incoming in outcome.refused:
+            self._refuse(incoming, now_us)
+
+    def _tell(self, order: Order, now_us: int) -> None:
+        answer = self._answer(order, now_us)
+        name = f"order {order.name} {order.life.value}" if order.life.is_over else ""
+        self._post([Outgoing(FLEET, answer, name)])
+        if order.wish.what == "visit":
+            self._tell_machine(order.wish.node, now_us)
+
+    def _answer(self, order: Order, now_us: int) -> Publication:
+        told: Json = {"at": self._at(now_us), "id": order.name, "phase": order.life.value}
+        if order.task is not None:
+            stands = self._publisher.fleet.task(order.task, now_us)
+            told |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
+        if order.owner:
+            told["owner"] = self._publisher.fleet.picture.view.name(order.owner)
+        if order.before_us is not None:
+            told["before"] = timestamp(order.before_us)
+            told["late"] = max(told.get("promised", ""), told["at"] if order.life is Life.DONE else "") > told["before"]
+        told |= {key: one for key, one in (("reason", order.reason), ("why", order.why)) if one}
+        return self._publisher.publication(f"order/{level(order.name)}", told, qos=1)
+
+    def _refuse(self, incoming: Incoming, now_us: int) -> None:
+        name = name_of(incoming)[:64]
+        told = {"at": self._at(now_us), "id": name, "phase": Life.REFUSED.value, "reason": incoming.reason}
+        told |= {"path": incoming.path, "why": incoming.why}
+        self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", told, qos=1))])
+        node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), None)
+        if node is not None:
+            references = [{"referenceKey": "path", "referenceValue": incoming.path}]
+            references.append({"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))})
+            kind = "validationError" if incoming.reason == "MALFORMED" else "orderError"
+            error = {"errorType": kind, "errorLevel": "WARNING", "errorReferences": references}
+            error |= {"errorDescription": f"{incoming.reason}: {incoming.path}: {incoming.why}"}
+            self._errors.setdefault(node, deque(maxlen=MOST_ERRORS)).append(error)
+            self._tell_machine(node, now_us)
+
+    def _tell_machine(self, node: int, now_us: int) -> None:
+        """What its state tells of orders; an order that was taken clears the errors of those that were not."""
+        order = self.orders.of_robot(node)
+        errors = self._errors.get(node)
+        if order is not None and errors and order.life is Life.ACCEPTED:
+            errors.clear()
+        actions = self._actions[self._site.machines[node].name]
+        name = order.name.partition("/")[2] if order is not None else None
+        self._publisher.subjects[node] = Subject(
+            order_id=name, errors=tuple(errors or ()), actions=tuple(actions.states.values())
+        )
+        self._publisher.wants(node, now_us)
+
+    def _at(self, now_us: int) -> str:
+        return timestamp(self._publisher.settings.epoch_us + now_us)

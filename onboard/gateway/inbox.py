@@ -1,0 +1,108 @@
+"""What arrives as an order: bounded, parsed, checked; refused with a path and a reason, or handed on. Never raises."""
+
+import json
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+from onboard.gateway.dialect import Dialect
+from onboard.gateway.factsheet import MOST_BYTES
+from onboard.gateway.schema import TRANSPORT, schema
+from onboard.ports.broker import Publication
+
+#: Orders taken up at once, and how fast the allowance grows again, us an order: a burst of 20, then one a second. Ours.
+BURST, RATE_US = 20, 1_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class Incoming:
+    """One order. ``kind``: ``transport``, or ``order`` and ``instantActions`` of VDA 5050 to the machine ``serial``.
+
+    Where ``reason`` is not empty it is refused: ``path`` is the place in it. ``told`` is what could be read of it.
+    """
+
+    kind: str
+    serial: str
+    told: dict[str, Any]
+    reason: str = ""
+    path: str = ""
+    why: str = ""
+
+
+class Inbox:
+    """Judges publications one after another. ``refused`` counts by reason."""
+
+    def __init__(self, dialect: Dialect, root: str, manufacturer: str) -> None:
+        """``root`` is PREFIX/SITE."""
+        self.refused: Counter[str] = Counter()
+        self._dialect = dialect
+        self._transport = f"{root}/orders"
+        self._machines = f"{dialect.topic_root}/{manufacturer}/"
+        self._allowance = BURST
+        self._filled_us: int | None = None
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """What is to be subscribed to."""
+        return (self._transport, f"{self._machines}+/order", f"{self._machines}+/instantActions")
+
+    def judge(self, publication: Publication, now_us: int) -> Incoming | None:
+        """One publication; None for a topic that is not of orders."""
+        kind, serial = self._kind(publication.topic)
+        if not kind:
+            return None
+        found = self._judge(kind, serial, publication, now_us)
+        if found.reason:
+            self.refused[found.reason] += 1
+        return found
+
+    def refuse(self, order: Incoming, reason: str, why: str, path: str = "$") -> Incoming:
+        """The same order, refused for what it means; counted."""
+        self.refused[reason] += 1
+        return Incoming(order.kind, order.serial, order.told, reason, path, why)
+
+    def _judge(self, kind: str, serial: str, publication: Publication, now_us: int) -> Incoming:
+        if len(publication.payload) > MOST_BYTES:
+            return Incoming(kind, serial, {}, "OVERSIZED", "$", f"at most {MOST_BYTES} bytes are taken")
+        try:
+            told = json.loads(publication.payload, parse_constant=_no_constant)
+        except (ValueError, RecursionError) as error:
+            return Incoming(kind, serial, {}, "MALFORMED", "$", f"no JSON: {str(error)[:100]}")
+        named = told if isinstance(told, dict) else {}
+        name = TRANSPORT if kind == TRANSPORT else f"{self._dialect.number}/{kind}"
+        wrong = schema(name).first_error(told)
+        if wrong is not None:
+            return Incoming(kind, serial, named, "MALFORMED", *wrong)
+        if kind != TRANSPORT:
+            mine = (("serialNumber", serial), ("manufacturer", self._machines.split("/")[-2]))
+            for key, value in mine:
+                if told[key] != value:
+                    return Incoming(kind, serial, named, "MALFORMED", f"$.{key}", f"must be that of the topic, {value}")
+        if publication.retain:
+            # Kept by the broker from who knows when: an order is not to be carried out at every start.
+            return Incoming(kind, serial, named, "RETAINED", "$", "an order must not be retained")
+        if not self._allowed(now_us):
+            return Incoming(kind, serial, named, "TOO_FAST", "$", f"{BURST} at once and one a second are taken")
+        return Incoming(kind, serial, named)
+
+    def _kind(self, topic: str) -> tuple[str, str]:
+        if topic == self._transport:
+            return TRANSPORT, ""
+        serial, _, name = topic.removeprefix(self._machines).partition("/")
+        is_order = topic.startswith(self._machines) and name in ("order", "instantActions")
+        return (name, serial) if is_order else ("", "")
+
+    def _allowed(self, now_us: int) -> bool:
+        if self._filled_us is None:
+            self._filled_us = now_us
+        gained = (now_us - self._filled_us) // RATE_US
+        self._allowance = min(BURST, self._allowance + gained)
+        self._filled_us += gained * RATE_US
+        if not self._allowance:
+            return False
+        self._allowance -= 1
+        return True
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"{name} is no JSON")

@@ -1,0 +1,248 @@
+"""Orders from outside: taken once each, said on the bus until heard, and their life told back. No I/O, no clock.
+
+An order is journalled before it is said, so after a restart it is the same order, and the same name again is the same
+order still. Nothing here gives a right: what follows on the bus is a customer's press or a list of nodes, and the
+machines negotiate as ever.
+"""
+
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+from typing import Any
+
+from onboard.core.codes import TaskPhase
+from onboard.core.messages import Message, Reference, TaskReport
+from onboard.core.serial import successor
+from onboard.core.site import Site
+from onboard.gateway.inbox import Incoming
+from onboard.gateway.order import RANK, Life, Order, Wish, read_order, same_content, with_number
+from onboard.gateway.schema import TRANSPORT
+from onboard.gateway.wishes import LISTEN_US, RefusedError, Wishes, actions_of, is_robot
+from onboard.ports.journal import Entry
+
+#: Orders that are over are remembered, the newest so many, so that their names are known when they come again.
+KEPT = 2_000
+#: Open orders at most; one more is refused.
+MOST_OPEN = 200
+_PHASES = {
+    TaskPhase.AWARDED: Life.AWARDED,
+    TaskPhase.STARTED: Life.MOVING,
+    TaskPhase.LOADED: Life.MOVING,
+    TaskPhase.DONE: Life.DONE,
+    TaskPhase.REFUSED: Life.REFUSED,
+    TaskPhase.FORFEITED: Life.CALLED,
+}
+
+
+@dataclass
+class Outcome:
+    """What follows from a step: ``changed`` orders are durable before ``say`` goes to the bus and anything is told.
+
+    ``told`` are orders to be told of that did not change; ``refused`` what was not taken.
+    """
+
+    changed: list[Order] = field(default_factory=list)
+    say: list[Message] = field(default_factory=list)
+    told: list[Order] = field(default_factory=list)
+    refused: list[Incoming] = field(default_factory=list)
+
+
+class Orders:
+    """All orders of a site that came in through one gateway, by name, oldest first."""
+
+    def __init__(
+        self, site: Site, wishes: Wishes, node_id: int, entries: Iterable[Entry], *, now_us: int = 0, seed: int = 0
+    ) -> None:
+        """``seed`` (16 bits) begins the numbers of visit lists where the journal is empty: another than last time."""
+        self.book: OrderedDict[str, Order] = OrderedDict()
+        self._site, self._wishes, self._node_id = site, wishes, node_id
+        self._number = seed & 0xFFFF
+        self._asked = False
+        self._ready_us = now_us + LISTEN_US
+        for entry in entries:
+            if entry.get("record") == "order":
+                order = read_order(entry)
+                self.book.pop(order.name, None)
+                self.book[order.name] = order
+                self._number = order.wish.number or self._number
+        for order in self.open:
+            # A key is not pressed again: what it led to is heard, or was.
+            heard = order.wish.what == "park" and order.life is not Life.ACCEPTED
+            order.due_us = None if heard else self._ready_us
+
+    @property
+    def open(self) -> list[Order]:
+        """Orders that are not over."""
+        return [order for order in self.book.values() if not order.life.is_over]
+
+    def entries(self) -> Iterator[Entry]:
+        """What counts of all, for the journal."""
+        return (order.entry() for order in self.book.values())
+
+    def of_robot(self, node: int) -> Order | None:
+        """The order that a robot has by name, the newest; None where it never had one."""
+        newest = reversed(self.book.values())
+        return next((one for one in newest if one.wish.what == "visit" and one.wish.node == node), None)
+
+    # --- in ------------------------------------------------------------------------------------------------------
+
+    def take(self, incoming: Incoming, wall_us: int, now_us: int) -> Outcome:
+        """A transport, or a VDA 5050 order, that is well formed."""
+        outcome = Outcome()
+        try:
+            self._take(incoming, wall_us, now_us, outcome)
+        except RefusedError as refused:
+            outcome.refused.append(
+                Incoming(incoming.kind, incoming.serial, incoming.told, refused.reason, refused.path, refused.why)
+            )
+        return outcome
+
+    def _take(self, incoming: Incoming, wall_us: int, now_us: int, outcome: Outcome) -> None:
+        told = incoming.told
+        name, update = name_of(incoming), int(told.get("orderUpdateId", 0))
+        content = same_content(incoming.kind, _essence(told))
+        known = self.book.get(name)
+        if known is not None:
+            if (known.content, known.update) != (content, update):
+                why = "another order has this name; updates are not supported"
+                raise RefusedError("NAME_TAKEN", why, _NAME[incoming.kind])
+            outcome.told.append(known)
+            return
+        if len(self.open) >= MOST_OPEN:
+            raise RefusedError("TOO_MANY", f"{MOST_OPEN} orders are open")
+        before_us = _moment_us(told.get("before"))
+        if before_us is not None and before_us <= wall_us:
+            raise RefusedError("TOO_LATE", "is past", "$.before")
+        order = Order(name, self._wish(incoming), content, before_us, update)
+        if incoming.kind != TRANSPORT:
+            order.actions = actions_of(told)
+        order.due_us = max(now_us, self._ready_us)
+        self.book[name] = order
+        outcome.changed.append(order)
+        self._forget()
+
+    def _wish(self, incoming: Incoming) -> Wish:
+        if incoming.kind == TRANSPORT:
+            return self._wishes.transport(incoming.told)
+        node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), 0)
+        if not is_robot(self._site, node):
+            raise RefusedError("UNKNOWN_MACHINE", "no machine of this name travels", "$.serialNumber")
+        wish = self._wishes.visit(node, incoming.told)
+        busy = self.of_robot(node)
+        if busy is not None and not busy.life.is_over:
+            raise RefusedError("BUSY", f"{incoming.serial} has order {busy.name}", "$.orderId")
+        self._number = successor(self._number, 16)
+        return with_number(wish, self._number)
+
+    def cancel(self, node: int) -> tuple[Outcome, str]:
+        """End a robot's order by name; why not, where it cannot be: the robot has it."""
+        order = self.of_robot(node)
+        if order is None or order.life.is_over:
+            return Outcome(), "there is no order"
+        if order.was_said:
+            return Outcome(), "a robot that has been given its order finishes it"
+        return Outcome(changed=[self._end(order, Life.REFUSED, "CANCELLED", "before it was given")]), ""
+
+    # --- the bus and the clock -----------------------------------------------------------------------------------
+
+    def feed(self, message: Message) -> Outcome:
+        """Take up one message of the fleet bus."""
+        outcome = Outcome()
+        for order in self.open:
+            task = self._wishes.task_of(order, message) if order.life in (Life.ACCEPTED, Life.CALLED) else None
+            if task is not None and (task != order.task or order.life is Life.ACCEPTED):
+                order.task, order.life, order.due_us = task, Life.CALLED, None
+                outcome.changed.append(order)
+            elif isinstance(message, TaskReport) and message.task == self._task(order):
+                self._on_report(order, message, outcome)
+            elif self._wishes.is_done(order, message):
+                outcome.changed.append(self._end(order, Life.DONE, "", ""))
+        return outcome
+
+    def _on_report(self, order: Order, report: TaskReport, outcome: Outcome) -> None:
+        life = _PHASES.get(report.phase)
+        by_robot = is_robot(self._site, report.sender)
+        if life is None or (not by_robot and life is not Life.REFUSED):
+            return
+        if life.is_over:
+            reason = report.reason.name if life is Life.REFUSED else ""
+            order.owner = report.sender if by_robot else order.owner
+            outcome.changed.append(self._end(order, life, reason, ""))
+        elif life is Life.CALLED or RANK[life] > RANK[order.life]:
+            order.task, order.life, order.due_us = report.task, life, None
+            order.owner = report.sender if life is not Life.CALLED else 0
+            outcome.changed.append(order)
+
+    def wake(self, now_us: int) -> Outcome:
+        """Say what is due."""
+        outcome = Outcome()
+        if not self._asked:
+            self._asked = True
+            outcome.say += self._wishes.ask_all(self._node_id)
+        for order in self.open:
+            if order.due_us is not None and order.due_us <= now_us:
+                self._say(order, now_us, outcome)
+        return outcome
+
+    def next_wake(self) -> int | None:
+        """When something is due; None for never."""
+        return min((order.due_us for order in self.open if order.due_us is not None), default=None)
+
+    def _say(self, order: Order, now_us: int, outcome: Outcome) -> None:
+        try:
+            said = self._wishes.say(order, self._node_id)
+        except RefusedError as refused:
+            gone = order.was_said and refused.reason == "UNKNOWN_TICKET"
+            # Asked for before, and not in the park any more: somebody has it.
+            life = Life.DONE if gone else Life.REFUSED
+            outcome.changed.append(self._end(order, life, "" if gone else refused.reason, "" if gone else refused.why))
+            return
+        if not order.was_said:
+            order.was_said = True
+            outcome.changed.append(order)
+        outcome.say += said.messages
+        order.due_us = None if said.again_us is None else now_us + said.again_us
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _task(self, order: Order) -> Reference | None:
+        """The task on the bus: heard, or named by the order itself."""
+        return Reference(self._node_id, order.wish.number) if order.wish.number else order.task
+
+    def _end(self, order: Order, life: Life, reason: str, why: str) -> Order:
+        order.life, order.reason, order.why, order.due_us = life, reason, why, None
+        return order
+
+    def _forget(self) -> None:
+        over = [name for name, order in self.book.items() if order.life.is_over]
+        for name in over[: max(0, len(over) - KEPT)]:
+            del self.book[name]
+
+
+_NAME = {TRANSPORT: "$.id", "order": "$.orderId"}
+
+
+def name_of(incoming: Incoming) -> str:
+    """An order's name; a robot's orders are apart from the fleet's. Empty where it has none."""
+    if incoming.kind == TRANSPORT:
+        return str(incoming.told.get("id", ""))
+    return f"{incoming.serial}/{incoming.told.get('orderId', '')}"
+
+
+def _essence(told: dict[str, Any]) -> list[tuple[str, Any]]:
+    """What an order says, without what differs when it is sent again."""
+    return sorted((key, repr(value)) for key, value in told.items() if key not in ("headerId", "timestamp"))
+
+
+def _moment_us(text: str | None) -> int | None:
+    """Wall time in us since 1970 of ISO 8601 with a time zone. Raises ``RefusedError``."""
+    if text is None:
+        return None
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError:
+        moment = None
+    if moment is None or moment.tzinfo is None:
+        raise RefusedError("MALFORMED", "must be ISO 8601 with a time zone, such as 2026-03-01T16:30:00Z", "$.before")
+    return round(moment.timestamp() * 1_000_000)

@@ -1,0 +1,227 @@
+"""What orders become on the bus, system by system: the smallest true form of each.
+
+Car park: a transport is a ticket put into a compartment's desk from afar, or its key pressed (row P52): the same path
+as a customer's press, and the compartment calls for it. Factory graph: an order to a robot by name is a list of nodes
+to visit (row G11). What a system has no such form for is refused.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, Operation, OperatorAction
+from onboard.core.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference, SyncRequest
+from onboard.core.site import Site
+from onboard.gateway.order import Order, Wish
+from onboard.kinds.car_park.site import CarPark
+from onboard.kinds.graph.messages import VisitList, five
+from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph
+from onboard.trace.view import SiteView
+
+#: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
+TICKET_AGAIN_US = 30_000_000
+#: A key press is not repeated, for the next car may be another's: heard within this, or refused, us. Ours.
+KEY_PATIENCE_US = 20_000_000
+#: A visit list is said again so often until its robot answers, us; as by kinds/graph/desk.
+VISIT_AGAIN_US = 1_000_000
+#: After its start a gateway asks all what they vouch for, and knows the cars so much later, us. Ours.
+LISTEN_US = 3_000_000
+
+
+class RefusedError(Exception):
+    """An order that means nothing here: ``reason`` is a word of docs/mqtt.md, ``path`` the place in it."""
+
+    def __init__(self, reason: str, why: str, path: str = "$") -> None:
+        super().__init__(f"{path}: {why}")
+        self.reason, self.why, self.path = reason, why, path
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What is said for an order now, and when again, us from now; None for never."""
+
+    messages: tuple[Message, ...]
+    again_us: int | None
+
+
+class Wishes(Protocol):
+    """One system's way."""
+
+    def ask_all(self, sender: int) -> tuple[Message, ...]:
+        """What is asked of all machines at the start."""
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """A transport's wish. Raises ``RefusedError``."""
+
+    def visit(self, node: int, told: dict[str, Any]) -> Wish:
+        """A VDA 5050 order's wish to a robot. Raises ``RefusedError``."""
+
+    def say(self, order: Order, sender: int) -> Said:
+        """Say an order, for the first time or again. Raises ``RefusedError``."""
+
+    def task_of(self, order: Order, message: Message) -> Reference | None:
+        """The task that an order has become, where this message tells."""
+
+    def is_done(self, order: Order, message: Message) -> bool:
+        """Whether this message tells that what the order asks for is so, whoever did it."""
+
+
+def wishes_of(site: Site, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+    """The way of a site's system; ``place`` names a station by its number."""
+    if isinstance(site, FactoryGraph):
+        return GraphWishes(site)
+    return ParkWishes(site, view, place) if isinstance(site, CarPark) else NoWishes(site)
+
+
+class NoWishes:
+    """A system that orders cannot be given to in this way."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+
+    def ask_all(self, sender: int) -> tuple[Message, ...]:
+        """Nothing is asked."""
+        return ()
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """None is taken."""
+        raise RefusedError("UNSUPPORTED", f"a {self._site.system} takes no transports from outside its desks")
+
+    def visit(self, node: int, told: dict[str, Any]) -> Wish:
+        """None is taken."""
+        raise RefusedError("UNSUPPORTED", f"machines of a {self._site.system} take no orders by name")
+
+    def say(self, order: Order, sender: int) -> Said:
+        """Nothing was taken."""
+        raise RefusedError("UNSUPPORTED", "not of this site")
+
+    def task_of(self, order: Order, message: Message) -> Reference | None:
+        """None."""
+        return None
+
+    def is_done(self, order: Order, message: Message) -> bool:
+        """Only a report tells."""
+        return False
+
+
+class ParkWishes(NoWishes):
+    """A robotized car park; ``view`` is what was heard of it."""
+
+    def __init__(self, site: Site, view: SiteView, place: Callable[[int], str | None]) -> None:
+        super().__init__(site)
+        self._view, self._place = view, place
+        self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
+
+    def ask_all(self, sender: int) -> tuple[Message, ...]:
+        """Where the cars are."""
+        return (SyncRequest(sender, 0),)
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""
+        urgent = told.get("priority", 0) > 0
+        if "to" in told:
+            node = self._desk(told["to"], "$.to")
+            if "car" not in told and "from" not in told:
+                raise RefusedError("INCOMPLETE", "name the car, or from where", "$.car")
+            car = _car(told["car"]) if "car" in told else self._standing(told["from"])
+            return Wish("fetch", node, car, urgent=urgent)
+        if "from" not in told:
+            raise RefusedError("INCOMPLETE", "name a compartment to hand out at, or one to park from", "$.to")
+        return Wish("park", self._desk(told["from"], "$.from"), urgent=urgent)
+
+    def say(self, order: Order, sender: int) -> Said:
+        """A ticket, or the key."""
+        wish = order.wish
+        if wish.car is None:
+            if order.was_said:
+                raise RefusedError("NOT_TAKEN", "the compartment has not called for it: no car in it, or not ready")
+            return Said((OperatorOrder(sender, wish.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US)
+        if wish.car not in self._view.cars:
+            raise RefusedError("UNKNOWN_TICKET", "no such car is in the park", "$.car")
+        action = OperatorAction.URGENT_TICKET if wish.urgent else OperatorAction.INSERT_TICKET
+        return Said((OperatorOrder(sender, wish.node, action, wish.car),), TICKET_AGAIN_US)
+
+    def task_of(self, order: Order, message: Message) -> Reference | None:
+        """The compartment's call for the car, or its next call to park."""
+        if not isinstance(message, CallForProposals) or message.sender != order.wish.node or message.depth:
+            return None
+        if order.wish.car is None:
+            return message.task if message.operation is Operation.PARK and order.was_said else None
+        is_it = message.operation is Operation.RETRIEVE and message.car == order.wish.car
+        return message.task if is_it else None
+
+    def is_done(self, order: Order, message: Message) -> bool:
+        """The car has left; or it stands in a place, and its parking was the task, which has the car's own name."""
+        if not isinstance(message, CarAt) or order.task is None:
+            return False
+        if order.wish.car is not None:
+            return message.car == order.wish.car and message.station == OUTSIDE
+        bays = {station.number for station in self._site.compartments.values()}
+        return message.car == order.task and message.station not in (*bays, ANY_STATION, OUTSIDE)
+
+    def _desk(self, name: str, path: str) -> int:
+        if name not in self._desks:
+            raise RefusedError("UNKNOWN_PLACE", f"no compartment; one of {', '.join(self._desks)}", path)
+        return self._desks[name]
+
+    def _standing(self, place: str) -> Reference:
+        for number, car in self._view.places_taken().items():
+            if self._place(number) == place:
+                return car
+        raise RefusedError("UNKNOWN_TICKET", "no car is known to stand there", "$.from")
+
+
+class GraphWishes(NoWishes):
+    """A factory graph."""
+
+    def __init__(self, site: FactoryGraph) -> None:
+        super().__init__(site)
+        self._graph = site
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """Only an order desk calls for the nearest robot (onboard/kinds/graph/desk.py)."""
+        raise RefusedError("UNSUPPORTED", "give a VDA 5050 order to a robot; transports come in at a desk")
+
+    def visit(self, node: int, told: dict[str, Any]) -> Wish:
+        """The nodes with an action and the last one are stops; between them the robot goes its own way."""
+        nodes = told["nodes"]
+        for place, one in enumerate(nodes):
+            path = f"$.nodes[{place}]"
+            if not one["nodeId"].isdecimal() or int(one["nodeId"]) not in self._graph.graph.neighbours:
+                raise RefusedError("UNKNOWN_PLACE", "no node of this graph", f"{path}.nodeId")
+            if not one["released"]:
+                raise RefusedError("UNSUPPORTED", "a horizon is not planned for; release all nodes", f"{path}.released")
+            for number, action in enumerate(one["actions"]):
+                if action["actionType"] not in ("pick", "drop"):
+                    where = f"{path}.actions[{number}].actionType"
+                    raise RefusedError("UNSUPPORTED", "of actions only pick and drop are known", where)
+        numbers = [step["sequenceId"] for step in nodes]
+        if not nodes or numbers != list(range(numbers[0], numbers[0] + 2 * len(nodes), 2)):
+            raise RefusedError("MALFORMED", "nodes must be there, their numbers two apart", "$.nodes")
+        stops = tuple(int(one["nodeId"]) for one in nodes if one["actions"] or one is nodes[-1])
+        if len(stops) > MAX_STOPS:
+            raise RefusedError("TOO_LONG", f"at most {MAX_STOPS} stops fit into one order", "$.nodes")
+        return Wish("visit", node, stops=stops)
+
+    def say(self, order: Order, sender: int) -> Said:
+        """The list of nodes, until the robot answers."""
+        wish = order.wish
+        return Said((VisitList(sender, wish.number, wish.node, *five(wish.stops)),), VISIT_AGAIN_US)
+
+
+def actions_of(told: dict[str, Any]) -> tuple[tuple[str, str], ...]:
+    """Identifier and type of every node action of a VDA 5050 order."""
+    return tuple((one["actionId"], one["actionType"]) for node in told["nodes"] for one in node["actions"])
+
+
+def is_robot(site: Site, node: int) -> bool:
+    """Whether a node is a machine that carries."""
+    machine = site.machines.get(node)
+    return machine is not None and machine.kind in (KindCode.ROBOT, KindCode.VEHICLE)
+
+
+def _car(text: str) -> Reference:
+    origin, _, number = text.partition(".")
+    if int(origin) > 0xFF or int(number) > 0xFFFF:
+        raise RefusedError("UNKNOWN_TICKET", "no such car can be", "$.car")
+    return Reference(int(origin), int(number))

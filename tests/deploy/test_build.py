@@ -1,0 +1,169 @@
+"""What people put on boards: the single file, the Debian package, the machine files of a fleet."""
+
+import asyncio
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import onboard
+from bus_sim.can.medium import Medium
+from bus_sim.serve.socketcand import SocketcandServer
+from bus_sim.sites import find_site
+from bus_sim.virtual_time import LoopClock
+from deploy.__main__ import main as deploy
+from deploy.archive import build_archive
+from deploy.package import build_package
+from deploy.wheels import PINS, DeployError, pinned_wheels
+from onboard.cli import main as onboard_main
+from onboard.config.machine import load_machine
+from onboard.core.codes import Reason
+from onboard.core.frame import Frame
+from onboard.core.messages import EmergencyStop, Heartbeat, Message
+from onboard.wire.codec import fleet_codec
+from onboard.wire.decoder import Decoder
+from tests.tools import require_tool, run_tool
+
+ROOT = Path(__file__).parents[2]
+SITE = ROOT / "bus_sim" / "sites" / "small.toml"
+DEADLINE_S = 60
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The single file; without a package index and a filled store there is none to be had."""
+    try:
+        pinned_wheels()
+    except DeployError as error:
+        pytest.skip(str(error))
+    return build_archive(tmp_path_factory.mktemp("archive") / "onboard.pyz")
+
+
+def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
+    """Python without any library installed beside it."""
+    command = [sys.executable, "-I", "-S", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE_S, check=False)
+
+
+def fleet(to: Path, *words: str) -> Path:
+    assert deploy(["machines", str(SITE), "--out", str(to), *words]) == 0
+    return to
+
+
+def test_the_single_file_needs_nothing_beside_it(archive: Path, tmp_path: Path) -> None:
+    machine = fleet(tmp_path) / "MR1" / "machine.toml"
+    assert run(archive, "--version").stdout == f"onboard {onboard.__version__}\n"
+    checked = run(archive, "--machine", machine, "--check")
+    assert "MR1 of site small" in checked.stdout, checked.stderr
+    assert run(archive, "trace", "--help").returncode == 0
+
+
+async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: Path, tmp_path: Path) -> None:
+    """Against a served bus, as a board would join it; its reason for stopping is an emergency stop."""
+    machine = fleet(tmp_path, "--device", "can0") / "MR1" / "machine.toml"
+    heard: asyncio.Queue[Message] = asyncio.Queue()
+    decoder = Decoder(fleet_codec())
+
+    def on_frame(frame: Frame, time_us: int) -> None:
+        message = decoder.feed(frame, time_us)
+        if message is not None:
+            heard.put_nowait(message)
+
+    async def scenario() -> tuple[Message, int, str]:
+        medium = Medium(LoopClock(asyncio.get_running_loop()))
+        server = SocketcandServer(lambda _, name: medium.attach(name), int, port=0)
+        port = await server.start()
+        ears = medium.attach("ears", 251)
+        ears.subscribe(on_frame)
+        served = f'interface = "socketcand-asyncio"\nhost = "127.0.0.1"\nport = {port}\n'
+        machine.write_text(machine.read_text().replace('interface = "socketcan"\n', served))
+        program = await asyncio.create_subprocess_exec(
+            *(sys.executable, "-I", "-S", str(archive), "--machine", str(machine)),
+            stderr=asyncio.subprocess.PIPE,
+        )
+        message = await heard.get()
+        for frame in fleet_codec().encode(EmergencyStop(251, Reason.OPERATOR)):
+            ears.send(frame)
+        _, said = await program.communicate()
+        await server.close()
+        return message, program.returncode or 0, said.decode()
+
+    async with asyncio.timeout(DEADLINE_S):
+        message, status, said = await scenario()
+    assert isinstance(message, Heartbeat) and message.sender == 11
+    assert status == 1 and "emergency stop from node 251" in said
+
+
+def test_the_same_sources_give_the_same_bytes(archive: Path, tmp_path: Path) -> None:
+    assert build_archive(tmp_path / "again.pyz").read_bytes() == archive.read_bytes()
+    packages = [build_package(tmp_path / name).read_bytes() for name in ("one.deb", "two.deb")]
+    assert packages[0] == packages[1]
+
+
+def test_no_compiled_part_ties_the_file_to_a_processor(archive: Path) -> None:
+    with zipfile.ZipFile(archive) as inside:
+        names = inside.namelist()
+    assert not [name for name in names if name.endswith(".so")]
+    assert {"onboard/cli.py", "dbc/fleet.dbc", "can/__init__.py", "cantools/__init__.py", "THIRD_PARTY.md"} <= set(
+        names
+    )
+
+
+def test_a_wheel_of_another_digest_is_refused(archive: Path, tmp_path: Path) -> None:
+    pins = tmp_path / "wheels.txt"
+    pins.write_text(PINS.read_text().replace("sha256:1680", "sha256:1681"))
+    with pytest.raises(DeployError, match=r"wheels\.txt: "):
+        pinned_wheels(pins, tmp_path / "store")
+
+
+def test_the_package_is_one_that_dpkg_unpacks_and_its_service_is_in_order(archive: Path, tmp_path: Path) -> None:
+    deb = build_package(tmp_path / "onboard.deb")
+    assert run_tool(require_tool("dpkg-deb"), "--field", str(deb), "Package", "Version").splitlines() == [
+        "Package: onboard-fleet",
+        f"Version: {onboard.__version__}",
+    ]
+    root = tmp_path / "root"
+    run_tool("dpkg-deb", "--extract", str(deb), str(root))
+    assert (root / "usr/lib/onboard/onboard.pyz").read_bytes() == archive.read_bytes()
+    assert (root / "usr/bin/onboard").stat().st_mode & 0o777 == 0o755
+    service = (root / "usr/lib/systemd/system/onboard.service").read_text()
+    # After an emergency stop the program ends with status 1, and only a person may start it again.
+    assert "Restart=on-abnormal" in service and "WatchdogSec=" in service and "Type=notify" in service
+
+
+def test_every_machine_of_a_site_gets_its_files(tmp_path: Path) -> None:
+    site = find_site("small")
+    folders = sorted(fleet(tmp_path, "--fleet", "can0", "--device", "can1").iterdir())
+    assert [folder.name for folder in folders] == sorted(machine.name for machine in site.machines.values())
+    for folder in folders:
+        config = load_machine(folder / "machine.toml")
+        assert config.machine.name == folder.name
+        assert config.site.digest == site.digest
+        assert (config.fleet_bus.channel, config.device_bus.channel) == ("can0", "can1")
+
+
+def test_one_interface_may_carry_both_buses(tmp_path: Path) -> None:
+    config = load_machine(fleet(tmp_path, "--device", "can0") / "ER1" / "machine.toml")
+    assert config.device_bus == config.fleet_bus
+
+
+def test_networkd_is_told_the_sites_bit_rate(tmp_path: Path) -> None:
+    site = tmp_path / "slow.toml"
+    site.write_text(SITE.read_text().replace("bitrate = 500_000", "bitrate = 125_000"))
+    assert deploy(["machines", str(site), "--out", str(tmp_path / "fleet")]) == 0
+    machine, to = tmp_path / "fleet" / "MR1" / "machine.toml", tmp_path / "network"
+    assert onboard_main(["--machine", str(machine), "--networkd", str(to)]) == 0
+    assert {file.name: file.read_text() for file in to.iterdir()} == {
+        f"80-onboard-{name}.network": f"[Match]\nName={name}\n\n[CAN]\nBitRate=125000\nRestartSec=100ms\n"
+        for name in ("can0", "can1")
+    }
+
+
+def test_a_site_that_is_wrong_is_told_and_nothing_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert deploy(["machines", str(tmp_path / "no.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "no.toml" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,94 @@
+"""``python -m hil commission`` as a person calls it: on a served bus, with the answers from a pipe."""
+
+import asyncio
+import os
+import sys
+from asyncio.subprocess import PIPE, STDOUT
+from pathlib import Path
+
+import pytest
+
+from bus_sim.processes.plan import machine_file
+from bus_sim.run import RunOptions, build
+from bus_sim.serve.socketcand import SocketcandServer
+from bus_sim.virtual_time import VirtualTimeLoop
+from hil.cli import main
+from onboard.config.site import parse_site
+from tests.hil.bench_files import BENCHES
+
+Capture = pytest.CaptureFixture[str]
+ROOT = Path(__file__).parents[2]
+DEADLINE_S = 120
+#: Name, termination, the fleet is on, drive and shuttle tell the truth, three times somebody in the way, controller on.
+ANSWERS = "A. Person\n60,1\ny\ny\ny\nn\nn\nn\n\n"
+
+
+async def play(directory: Path) -> tuple[int | None, str]:
+    """Exit status and output of a walk; the controller is switched on when the walk asks for it."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualTimeLoop)
+    text = (BENCHES / "bench.toml").read_text()
+    simulation = build(parse_site(text, "site.toml"), RunOptions(without=frozenset({"MR1", "MR2"})), loop)
+    for medium in (*simulation.devices.values(), simulation.fleet):
+        medium.attach("another node")
+    simulation.start()
+    server = SocketcandServer(simulation.join, lambda time_us: time_us, port=0)
+    port = await server.start()
+    (directory / "site.toml").write_text(text)
+    (directory / "MR1.toml").write_text(machine_file("MR1", "127.0.0.1", port))
+    walk = await asyncio.create_subprocess_exec(
+        *(sys.executable, "-m", "hil", "commission", "--machine", "MR1.toml"),
+        cwd=directory,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdin=PIPE,
+        stdout=PIPE,
+        stderr=STDOUT,
+    )
+    assert walk.stdin is not None and walk.stdout is not None
+    walk.stdin.write(ANSWERS.encode())
+    shown, told = "", False
+    async with asyncio.timeout(DEADLINE_S):
+        while piece := await walk.stdout.read(4096):
+            shown += piece.decode()
+            if "passed: digests" in shown and not told:
+                # Devices repeat themselves every ten seconds; the test does not wait so long.
+                told = True
+                simulation.plant.carriers[11].start()
+                simulation.plant.shuttles[11].start()
+            if "Switch the controller of MR1 on" in shown and 11 not in simulation.controllers:
+                simulation.start_controller(simulation.site.machines[11])
+        status = await walk.wait()
+    await server.close()
+    for controller in simulation.controllers.values():
+        await controller.stop()
+    return status, shown
+
+
+def test_the_walk_on_a_live_bus_prints_and_keeps_its_protocol(tmp_path: Path) -> None:
+    loop = VirtualTimeLoop(pace=1.0)
+    try:
+        asyncio.set_event_loop(loop)
+        status, shown = loop.run_until_complete(play(tmp_path))
+    finally:
+        asyncio.set_event_loop(None)
+        loop.close()
+    assert status == 1, shown
+    protocol = (tmp_path / "MR1-protocol.txt").read_text()
+    assert protocol in shown
+    assert "person      A. Person" in protocol
+    assert "60.1 ohms, wanted 54 to 66" in protocol
+    assert "passed    node-ID: 11 is free" in protocol
+    assert "not done  drive: somebody was in the way" in protocol
+    assert "passed    joins: boot 1, idle" in protocol
+    assert "NOT in order: 0 failed, 3 not done" in protocol
+
+
+def test_mistakes_are_one_line_and_status_2(tmp_path: Path, capsys: Capture) -> None:
+    assert main(["commission", "--machine", str(tmp_path / "none.toml")]) == 2
+    assert "does not exist; name an existing machine file" in capsys.readouterr().err
+    (tmp_path / "site.toml").write_text((BENCHES / "bench.toml").read_text())
+    (tmp_path / "MR1.toml").write_text(machine_file("MR1", "127.0.0.1", 1))
+    assert main(["commission", "--machine", str(tmp_path / "MR1.toml")]) == 2
+    assert "is the server running" in capsys.readouterr().err
+    assert main([]) == 2
+    assert "python -m hil commission --machine FILE" in capsys.readouterr().err
