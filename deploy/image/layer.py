@@ -1,18 +1,22 @@
 """What the image has over Debian: the program, its service, the kernel's modules, and what is switched off."""
 
-import compileall
-import py_compile
+import os
 import shutil
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
 from deploy.archive import build_archive
 from deploy.image.debian import Debian
+from deploy.wheels import DeployError
 
 FILES = Path(__file__).with_name("files")
 SHARED = Path(__file__).parents[1] / "files"
 #: Where Debian's Python looks for libraries that the distribution brings.
 LIBRARIES = "usr/lib/python3/dist-packages"
+#: Debian 12's.
+PYTHON = (3, 11)
 _UNITS = "usr/lib/systemd/system"
 _PLACES = {
     SHARED / "onboard.service": f"{_UNITS}/onboard.service",
@@ -69,10 +73,8 @@ def _add_libraries(to: Path) -> None:
             if (name.endswith(".py") and name != "__main__.py") or name.startswith(("dbc/", "onboard/")):
                 packed.extract(name, libraries)
     archive.unlink()
-    compileall.compile_dir(
-        libraries,
-        quiet=2,
-        invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH,
-        stripdir=str(to),
-        prependdir="/",
-    )
+    if sys.version_info[:2] != PYTHON:
+        raise DeployError(f"the boards' Python is {PYTHON[0]}.{PYTHON[1]}; build with that version")
+    # The order within a compiled set follows the hash seed.
+    words = ["-q", "-j", "1", "--invalidation-mode", "unchecked-hash", "-s", str(to), "-p", "/", str(libraries)]
+    subprocess.run([sys.executable, "-m", "compileall", *words], env={**os.environ, "PYTHONHASHSEED": "0"}, check=True)

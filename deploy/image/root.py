@@ -127,7 +127,7 @@ def _edited(name: str, text: bytes) -> bytes:
 def _squash(archive: Path, to: Path) -> None:
     to.unlink(missing_ok=True)
     settings = ["-tar", "-quiet", "-no-progress", "-root-mode", "755", "-comp", "zstd", "-Xcompression-level", LEVEL]
-    times = ["-mkfs-time", str(EPOCH_S), "-reproducible"]
+    times = ["-mkfs-time", str(EPOCH_S), "-all-time", str(EPOCH_S), "-reproducible"]
     try:
         with archive.open("rb") as content:
             done = subprocess.run(
