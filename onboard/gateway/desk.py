@@ -141,7 +141,7 @@ class OrderDesk:
             self._tell_machine(order.wish.node, now_us)
 
     def _answer(self, order: Order, now_us: int) -> Publication:
-        told: Json = {"at": self._at(now_us), "id": order.name, "phase": order.life.value}
+        told: Json = {"at": self._publisher.at(now_us), "id": order.name, "phase": order.life.value}
         if order.task is not None:
             stands = self._publisher.fleet.task(order.task, now_us)
             told |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
@@ -155,7 +155,7 @@ class OrderDesk:
 
     def _refuse(self, incoming: Incoming, now_us: int) -> None:
         name = name_of(incoming)[:64]
-        told = {"at": self._at(now_us), "id": name, "phase": Life.REFUSED.value, "reason": incoming.reason}
+        told = {"at": self._publisher.at(now_us), "id": name, "phase": Life.REFUSED.value, "reason": incoming.reason}
         told |= {"path": incoming.path, "why": incoming.why}
         self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", told, qos=1))])
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), None)
@@ -180,6 +180,3 @@ class OrderDesk:
             order_id=name, errors=tuple(errors or ()), actions=tuple(actions.states.values())
         )
         self._publisher.wants(node, now_us)
-
-    def _at(self, now_us: int) -> str:
-        return timestamp(self._publisher.settings.epoch_us + now_us)
