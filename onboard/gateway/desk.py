@@ -7,6 +7,7 @@ from onboard.core.messages import CallForProposals, CarAt, Message, TaskReport
 from onboard.core.site import Site
 from onboard.gateway.actions import REFUSED, InstantActions
 from onboard.gateway.dialect import Json, timestamp
+from onboard.gateway.factsheet import MOST_ID
 from onboard.gateway.inbox import Inbox, Incoming
 from onboard.gateway.order import Life, Order
 from onboard.gateway.orders import Orders, Outcome, name_of
@@ -154,14 +155,16 @@ class OrderDesk:
         return self._publisher.publication(f"order/{level(order.name)}", told, qos=1)
 
     def _refuse(self, incoming: Incoming, now_us: int) -> None:
-        name = name_of(incoming)[:64]
+        name = name_of(incoming)[: 2 * MOST_ID]
         told = {"at": self._publisher.at(now_us), "id": name, "phase": Life.REFUSED.value, "reason": incoming.reason}
         told |= {"path": incoming.path, "why": incoming.why}
         self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", told, qos=1))])
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), None)
         if node is not None:
             references = [{"referenceKey": "path", "referenceValue": incoming.path}]
-            references.append({"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))})
+            references.append(
+                {"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))[:MOST_ID]}
+            )
             kind = "validationError" if incoming.reason == "MALFORMED" else "orderError"
             error = {"errorType": kind, "errorLevel": "WARNING", "errorReferences": references}
             error |= {"errorDescription": f"{incoming.reason}: {incoming.path}: {incoming.why}"}

@@ -111,6 +111,7 @@ REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({"serialNumber": "R9"}, "MALFORMED", "$.serialNumber"),
     ({"manufacturer": "other"}, "MALFORMED", "$.manufacturer"),
     ({"orderUpdateId": -1}, "MALFORMED", "$.orderUpdateId"),
+    ({"orderId": "x" * 65}, "TOO_LONG", "$.orderId"),
     ({"nodes": []}, "MALFORMED", "$.nodes"),
     ({"nodes": [{"nodeId": "1"}]}, "MALFORMED", "$.nodes[0].sequenceId"),
     (order("x", (77, "")), "UNKNOWN_PLACE", "$.nodes[0].nodeId"),

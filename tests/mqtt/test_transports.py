@@ -152,3 +152,11 @@ def test_what_the_disk_cannot_keep_is_not_done() -> None:
     scene, ordered = park_and_order(site, 0, orders, journal=journal, extra_s=60)
     assert [one["reason"] for one in ordered.told("test")] == ["NOT_DURABLE"]
     assert said(scene, OperatorOrder) == []
+
+
+def test_a_key_is_pressed_once_though_the_gateway_dies_after_it() -> None:
+    """The next car in the compartment may be another's."""
+    order = (20.0, ORDERS.format("test"), {"id": "n", "from": "IOC1"})
+    scene, ordered = park_and_order(one_floor(), 0, [order], deaths_s=(22.0,), extra_s=60)
+    assert len(said(scene, OperatorOrder)) == 1
+    assert ordered.told("test", "n")[-1]["reason"] == "NOT_TAKEN"
