@@ -200,10 +200,10 @@ class SiteView:
         return True
 
     def own(self, reference: Reference, owner: int) -> None:
-        """Who has a task, where no award of a call tells it."""
+        """Who has a task, 0 for nobody any more, where no award of a call tells it."""
         if reference in self.tasks:
             self.tasks[reference].owner = owner
-            self.tasks[reference].phase = TaskPhase.AWARDED
+            self.tasks[reference].phase = TaskPhase.AWARDED if owner else TaskPhase.OPEN
 
     def end(self, reference: Reference, time_us: int) -> None:
         """A task is done, where no report tells it."""

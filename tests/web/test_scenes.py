@@ -172,6 +172,8 @@ def test_robots_of_a_floor_are_in_the_cells_that_they_tell_and_what_they_serve_i
                 row, column = divmod(state.cell, 10)
                 assert told["where"] == f"{row},{column}, step {state.step}"
                 assert told["car"] == (str(state.task) if state.loaded else None)
+                owners = [one["owner"] for one in snapshot["tasks"] if one["owner"]]
+                assert len(owners) == len(set(owners)), "a robot has one task at a time"
                 ((x0, y0), (x1, y1)) = names[f"{row},{column}"]
                 assert x0 < told["path"][-1][0] < x1 and y0 < told["path"][-1][1] < y1
         end = film.show(film.last_us).snapshot()

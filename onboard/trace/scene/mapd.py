@@ -39,6 +39,7 @@ class _Robot:
     cell: int
     step: int = 0
     task: int = NO_TASK
+    won: int = NO_TASK
     loaded: bool = False
     bound_for: int = -1
     path: list[list[float]] = field(default_factory=list)
@@ -91,9 +92,8 @@ class MapdScene:
                 self._on_call(message, time_us)
             case TransportBid() if message.task != NO_TASK:
                 self.view.bids += 1
-            case StepAward() if message.robot and message.task != NO_TASK:
-                self.view.own(self._reference(message.task), message.robot)
-                self.view.say(time_us, f"{self.view.name(message.robot)} wins {self._thing(message.task)}")
+            case StepAward() if message.robot in self._robots:
+                self._on_award(message, time_us)
             case PathHead() if robot is not None:
                 robot.head, robot.parts = message, {}
             case PathMoves() if robot is not None and robot.head is not None:
@@ -112,6 +112,18 @@ class MapdScene:
         if self.view.open_task(self._reference(call.task), Operation.TRANSPORT, time_us):
             ways = f"from {self.place(call.pickup)} to {self.place(call.delivery)}"
             self.view.say(time_us, f"{self.view.name(call.sender)} calls: {self._thing(call.task)}, {ways}")
+
+    def _on_award(self, award: StepAward, time_us: int) -> None:
+        """What a robot had and has not picked up is anybody's again, unless another has won it in the same round."""
+        robot, name = self._robots[award.robot], self.view.name(award.robot)
+        if robot.won not in (NO_TASK, award.task) and not (robot.loaded and robot.task == robot.won):
+            before = self.view.tasks.get(self._reference(robot.won))
+            if before is not None and before.is_waiting and before.owner == award.robot:
+                self.view.own(self._reference(robot.won), 0)
+        robot.won = award.task
+        if award.task != NO_TASK:
+            self.view.own(self._reference(award.task), award.robot)
+            self.view.say(time_us, f"{name} wins {self._thing(award.task)}")
 
     def _on_state(self, robot: _Robot, state: StepState, time_us: int) -> None:
         if state.cell not in self._spots:
