@@ -1,5 +1,6 @@
 """Scenarios of what must not happen to a fleet and does: a node-ID twice, another site's file, a flood."""
 
+import re
 from dataclasses import replace
 
 from hil.scenarios.recovery import BEATS_S
@@ -74,10 +75,10 @@ async def survives_flood(stage: Stage) -> None:
 
 
 def wrong_site(text: str) -> str:
-    """The same site with doors that are slower by a tenth of a second: another digest, the same machines."""
-    found = [line for line in text.splitlines() if line.startswith("door_ms")]
-    assert len(found) == 1, "the site file of a bench has one line door_ms"
-    return text.replace(found[0], f"door_ms = {int(found[0].partition('=')[2]) + 100}")
+    """A site file of another name: another digest, the same machines."""
+    changed, count = re.subn(r'^name\s*=\s*"(\w)', r'name = "not-\1', text, count=1, flags=re.MULTILINE)
+    assert count == 1, "the first name in the site file of a bench is the site's"
+    return changed
 
 
 def _is_motion(one: Said[Message], node_id: int) -> bool:
