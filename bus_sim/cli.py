@@ -18,9 +18,10 @@ from bus_sim.planted.bug import PlantedBug
 from bus_sim.planted.registry import find_bug
 from bus_sim.processes.fleet import ProcessesError
 from bus_sim.processes.options import ANY_PORT, add_processes, process_plan
+from bus_sim.publish import PublishError, check_mqtt
 from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
-from bus_sim.sites import SiteNotFoundError, find_site, site_names
+from bus_sim.sites import SiteNotFoundError, find_site, site_names, site_text
 from bus_sim.systems.registry import RUNNERS, SystemOptions
 from onboard import __version__
 from onboard.config.problems import ConfigError
@@ -49,6 +50,7 @@ examples:
                                        the fleet bus on an interface, so that `candump vcan0` shows it
   bus-sim run small --processes --one-car 60
                                        every machine in a process of its own, at the pace of the clock
+  bus-sim run small --mqtt             publish it to a broker of its own; prints how to watch with mosquitto_sub
   bus-sim dbc level1 > level1.dbc      one message for each machine, for candump | cantools decode, Wireshark ...
 """
 
@@ -177,6 +179,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         help="serve the buses in the socketcand protocol (default 127.0.0.1:29536)",
     )
     out.add_argument(
+        "--mqtt",
+        nargs="?",
+        const="",
+        metavar="URL",
+        help="publish the site to this broker and take orders, at the pace of the clock (default: a mosquitto of the "
+        "run's own on a loopback port; docs/mqtt.md)",
+    )
+    out.add_argument(
         "--bus",
         action="append",
         default=[],
@@ -209,6 +219,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         BusOpenError,
         ServeError,
         ProcessesError,
+        PublishError,
         OptionError,
     ) as error:
         for line in str(error).splitlines():
@@ -337,9 +348,10 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
     try:
         parse_bus_specs(args.bus, 500_000, [machine.name for machine in site.machines.values()])
         processes = process_plan(args, site, args.site or DEFAULT_SITE, faults)
+        mqtt = check_mqtt(args.mqtt) if args.mqtt is not None else None
     except ValueError as error:
         raise OptionError(str(error)) from error
-    live = args.serve is not None or bool(args.bus) or processes is not None
+    live = args.serve is not None or bool(args.bus) or processes is not None or mqtt is not None
     if args.serve is not None and not args.serve.rpartition(":")[2].isdigit():
         raise OptionError(f"--serve {args.serve}: must be HOST:PORT, such as 127.0.0.1:29536")
     window = _window(args, live=live)
@@ -376,9 +388,11 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
         planted_bug=_planted(args.plant_bug),
         trace=args.trace,
         devices=args.devices,
-        serve=args.serve or (ANY_PORT if processes is not None else None),
+        serve=args.serve or (ANY_PORT if processes is not None or mqtt is not None else None),
         buses=tuple(args.bus),
         processes=processes,
+        mqtt=mqtt,
+        site_text=site_text(args.site or DEFAULT_SITE) if mqtt is not None else "",
         web=_web(args),
     )
 

@@ -3,7 +3,7 @@
 import asyncio
 import signal
 import time
-from contextlib import AbstractAsyncContextManager, AsyncExitStack
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
@@ -18,6 +18,7 @@ from bus_sim.outside import Outside
 from bus_sim.planted.bug import PlantedBug
 from bus_sim.processes.fleet import ProcessFleet
 from bus_sim.processes.plan import ProcessPlan
+from bus_sim.publish import Publishing
 from bus_sim.run import RunOptions, Simulation, build, run_until
 from bus_sim.show import Clock, TerminalShow
 from bus_sim.summary import BurstFigures, RunSummary, bus_figures, unserved
@@ -68,6 +69,9 @@ class DayOptions:
     by_hand: bool = False
     #: Where the page is served, PORT or HOST:PORT; None for no page.
     web: str | None = None
+    #: The broker that the site is published to, empty for one of the run's own; None for none. Goes with ``serve``.
+    mqtt: str | None = None
+    site_text: str = ""
     quiet: bool = False
 
 
@@ -204,6 +208,7 @@ class _Day:
                 await stack.enter_async_context(self._page(options.web))
             if self._window is None:
                 await stack.enter_async_context(outside)
+                await stack.enter_async_context(self._publishing(outside))
                 simulation.start()
                 stack.enter_context(show)
                 if options.by_hand:
@@ -221,12 +226,20 @@ class _Day:
                 await self._warm_up(self._window, show)
                 # Guests come for the window: they could not follow a warm-up that is hurried.
                 await stack.enter_async_context(outside)
+                await stack.enter_async_context(self._publishing(outside))
                 await self._through(self._window, show)
         wall_s = time.monotonic() - self._begin_s
         summary = self._summarise(wall_s)
         for line in summary.lines():
             console.print(line, highlight=False, soft_wrap=True)
         return summary
+
+    def _publishing(self, outside: Outside) -> AbstractAsyncContextManager[object]:
+        options = self._options
+        if options.mqtt is None:
+            return nullcontext()
+        assert outside.served is not None, "the options with a broker name an address"
+        return Publishing(self._simulation.site, options.site_text, options.mqtt, outside.served, self._console)
 
     def _page(self, where: str) -> AbstractAsyncContextManager[object]:
         from bus_sim.web.car_park import CarParkSource  # noqa: PLC0415  # its libraries are an extra

@@ -6,21 +6,33 @@ import signal
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from onboard import __version__
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
-from onboard.core.holon import Holon, next_boot
+from onboard.core.holon import Holon
+from onboard.core.serial import next_boot
+from onboard.gateway.options import add_mqtt_arguments
+from onboard.gateway.settings import GatewayError
 from onboard.io.broker_address import is_mqtt_installed
-from onboard.io.console import ConsoleTelemetry
+from onboard.io.console import ConsoleTelemetry, ManyTelemetry
 from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.io.watchdog import SystemdWatchdog
 from onboard.kinds.registry import factory_for, system_of
+from onboard.ports.broker import BrokerError
+from onboard.ports.telemetry import Telemetry
 from onboard.web.address import is_installed as is_web_installed
-from onboard.wire.codec import codecs
+from onboard.wire.codec import Codec, codecs
+
+if TYPE_CHECKING:
+    from onboard.gateway.gateway import Gateway
+
+#: Makes a machine's own gateway on the running loop, from its fleet bus and the contract.
+GatewayMaker = Callable[[OpenBus, Codec], "Gateway"]
 
 EXIT_STATUS = """\
 exit status:
@@ -35,6 +47,8 @@ examples:
       the fleet bus on a real interface; the command line overrides the file
   onboard --machine mr1.toml -i socketcand -c fleet --bus-kwargs host=127.0.0.1 port=29536
       join a site served by: bus-sim run level1 --serve --without MR1
+  onboard --machine mr1.toml --mqtt mqtts://broker.example --mqtt-ca ca.pem --mqtt-cert mr1.pem --mqtt-key mr1.key
+      publish this machine's state as well (docs/mqtt.md)
   onboard trace check trace.log --site site.toml
       judge a recorded log; see onboard trace --help
   onboard gateway -i socketcan -c can0 --site site.toml --mqtt mqtt://127.0.0.1
@@ -65,6 +79,7 @@ def build_parser() -> argparse.ArgumentParser:
         help="write systemd-networkd's settings for the machine's CAN interfaces into this folder, and stop",
     )
     parser.add_argument("--journal", type=Path, metavar="DIR", help="journal directory instead of the file's")
+    add_mqtt_arguments(parser, required=False)
     add_bus_arguments(parser)
     return parser
 
@@ -92,13 +107,23 @@ def main(argv: Sequence[str] | None = None) -> int:
     if args.networkd is not None:
         return _networkd(config, fleet_settings, args.networkd)
     try:
-        return asyncio.run(run(config, fleet_settings, args.journal or config.journal))
-    except BusOpenError as error:
+        gateway = _beside(args, config) if args.mqtt is not None else None
+        return asyncio.run(run(config, fleet_settings, args.journal or config.journal, gateway))
+    except (BusOpenError, BrokerError, GatewayError) as error:
         print(f"onboard: {error}", file=sys.stderr)
         return 2
     except OSError as error:
         print(f"onboard: journal {args.journal or config.journal}: {error.strerror or error}", file=sys.stderr)
         return 2
+
+
+def _beside(args: argparse.Namespace, config: MachineConfig) -> GatewayMaker:
+    """What makes the machine's own gateway. Raises ``GatewayError`` and ``BrokerError``."""
+    if not is_mqtt_installed():
+        raise GatewayError("--mqtt: its libraries are missing; pip install 'onboard-fleet[mqtt]'")
+    from onboard.gateway.cli import beside  # noqa: PLC0415  # a controller without a broker must not carry it
+
+    return beside(args, config.site, config.machine)
 
 
 def _trace(words: list[str]) -> int:
@@ -139,7 +164,9 @@ def _gateway(words: list[str]) -> int:
 COMMANDS: dict[str, Callable[[list[str]], int]] = {"trace": _trace, "web": _web, "gateway": _gateway}
 
 
-async def run(config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path) -> int:
+async def run(
+    config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path, gateway: GatewayMaker | None = None
+) -> int:
     """Run until stopped: 0 where a signal ended it, 1 where the controller or its bus ended it."""
     journal = FileJournal(journal_directory)
     entries = journal.replay()
@@ -151,16 +178,32 @@ async def run(config: MachineConfig, fleet_settings: BusSettings, journal_direct
     device_settings = BusSettings.of(config.device_bus)
     if device_settings != fleet_settings:
         device_bus = await open_bus(device_settings)
-    ports = Ports(fleet_bus, device_bus, journal, ConsoleTelemetry(), SystemdWatchdog())
     system = system_of(config.site)
     codec = codecs(system.name, system.messages)
+    telemetry: Telemetry = ConsoleTelemetry()
+    beside = gateway(fleet_bus, codec.fleet) if gateway is not None else None
+    published: asyncio.Task[None] | None = None
+    if beside is not None:
+        telemetry = ManyTelemetry(telemetry, beside)
+        published = asyncio.get_running_loop().create_task(beside.run())
+        published.add_done_callback(_tell_ended)
+    ports = Ports(fleet_bus, device_bus, journal, telemetry, SystemdWatchdog())
     controller = Controller(holon, ports, codec.fleet, codec.device)
     controller.start()
     status, why = await _until_ended(controller, fleet_bus, device_bus)
     if why:
         print(f"onboard: {config.machine.name}: {why}", file=sys.stderr)
     await controller.stop()
+    if beside is not None and published is not None:
+        beside.stop()
+        await asyncio.wait([published])
     return status
+
+
+def _tell_ended(published: "asyncio.Task[None]") -> None:
+    """A gateway that has failed is told of; the controller goes on without it."""
+    if not published.cancelled() and published.exception() is not None:
+        print(f"onboard: the gateway has failed: {published.exception()!r}; the controller goes on", file=sys.stderr)
 
 
 async def _until_ended(controller: Controller, fleet_bus: OpenBus, device_bus: OpenBus) -> tuple[int, str]:

@@ -12,6 +12,7 @@ PACKAGES = {
     "candump": "can-utils",
     "gcc": "gcc libc6-dev",
     "mosquitto": "mosquitto",
+    "mosquitto_pub": "mosquitto-clients",
     "mosquitto_sub": "mosquitto-clients",
     "openssl": "openssl",
     "spin": "spin",

@@ -5,14 +5,14 @@ import asyncio
 import signal
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
-from onboard.core.site import Site
+from onboard.core.site import Machine, Site
 from onboard.gateway.gateway import Gateway
-from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings
+from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_settings, watch_lines
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress
@@ -21,7 +21,7 @@ from onboard.io.mqtt import MqttBroker
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.kinds.registry import system_of
 from onboard.ports.broker import BrokerError
-from onboard.wire.codec import codecs
+from onboard.wire.codec import Codec, codecs
 
 EXAMPLES = """\
 exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the command line or in a file
@@ -86,6 +86,20 @@ def main(argv: Sequence[str]) -> int:
         return 2
 
 
+def beside(args: argparse.Namespace, site: Site, machine: Machine) -> Callable[[OpenBus, Codec], Gateway]:
+    """The gateway of one controller: call it on the running loop with the fleet bus. Raises as the options do."""
+    settings = gateway_settings(args, serials=frozenset({machine.name}))
+    broker = MqttBroker(broker_address(args))
+    client = f"{settings.prefix}-{level(site.name)}"
+
+    def build(bus: OpenBus, codec: Codec) -> Gateway:
+        gateway = Gateway(site, codec, broker, settings, wall_us=wall_us, client=client)
+        bus.subscribe(gateway.on_frame, gateway.on_frame)
+        return gateway
+
+    return build
+
+
 async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bus: BusSettings, spool: Path) -> int:
     broker = MqttBroker(address)
     journal = FileJournal(spool)
@@ -142,22 +156,6 @@ async def _tell_news(gateway: Gateway) -> None:
         if line != told:
             told = line
             print(line, flush=True)
-
-
-def watch_lines(address: BrokerAddress, site: Site, settings: GatewaySettings) -> list[str]:
-    """How to watch with mosquitto's own program."""
-    words = f"mosquitto_sub -h {address.host} -p {address.port}"
-    if address.user is not None:
-        words += f" -u {address.user} -P ..."
-    if address.tls:
-        words += f" --cafile {address.ca or '...'} --cert ... --key ..."
-    root = f"{settings.prefix}/{level(site.name)}"
-    machines = f"{settings.dialect.topic_root}/{settings.manufacturer}"
-    return [
-        f"publishing {site.name} to {address}, VDA 5050 {settings.version}; watch with:",
-        f"  {words} -v -t '{root}/#'",
-        f"  {words} -v -t '{machines}/+/state'",
-    ]
 
 
 def wall_us() -> int:

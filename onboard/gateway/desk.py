@@ -7,6 +7,7 @@ from onboard.core.messages import CallForProposals, CarAt, Message, TaskReport
 from onboard.core.site import Site
 from onboard.gateway.actions import REFUSED, InstantActions
 from onboard.gateway.dialect import Json, timestamp
+from onboard.gateway.factsheet import MOST_ID
 from onboard.gateway.inbox import Inbox, Incoming
 from onboard.gateway.order import Life, Order
 from onboard.gateway.orders import Orders, Outcome, name_of
@@ -141,7 +142,7 @@ class OrderDesk:
             self._tell_machine(order.wish.node, now_us)
 
     def _answer(self, order: Order, now_us: int) -> Publication:
-        told: Json = {"at": self._at(now_us), "id": order.name, "phase": order.life.value}
+        told: Json = {"at": self._publisher.at(now_us), "id": order.name, "phase": order.life.value}
         if order.task is not None:
             stands = self._publisher.fleet.task(order.task, now_us)
             told |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
@@ -154,14 +155,16 @@ class OrderDesk:
         return self._publisher.publication(f"order/{level(order.name)}", told, qos=1)
 
     def _refuse(self, incoming: Incoming, now_us: int) -> None:
-        name = name_of(incoming)[:64]
-        told = {"at": self._at(now_us), "id": name, "phase": Life.REFUSED.value, "reason": incoming.reason}
+        name = name_of(incoming)[: 2 * MOST_ID]
+        told = {"at": self._publisher.at(now_us), "id": name, "phase": Life.REFUSED.value, "reason": incoming.reason}
         told |= {"path": incoming.path, "why": incoming.why}
         self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", told, qos=1))])
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), None)
         if node is not None:
             references = [{"referenceKey": "path", "referenceValue": incoming.path}]
-            references.append({"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))})
+            references.append(
+                {"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))[:MOST_ID]}
+            )
             kind = "validationError" if incoming.reason == "MALFORMED" else "orderError"
             error = {"errorType": kind, "errorLevel": "WARNING", "errorReferences": references}
             error |= {"errorDescription": f"{incoming.reason}: {incoming.path}: {incoming.why}"}
@@ -180,6 +183,3 @@ class OrderDesk:
             order_id=name, errors=tuple(errors or ()), actions=tuple(actions.states.values())
         )
         self._publisher.wants(node, now_us)
-
-    def _at(self, now_us: int) -> str:
-        return timestamp(self._publisher.settings.epoch_us + now_us)

@@ -10,10 +10,12 @@ from onboard.core.site import Machine, Site
 from onboard.gateway.dialect import Dialect, Json
 from onboard.gateway.settings import GatewaySettings
 from onboard.kinds.car_park.site import CarPark
-from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph
+from onboard.kinds.graph.site import FactoryGraph
 
 #: Largest payload taken, bytes; see onboard/gateway/inbox.
 MOST_BYTES = 65_536
+#: Longest identifier, characters, and most instant actions in one message.
+MOST_ID, MOST_ACTIONS = 64, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +30,7 @@ class _Body:
 
 def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewaySettings) -> Json:
     """The body of a `factsheet` message, in the keys of the version."""
-    body = _body(site)
+    body, takes_orders = _body(site), isinstance(site, FactoryGraph)
     kinematic, navigation = (
         ("DIFFERENTIAL", "VIRTUAL_LINE_GUIDED") if dialect.is_third else ("DIFF", "VIRTUAL_LINE_GUIDED")
     )
@@ -53,8 +55,8 @@ def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewayS
             "length": body.length,
         },
         "protocolLimits": {
-            "maxStringLens": {"msgLen": MOST_BYTES, "idLen": 64},
-            "maxArrayLens": {"order.nodes": MAX_STOPS if isinstance(site, FactoryGraph) else 0, "instantActions": 8},
+            "maxStringLens": {"msgLen": MOST_BYTES, "idLen": MOST_ID},
+            "maxArrayLens": {"instantActions": MOST_ACTIONS} | ({} if takes_orders else {"order.nodes": 0}),
             "timing": {
                 "minOrderInterval": 1.0,
                 "minStateInterval": settings.least_state_us / 1e6,

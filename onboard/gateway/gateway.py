@@ -16,7 +16,7 @@ from onboard.gateway.desk import OrderDesk
 from onboard.gateway.link import Link, LinkWords
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.reports import Reports
-from onboard.gateway.settings import GatewaySettings
+from onboard.gateway.settings import GatewaySettings, level
 from onboard.ports.broker import Broker, Publication
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
@@ -80,6 +80,13 @@ class Gateway:
             self.frames_dropped += 1
         self._inbox.append((frame, time_us))
         self._news.set()
+
+    def event(self, time_us: int, source: str, text: str) -> None:
+        """``ports.Telemetry``: what a controller in this process says in words, on ``log/MACHINE``."""
+        told = {"at": self.publisher.at(time_us), "machine": source, "text": text}
+        link = self.links.get(level(source), self.links.get(FLEET))
+        if link is not None:
+            link.post(self.publisher.publication(f"log/{level(source)}", told))
 
     def news(self) -> str:
         """The sessions in one line: how many there are, why the others are not, and what was lost."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from onboard.gateway.dialect import Dialect
-from onboard.gateway.factsheet import MOST_BYTES
+from onboard.gateway.factsheet import MOST_ACTIONS, MOST_BYTES, MOST_ID
 from onboard.gateway.schema import TRANSPORT, schema
 from onboard.ports.broker import Publication
 
@@ -78,6 +78,9 @@ class Inbox:
             for key, value in mine:
                 if told[key] != value:
                     return Incoming(kind, serial, named, "MALFORMED", f"$.{key}", f"must be that of the topic, {value}")
+            wrong = _too_long(told)
+            if wrong is not None:
+                return Incoming(kind, serial, named, "TOO_LONG", *wrong)
         if publication.retain:
             # Kept by the broker from who knows when: an order is not to be carried out at every start.
             return Incoming(kind, serial, named, "RETAINED", "$", "an order must not be retained")
@@ -102,6 +105,19 @@ class Inbox:
             return False
         self._allowance -= 1
         return True
+
+
+def _too_long(told: dict[str, Any]) -> tuple[str, str] | None:
+    """What the factsheet's limits forbid and the schema does not: path and reason."""
+    if len(told.get("orderId", "")) > MOST_ID:
+        return "$.orderId", f"must have at most {MOST_ID} characters"
+    actions = told.get("actions", [])
+    if len(actions) > MOST_ACTIONS:
+        return "$.actions", f"must have at most {MOST_ACTIONS} elements"
+    for number, action in enumerate(actions):
+        if max(len(action["actionId"]), len(action["actionType"])) > MOST_ID:
+            return f"$.actions[{number}].actionId", f"must have at most {MOST_ID} characters"
+    return None
 
 
 def _no_constant(name: str) -> None:

@@ -4,7 +4,8 @@ import argparse
 import os
 from pathlib import Path
 
-from onboard.gateway.settings import GatewayError, GatewaySettings
+from onboard.core.site import Site
+from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress, parse_broker
 
 
@@ -57,6 +58,31 @@ def gateway_settings(
     return GatewaySettings(
         version=args.vda5050, manufacturer=args.manufacturer, prefix=args.prefix, serials=serials, node_id=node_id
     )
+
+
+def watch_lines(address: BrokerAddress, site: Site, settings: GatewaySettings) -> list[str]:
+    """How to watch with mosquitto's own program."""
+    words = f"mosquitto_sub -h {address.host} -p {address.port}"
+    if address.user is not None:
+        words += f" -u {address.user} -P ..."
+    if address.tls:
+        words += f" --cafile {address.ca or '...'} --cert ... --key ..."
+    root = f"{settings.prefix}/{level(site.name)}"
+    machines = f"{settings.dialect.topic_root}/{settings.manufacturer}"
+    lines = [
+        f"publishing {site.name} to {address}, VDA 5050 {settings.version}; watch with:",
+        f"  {words} -v -t '{root}/#'",
+        f"  {words} -v -t '{machines}/+/state'",
+    ]
+    if settings.node_id is None:
+        return lines
+    order = '{"id": "A1", "car": "1.1", "to": "IOC1"}'
+    said = words.replace("mosquitto_sub", "mosquitto_pub")
+    return [
+        *lines,
+        f"it takes orders as node {settings.node_id}; for a car park:",
+        f"  {said} -q 1 -t {root}/orders -m '{order}'",
+    ]
 
 
 def _password(path: Path | None) -> str | None:

@@ -13,7 +13,7 @@ from onboard.core.codes import TaskPhase
 from onboard.core.messages import Message, TaskReport
 from onboard.core.site import Site
 from onboard.gateway import state as vda
-from onboard.gateway.dialect import Connection, Json
+from onboard.gateway.dialect import Connection, Json, timestamp
 from onboard.gateway.factsheet import factsheet
 from onboard.gateway.fleet import WHOLE, FleetTopics
 from onboard.gateway.machines import Machines
@@ -238,6 +238,10 @@ class Publisher:
             return self.publication("status", {"state": connection.value}, qos=1, retain=True)
         told = vda.connection(self.settings.dialect, connection)
         return self._vda(self._node(link), "connection", told, now_us, qos=1, retain=True)
+
+    def at(self, time_us: int) -> str:
+        """A time of the loop as a time stamp."""
+        return timestamp(self.settings.epoch_us + time_us)
 
     def publication(self, topic: str, told: Json, *, qos: int = 0, retain: bool = False) -> Publication:
         """One message of the fleet's own topics; ``topic`` below PREFIX/SITE."""

@@ -2,6 +2,8 @@
 
 import sys
 
+from onboard.ports.telemetry import Telemetry
+
 
 class ConsoleTelemetry:
     """``ports.Telemetry`` as one line an event: seconds since start, machine, text."""
@@ -12,3 +14,15 @@ class ConsoleTelemetry:
             print(f"{time_us / 1e6:.3f} {source}: {text}", file=sys.stderr, flush=True)
         except OSError:
             return
+
+
+class ManyTelemetry:
+    """``ports.Telemetry`` to several sinks, in their order."""
+
+    def __init__(self, *sinks: Telemetry) -> None:
+        self._sinks = sinks
+
+    def event(self, time_us: int, source: str, text: str) -> None:
+        """As in the port."""
+        for sink in self._sinks:
+            sink.event(time_us, source, text)

@@ -99,7 +99,7 @@ async def test_each_role_reads_what_it_may_and_nothing_else(mosquitto: Mosquitto
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 async def test_a_certificate_of_another_authority_or_none_does_not_get_in(mosquitto: Mosquitto, keys: Path) -> None:
     async def enter(address: BrokerAddress) -> None:
-        broker = MqttBroker(address, keepalive_s=5, timeout_s=2.0)
+        broker = MqttBroker(address, keepalive_s=5, timeout_s=0.7)
         async with broker.session("gateway", None, ()) as session:
             await session.publish(Publication("onboard/site/status", b"x", 1))
 

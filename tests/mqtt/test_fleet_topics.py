@@ -1,6 +1,7 @@
 """The fleet's own topics: every call with its bids, every task to its end, and nothing that grows for ever."""
 
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,13 +12,12 @@ from onboard.core.messages import Award, Bid, CallForProposals, Reference
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.settings import GatewaySettings
 from onboard.trace.view import CALL_LIMIT, TASK_LIMIT
-from tests.mqtt.logs import EPOCH_US, content, published, record
+from tests.mqtt.logs import EPOCH_US, content, published
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, Outgoing]]:
-    log = record(tmp_path_factory.mktemp("fleet") / "small.log", "small", "--one-car", "60")
-    return [(time_us, one) for time_us, one in published("small", log, prefix="house") if one.link == FLEET]
+def told(small_log: Path) -> list[tuple[int, Outgoing]]:
+    return [(time_us, one) for time_us, one in published("small", small_log, prefix="house") if one.link == FLEET]
 
 
 def of(told: list[tuple[int, Outgoing]], name: str) -> list[Any]:

@@ -1,15 +1,17 @@
 """The gateway and a broker that comes and goes: what must not be lost is not, what may be lost is bounded."""
 
+import asyncio
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.gateway import gateway as module
 from onboard.gateway import link, reports
 from onboard.gateway.gateway import Gateway
-from onboard.gateway.link import LAST_WAIT_S
+from onboard.gateway.link import LAST_WAIT_S, Link, LinkWords
 from onboard.gateway.reports import Reports
 from onboard.ports.broker import Publication
 from tests.mqtt.double import DoubleBroker
@@ -161,3 +163,31 @@ def test_a_gateway_that_is_flooded_drops_the_oldest_frames_and_counts_them(
 
     done = play(small_log, acts=[(0.0001, flood)])
     assert gateway is done and done.frames_dropped == 400
+
+
+def test_what_the_broker_keeps_is_never_older_than_what_was_said_last() -> None:
+    """An old word that waited for the broker does not come after the new one that begins a session."""
+    broker = DoubleBroker()
+    broker.kill()
+    new, old = Publication("t", b"new", 1, retain=True), Publication("t", b"old", 1, retain=True)
+    last = Publication("t/end", b"", 1)
+
+    async def live() -> None:
+        words = LinkWords(lambda: last, lambda: [new], lambda: last)
+        one = Link(broker, "c", words)
+        running = asyncio.ensure_future(one.run())
+        one.post(old)
+        one.post(Publication("other", b"x"))
+        await asyncio.sleep(3)
+        broker.start()
+        await asyncio.sleep(10)
+        one.stop()
+        await running
+
+    loop = VirtualTimeLoop()
+    try:
+        loop.run_until_complete(live())
+    finally:
+        loop.close()
+    assert broker.retained["t"] == new
+    assert [one.topic for one in broker.all] == ["t", "other", "t/end"]

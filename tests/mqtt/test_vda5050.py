@@ -15,16 +15,15 @@ from onboard.gateway.settings import GatewayError, GatewaySettings
 from tests.mqtt.logs import EPOCH_US, VERSIONS, content, published, record, validator
 
 RUNS = {
-    "small": ("small", "--one-car", "60"),
     "graph": ("graph",),
     "terminal": ("terminal",),
 }
 
 
 @pytest.fixture(scope="module")
-def logs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+def logs(tmp_path_factory: pytest.TempPathFactory, small_log: Path) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("logs")
-    return {name: record(folder / f"{name}.log", *words) for name, words in RUNS.items()}
+    return {"small": small_log} | {name: record(folder / f"{name}.log", *words) for name, words in RUNS.items()}
 
 
 def vda(found: list[tuple[int, Outgoing]]) -> Iterator[tuple[str, int, str, Any]]:
@@ -35,7 +34,7 @@ def vda(found: list[tuple[int, Outgoing]]) -> Iterator[tuple[str, int, str, Any]
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize("name", ["small", *RUNS])
 def test_every_message_of_a_run_is_valid_in_the_version_chosen(logs: dict[str, Path], name: str, version: str) -> None:
     seen = set()
     for link, time_us, message, told in vda(published(name, logs[name], version=version)):

@@ -113,17 +113,18 @@ LAYERS: dict[str, Layer] = {
             "onboard.wire",
         )
     ),
-    "onboard.gateway.options": Layer(("onboard.gateway", "onboard.io")),
+    "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.gateway.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+            *("onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+            *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),
         ),
         not_stdlib=frozenset({"random", "threading", "time"}),
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
-        ("onboard", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
+        ("onboard", "onboard.gateway", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
