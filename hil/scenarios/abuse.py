@@ -4,7 +4,7 @@ import re
 from dataclasses import replace
 
 from hil.scenarios.recovery import BEATS_S
-from hil.scenarios.work import AWARD_S, CALL_S, JOIN_S, assert_won
+from hil.scenarios.work import AWARD_S, CALL_S, JOIN_S, is_awarded
 from hil.stage import Said, Stage
 from onboard.core.codes import DriveMode, MachineState, Reason
 from onboard.core.frame import Frame
@@ -70,8 +70,7 @@ async def survives_flood(stage: Stage) -> None:
     since = stage.mark()
     stage.bring_car()
     call = await stage.first(CallForProposals, "call for a car", CALL_S, lambda one: one.depth == 0, since)
-    award = await stage.first(Award, "award", AWARD_S, lambda one: one.call == call.message.call, since)
-    assert_won(stage, award.message)
+    await is_awarded(stage, call.message.task)
 
 
 def wrong_site(text: str) -> str:
