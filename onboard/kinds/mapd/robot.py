@@ -60,6 +60,10 @@ _OF_INTEREST = (
 )
 
 
+#: What only the desk says.
+_OF_DESK = (StepAward, TransportCall, StepRound)
+
+
 class Phase(Enum):
     """Where a robot stands within a step."""
 
@@ -119,8 +123,11 @@ class UnitRobot(Plain):
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Everything that others say of tasks, steps, bids and paths."""
         self._is_new |= isinstance(message, _OF_INTEREST)
+        if isinstance(message, _OF_DESK) and message.sender != self.site.desk:
+            self.fleet.drops[Reason.NOT_AUTHORISED] += 1
+            return []
         match message:
-            case TransportBid():
+            case TransportBid() if message.sender in self.site.homes:
                 self._heard_bids.append(message)
                 if self._bids is not None:
                     self._bids.hear(message)
