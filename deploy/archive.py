@@ -12,6 +12,8 @@ from deploy.wheels import pinned_wheels
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("dbc", "onboard")
+#: What a person needs at a new machine; the rest of ``hil`` is for the bench.
+COMMISSIONING = ("hil/__init__.py", "hil/__main__.py", "hil/cli.py", "hil/notice.py", "hil/commission")
 #: The first moment that a ZIP archive can name.
 _TIME = (1980, 1, 1, 0, 0, 0)
 _MAIN = b"import sys\n\nfrom onboard.cli import main\n\nsys.exit(main())\n"
@@ -34,8 +36,9 @@ def build_archive(to: Path) -> Path:
 
 def _contents() -> Iterator[tuple[str, bytes]]:
     yield "__main__.py", _MAIN
-    for package in PACKAGES:
-        for file in (ROOT / package).rglob("*"):
+    for place in (*PACKAGES, *COMMISSIONING):
+        path = ROOT / place
+        for file in path.rglob("*") if path.is_dir() else [path]:
             if file.is_file() and "__pycache__" not in file.parts:
                 yield file.relative_to(ROOT).as_posix(), file.read_bytes()
     for name in ("LICENSE", "NOTICE", "THIRD_PARTY.md"):

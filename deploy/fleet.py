@@ -2,32 +2,18 @@
 
 from pathlib import Path
 
+from onboard.config.machine_text import BusTable, machine_text
 from onboard.config.site import load_site
 from onboard.core.site import Site
-
-_MACHINE = """\
-# {name}, a {kind} of site {site}, node {node}. All keys: docs/machine-file.md
-[machine]
-name = "{name}"
-site = "site.toml"
-
-[fleet_bus]
-interface = "socketcan"
-channel = "{fleet}"
-"""
-_DEVICE = """
-[device_bus]
-interface = "socketcan"
-channel = "{device}"
-"""
 
 
 def machine_file(site: Site, node: int, fleet: str, device: str) -> str:
     """The machine file of one node; one interface may carry both buses. Raises ``KeyError``."""
     machine = site.machines[node]
     kind = machine.kind.name.lower().replace("_", " ")
-    text = _MACHINE.format(name=machine.name, kind=kind, site=site.name, node=node, fleet=fleet)
-    return text if device == fleet else text + _DEVICE.format(device=device)
+    head = f"# {machine.name}, a {kind} of site {site.name}, node {node}. All keys: docs/machine-file.md\n"
+    devices = BusTable("socketcan", device) if device != fleet else None
+    return head + machine_text(machine.name, "site.toml", BusTable("socketcan", fleet), devices)
 
 
 def write_fleet(site_file: Path, to: Path, fleet: str = "can0", device: str = "can1") -> list[Path]:

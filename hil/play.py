@@ -87,7 +87,7 @@ async def _play(
         trace=directory / "trace.log",
         trace_devices=True,
         faults=(waiting_fault(target.machine.node_id),),
-        without=scenario.without | {target.machine.name},
+        without=scenario.without(bench.site, target.machine),
     )
     simulation = build(bench.site, options, loop)
     for medium in simulation.devices.values():

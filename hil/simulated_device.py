@@ -10,7 +10,8 @@ from hil.cable import Cable
 from hil.short_circuit import ShortCircuit
 from onboard.config.site import parse_site
 from onboard.controller.shell import Controller, Ports
-from onboard.core.holon import Holon, next_boot
+from onboard.core.holon import Holon
+from onboard.core.serial import next_boot
 from onboard.core.site import Machine
 from onboard.kinds.registry import factory_for
 from onboard.ports.bus import BusHealth

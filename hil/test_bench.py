@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 from hil.bench import Bench, Target
+from hil.device import BenchError
 from hil.play import missing, play
 from hil.scenarios.scenario import Scenario
+from onboard.io.settings import BusOpenError
 
 
 def test_scenario(
@@ -17,8 +19,12 @@ def test_scenario(
     lacking = missing(scenario, target)
     if lacking:
         pytest.skip(f"bench {bench.name}: {target.machine.name} has no {', '.join(lacking)}")
-    outcome = play(bench, target, scenario, place)
+    try:
+        outcome = play(bench, target, scenario, place)
+    except (BenchError, BusOpenError) as error:
+        pytest.fail(f"bench {bench.name}: {error}", pytrace=False)
     for name, value in outcome.properties().items():
         record_property(name, value)
     record_property("trace", str(place / "trace.log"))
-    assert outcome.is_good, "\n".join([*outcome.lines(), f"trace: {place / 'trace.log'}"])
+    if not outcome.is_good:
+        pytest.fail("\n".join([*outcome.lines(), f"trace: {place / 'trace.log'}"]), pytrace=False)

@@ -12,7 +12,8 @@ from onboard import __version__
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
-from onboard.core.holon import Holon, next_boot
+from onboard.core.holon import Holon
+from onboard.core.serial import next_boot
 from onboard.gateway.options import add_mqtt_arguments
 from onboard.gateway.settings import GatewayError
 from onboard.io.broker_address import is_mqtt_installed

@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from hil.scenarios.recovery import BEATS_S
-from hil.scenarios.work import AWARD_S, CALL_S, JOIN_S
+from hil.scenarios.work import AWARD_S, CALL_S, JOIN_S, assert_won
 from hil.stage import Said, Stage
-from onboard.core.codes import CallResult, DriveMode, MachineState, Reason
+from onboard.core.codes import DriveMode, MachineState, Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import (
     Award,
@@ -70,7 +70,7 @@ async def survives_flood(stage: Stage) -> None:
     stage.bring_car()
     call = await stage.first(CallForProposals, "call for a car", CALL_S, lambda one: one.depth == 0, since)
     award = await stage.first(Award, "award", AWARD_S, lambda one: one.call == call.message.call, since)
-    assert (award.message.result, award.message.winner) == (CallResult.AWARDED, stage.machine.node_id)
+    assert_won(stage, award.message)
 
 
 def wrong_site(text: str) -> str:

@@ -45,7 +45,7 @@ SCENARIOS: tuple[Scenario, ...] = (
         refuses_wrong_site,
         _WORK | {Capability.FILES},
         _ROBOT,
-        without=frozenset(),
+        rivals=True,
         drops=frozenset({Reason.OTHER_SITE}),
         late=True,
     ),

@@ -5,18 +5,16 @@ from dataclasses import dataclass
 
 from hil.bench import Capability
 from hil.stage import Stage
-from onboard.core.codes import KindCode, Reason
-
-#: What the fleet of a bench does without: the second robot, so that the device has no rival.
-NO_RIVAL = frozenset({"MR2"})
+from onboard.core.codes import MOBILE_KINDS, KindCode, Reason
+from onboard.core.site import Machine, Site
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
     """``play`` raises ``AssertionError`` where the device does something else than it should.
 
-    ``needs``: capabilities of the bench. ``kinds``: kinds of machine that can do this; none for all. ``without``:
-    machines of the site that nobody runs. ``drops``: reasons for which the device may drop input here.
+    ``needs``: capabilities of the bench. ``kinds``: kinds of machine that can do this; none for all. ``rivals``:
+    machines of the device's own kind are run as well. ``drops``: reasons for which the device may drop input here.
     ``wire_errors``: error counters may rise. ``late``: frames may be lost or leave late. ``ends``: the device stops.
     """
 
@@ -24,11 +22,16 @@ class Scenario:
     play: Callable[[Stage], Awaitable[None]]
     needs: frozenset[Capability]
     kinds: frozenset[KindCode] = frozenset()
-    without: frozenset[str] = NO_RIVAL
+    rivals: bool = False
     drops: frozenset[Reason] = frozenset()
     wire_errors: bool = False
     late: bool = False
     ends: bool = False
+
+    def without(self, site: Site, machine: Machine) -> frozenset[str]:
+        """Machines of the site that the simulated fleet does without: the device itself, and who could do its work."""
+        alike = [one.name for one in site.machines.values() if one.kind is machine.kind and one.kind in MOBILE_KINDS]
+        return frozenset([machine.name] if self.rivals else [machine.name, *alike])
 
     @property
     def is_disturbed(self) -> bool:

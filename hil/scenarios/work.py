@@ -65,7 +65,7 @@ async def wins(stage: Stage) -> None:
     """With no rival the device is awarded the task, tells a firm plan and reports the task as its own."""
     call = (await bids(stage)).message.call
     award = (await stage.first(Award, "award", AWARD_S, lambda one: one.call == call)).message
-    assert (award.result, award.winner) == (CallResult.AWARDED, stage.machine.node_id)
+    assert_won(stage, award)
     await stage.first_own(Itinerary, "firm plan", MOTION_S, _is_firm_journey)
     await stage.first_own(
         TaskReport, "report", MOTION_S, lambda one: one.task == award.task and one.phase is TaskPhase.AWARDED
@@ -100,6 +100,12 @@ async def yields(stage: Stage) -> None:
         Progress, "progress off the home segment", MOTION_S, lambda one: (one.track, one.index) != home, since
     )
     await stage.first_own(DriveState, "stand", MOTION_S, lambda one: one.mode is DriveMode.STANDING, stage.mark())
+
+
+def assert_won(stage: Stage, award: Award) -> None:
+    """The device has won a call for which it had no rival."""
+    told = f"the award tells {award.result.name}, winner {award.winner}, reason {award.reason.name}"
+    assert (award.result, award.winner) == (CallResult.AWARDED, stage.machine.node_id), told
 
 
 def _is_outer(call: CallForProposals) -> bool:

@@ -15,6 +15,9 @@ FAR_US = 100_000
 SAME_US = 20_000
 #: Sync messages missed before the clock counts as lost.
 MISSED_LIMIT = 4
+#: Who has sent bus time for less than this takes up that of another which is ahead, us: it has just been started, and
+#: its own time began with it. Ours; two periods of the message.
+YOUNG_US = 10_000_000
 #: Bus time on the wire has 48 bits of microseconds: 8.9 years.
 BUS_TIME_MODULUS = 1 << 48
 
@@ -32,6 +35,8 @@ class BusClock:
     is_source: bool = False
     #: The error of the last message, us, where that was far too large; None while in sync.
     far_us: int | None = None
+    #: Since when this machine has sent bus time, us of loop time.
+    source_since_us: int | None = None
 
     @property
     def is_set(self) -> bool:
@@ -62,6 +67,36 @@ class BusClock:
             self.far_us = None
             self.offset_us += max(-MAX_SLEW_US, min(MAX_SLEW_US, error_us))
         self.heard_at_us = local_us
+
+    def lead(self, local_us: int) -> None:
+        """From now on this machine sends bus time, if it does not already."""
+        if not self.is_source:
+            self.is_source, self.source_since_us = True, local_us
+
+    def follow(self, local_us: int) -> None:
+        """Another machine sends bus time; what this one has sent until now is what it knows of it."""
+        if self.is_source:
+            self.is_source, self.heard_at_us = False, local_us
+
+    def refutes(self, bus_time_us: int, local_us: int) -> bool:
+        """Whether a time message is that of a source which was started anew and does not know the time of the bus yet.
+
+        It is answered once, with the time as this machine knows it: a source that says so again means it.
+        """
+        error_us = bus_time_us - self.bus_us(local_us)
+        if not self.is_set or self.far_us is not None or error_us > -FAR_US:
+            return False
+        self.far_us, self.heard_at_us = error_us, local_us
+        return True
+
+    def adopt(self, bus_time_us: int, local_us: int) -> bool:
+        """Take up the time of the bus, where this machine has just begun to send its own and that is behind."""
+        ahead_us = bus_time_us - self.bus_us(local_us)
+        is_young = self.source_since_us is not None and local_us - self.source_since_us < YOUNG_US
+        if not (self.is_source and is_young and ahead_us > FAR_US):
+            return False
+        self.offset_us += ahead_us
+        return True
 
     def is_lost(self, local_us: int) -> bool:
         """Whether deadlines can no longer be trusted; such a machine does not bid."""

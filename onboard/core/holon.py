@@ -37,7 +37,7 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
 from onboard.core.presence import Presence
-from onboard.core.serial import is_newer, successor
+from onboard.core.serial import is_newer
 from onboard.core.site import Machine, Segment, Site
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
@@ -222,7 +222,11 @@ class Holon:
             machine = self.site.machines.get(message.sender)
             if machine is None or machine.kind in MOBILE_KINDS:
                 self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            elif self.clock.adopt(message.bus_time_us, local_us):
+                self._heartbeat_due_us = self._bus_time_due_us = self.clock.bus_us(local_us)
             return []
+        if self.machine.kind not in MOBILE_KINDS and self.clock.refutes(message.bus_time_us, local_us):
+            return [Send(BusTime(self.node_id, self.clock.bus_us(local_us) % BUS_TIME_MODULUS))]
         first = not self.clock.is_set
         self._bus_time_lost = False
         self.clock.heard(message.bus_time_us, local_us)
@@ -470,10 +474,12 @@ class Holon:
             for node in self.mirror.alive(now_us)
             if node < self.node_id and self.mirror.peers[node].kind not in (*MOBILE_KINDS, KindCode.OBSERVER)
         ]
-        self.clock.is_source = not lower
         if lower:
+            self.clock.follow(local_us)
             self._bus_time_due_us = None
-        elif self._bus_time_due_us is None:
+            return
+        self.clock.lead(local_us)
+        if self._bus_time_due_us is None:
             self._bus_time_due_us = now_us
 
     def _halt(self, why: str) -> list[Effect]:
@@ -488,12 +494,3 @@ class Holon:
         grown = [reason for reason in sorted(totals) if totals[reason] != self._told_drops[reason]]
         self._told_drops = totals
         return [Send(Diagnostic(self.node_id, reason, totals[reason] & 0xFFFFFFFF)) for reason in grown]
-
-
-def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
-    """The boot counter after the last one journalled, 1 to 255, going round."""
-    last = 0
-    for entry in entries:
-        if entry.get("record") == "boot":
-            last = int(entry["boot"])
-    return successor(last, 8)

@@ -1,5 +1,7 @@
 """Serial-number arithmetic for counters and times that wrap (RFC 1982)."""
 
+from collections.abc import Iterable, Mapping
+
 #: Bus time on the wire is in milliseconds modulo this.
 BUS_MS_MODULUS = 1 << 32
 
@@ -26,3 +28,12 @@ def from_bus_ms(bus_ms: int, near_us: int) -> int:
     near_ms = near_us // 1000
     half = BUS_MS_MODULUS >> 1
     return ((bus_ms - near_ms + half) % BUS_MS_MODULUS - half + near_ms) * 1000
+
+
+def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
+    """The boot counter after the last one journalled, 1 to 255, going round."""
+    last = 0
+    for entry in entries:
+        if entry.get("record") == "boot":
+            last = int(entry["boot"])
+    return successor(last, 8)

@@ -1,6 +1,7 @@
 """Sources that are no simulator of ours: a live bus that is only listened to, and a recorded log with a slider."""
 
 import asyncio
+import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,15 +26,24 @@ class LiveSource:
 
     def __init__(self, site: Site, codecs: Codecs) -> None:
         self.picture = LivePicture(site)
-        self._decoder = Decoder(codecs.fleet)
+        self._codecs = codecs
+        self._fleet, self._device = Decoder(codecs.fleet), Decoder(codecs.device)
         self._loop = asyncio.get_running_loop()
+        local = time.localtime()
+        # The page tells the time of day: what the loop's clock lacks to it.
+        self._zero_s = local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec - round(self._loop.time())
 
     def on_frame(self, frame: Frame, time_us: int) -> None:
-        """One frame of the fleet bus, at a time of the loop."""
+        """One frame of the bus, at a time of the loop; a machine's devices may be on the same wires."""
         self.picture.count_frame(frame)
-        message = self._decoder.feed(frame, time_us)
-        if message is not None:
+        is_fleet = self._codecs.fleet.name_of(frame) is not None
+        message = (self._fleet if is_fleet else self._device).feed(frame, time_us)
+        if message is None:
+            return
+        if is_fleet:
             self.picture.feed(message, time_us)
+        else:
+            self.picture.feed_device(message.sender, message, time_us)
 
     def layout(self) -> dict[str, Any]:
         """As in the port."""
@@ -42,7 +52,7 @@ class LiveSource:
     def snapshot(self) -> dict[str, Any]:
         """As in the port; the clock goes on between two frames."""
         self.picture.view.now_us = round(self._loop.time() * 1e6)
-        return {**self.picture.snapshot(), "pace": 1}
+        return {**self.picture.snapshot(), "pace": 1, "zero_s": self._zero_s}
 
     def figures(self) -> dict[str, Any]:
         """As in the port."""

@@ -7,7 +7,7 @@ What is drawn of a system, and its words, are its scene's (``onboard.trace.scene
 from collections import deque
 from typing import Any
 
-from onboard.core.codes import CallResult, Criterion, TaskPhase
+from onboard.core.codes import CallResult, Criterion, Reason, TaskPhase
 from onboard.core.frame import Frame
 from onboard.core.messages import BusTime, Heartbeat, Message, Progress, Waiting
 from onboard.core.site import Site
@@ -38,8 +38,9 @@ class LivePicture:
         self.scene = scene_of(site, self.view)
         #: Whether cars are parked and fetched here: the indicators of robots and lifts are of such a site.
         self.is_car_park = bool(site.tracks)
+        self.view.thing = self.scene.thing
         if not self.is_car_park:
-            self.view.thing, self.view.task_end = self.scene.thing, self.scene.task_end
+            self.view.task_end = self.scene.task_end
         self.indicators = Indicators(site)
         self._heard: dict[int, int] = {}
         self._waits: dict[int, tuple[int, Waiting]] = {}
@@ -182,6 +183,7 @@ class LivePicture:
             "winner": view.name(record.winner) if record.winner else None,
             "result": record.result.name.lower() if record.result is not None else None,
             "won": record.result is CallResult.AWARDED,
+            **({"reason": record.reason.name.lower().replace("_", " ")} if record.reason is not Reason.NONE else {}),
         }
 
     def _cost(self, criterion: Criterion, cost: int) -> dict[str, Any]:

@@ -1,6 +1,14 @@
 """A clock that is far off is lost, not slewed for hours; the next message that says the same sets it."""
 
+from bus_sim.sites import find_site
 from onboard.core.bus_time import FAR_US, MAX_SLEW_US, BusClock
+from onboard.core.effects import Effect, Send
+from onboard.core.holon import Holon
+from onboard.core.messages import BusTime
+from onboard.kinds.registry import factory_for
+
+SITE = find_site("small")
+BAY, LIFT = 1, 5
 
 
 def in_sync() -> BusClock:
@@ -40,3 +48,45 @@ def test_two_errors_that_differ_confirm_nothing() -> None:
     clock.heard(-9_000_000, 0)
     assert clock.is_lost(0)
     assert clock.bus_us(0) == 1_000_000
+
+
+HOURS_US = 36_000_000_000
+
+
+def fixed(node: int) -> Holon:
+    return Holon(SITE, SITE.machines[node], factory_for(SITE, SITE.machines[node].kind))
+
+
+def times(effects: list[Effect]) -> list[int]:
+    said = [effect.message for effect in effects if isinstance(effect, Send)]
+    return [message.bus_time_us for message in said if isinstance(message, BusTime)]
+
+
+def test_a_source_whose_board_was_off_takes_up_the_time_of_the_bus() -> None:
+    """Its own clock begins at zero again; if all others followed it, nothing would be due for hours."""
+    lift, bay = fixed(LIFT), fixed(BAY)
+    lift.start(HOURS_US)
+    (began,) = times(bay.start(0))
+    (answer,) = times(lift.receive(BusTime(BAY, began), HOURS_US + 1_000))
+    assert answer == HOURS_US + 1_000
+    bay.receive(BusTime(LIFT, answer), 2_000)
+    (now,) = times(bay.wake(2_000))
+    assert now == HOURS_US + 1_000
+    lift.receive(BusTime(BAY, now), HOURS_US + 1_500)
+    assert not lift.clock.is_lost(HOURS_US + 1_500)
+    assert abs(lift.clock.bus_us(HOURS_US + 1_500) - now) < FAR_US
+
+
+def test_a_source_that_says_again_that_it_is_behind_is_believed() -> None:
+    lift = fixed(LIFT)
+    lift.start(HOURS_US)
+    assert times(lift.receive(BusTime(BAY, 0), HOURS_US))
+    assert times(lift.receive(BusTime(BAY, 5_000_000), HOURS_US + 5_000_000)) == []
+    assert lift.clock.bus_us(HOURS_US + 5_000_000) == 5_000_000
+
+
+def test_a_source_that_has_led_for_long_goes_by_its_own_time() -> None:
+    bay = fixed(BAY)
+    bay.start(0)
+    bay.receive(BusTime(LIFT, HOURS_US), 60_000_000)
+    assert bay.clock.bus_us(60_000_000) == 60_000_000

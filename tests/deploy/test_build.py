@@ -60,6 +60,11 @@ def test_the_single_file_needs_nothing_beside_it(archive: Path, tmp_path: Path) 
     assert run(archive, "trace", "--help").returncode == 0
 
 
+def test_the_single_file_walks_a_person_through_a_new_machine(archive: Path) -> None:
+    code = f"import sys; sys.path.insert(0, {str(archive)!r}); from hil.cli import main; main(['commission', '--help'])"
+    assert "Walk through a new machine on a live bus" in run("-c", code).stdout
+
+
 async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: Path, tmp_path: Path) -> None:
     """Against a served bus, as a board would join it; its reason for stopping is an emergency stop."""
     machine = fleet(tmp_path, "--device", "can0") / "MR1" / "machine.toml"

@@ -1,10 +1,12 @@
 """The scenarios of the bench in the simulator's own time: what a good controller passes, and broken ones do not."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from hil.bench import Bench, Target
 from hil.device import Device
 from hil.play import Outcome, play
 from hil.scenarios.registry import SCENARIOS
@@ -47,10 +49,20 @@ def spoil(controller: Controller, change: Change) -> None:
     controller._perform = changed  # type: ignore[method-assign]  # a controller that is broken, for this test
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS, ids=[one.name for one in SCENARIOS])
-def test_a_good_controller_passes(scenario: Scenario, tmp_path: Path) -> None:
-    bench = simulated()
-    outcome = play(bench, bench.targets[0], scenario, tmp_path)
+def cases_of(bench: Bench) -> Iterator[tuple[Target, Scenario]]:
+    """Every machine of the site in turn is the device."""
+    for machine in bench.site.machines.values():
+        for scenario in SCENARIOS:
+            if not scenario.kinds or machine.kind in scenario.kinds:
+                yield replace(bench.targets[0], machine=machine), scenario
+
+
+TESTS = list(cases_of(simulated()))
+
+
+@pytest.mark.parametrize(("target", "scenario"), TESTS, ids=[f"{one.machine.name} {two.name}" for one, two in TESTS])
+def test_a_good_controller_passes(target: Target, scenario: Scenario, tmp_path: Path) -> None:
+    outcome = play(simulated(), target, scenario, tmp_path)
     assert outcome.is_good, "\n".join(outcome.lines())
     assert (tmp_path / "trace.log").stat().st_size > 0
     assert outcome.properties()["sent"] > 0

@@ -175,7 +175,7 @@ export class Stage {
     } else {
       return;
     }
-    if (car && cell > 17 && !bay) this.text(pen, car.split(".")[1], box, css("--card"));
+    if (car && cell > 17 && !bay) this.text(pen, this.carName(car), box, css("--card"));
     this.hits.push({ ...box, what: bay ? "machine" : "place", id: bay ? bay.node : number, car });
   }
 
@@ -197,7 +197,7 @@ export class Stage {
       pen.arc(box.x + box.w + 4, outside, 3, 0, 7);
       pen.fill();
     }
-    if (this.cell > 17) this.text(pen, car ? car.split(".")[1] : "I/O", box, car ? css("--card") : css("--bay"));
+    if (this.cell > 17) this.text(pen, car ? this.carName(car) : "I/O", box, car ? css("--card") : css("--bay"));
   }
 
   drawDoor(pen, box, y, state) {
@@ -293,6 +293,11 @@ export class Stage {
     }
     if (cell > 14) this.text(pen, machine.name.replace(/^MR/, ""), box, css("--card"));
     this.hits.push({ ...box, what: "machine", id: machine.node });
+  }
+
+  // Who named a car, and its number there, where there is room for both.
+  carName(car) {
+    return this.cell > 38 && this.bays.size > 1 ? car : car.split(".")[1];
   }
 
   text(pen, words, box, colour) {

@@ -283,7 +283,7 @@ function callLines() {
   if (!call) return ["this call is long over"];
   const lines = [`call ${call.id} of ${call.by}: ${call.what}${call.thing ? ` ${call.thing}` : ""}, from ${call.from} to ${call.to}`, `opened ${clock(call.opened_us)}${call.deadline_us ? `, deadline ${clock(call.deadline_us)}` : ""}${call.attempt > 1 ? `, attempt ${call.attempt}` : ""}`];
   for (const bid of call.bids) lines.push(`${bid.by} bids ${cost(call, bid)} after ${((bid.at_us - call.opened_us) / 1e3).toFixed(0)} ms`);
-  lines.push(call.result ? (call.won ? `won by ${call.winner}: the best bid heard` : `ended: ${call.result}`) : "open");
+  lines.push(call.result ? (call.won ? `won by ${call.winner}: the best bid heard` : `ended: ${call.result}${call.reason ? `, ${call.reason}` : ""}`) : "open");
   return lines;
 }
 
