@@ -1,10 +1,11 @@
 """A certificate for a graph and a number of robots, or the counterexample (row G29), and the rows of section 2.4."""
 
+import random
 from dataclasses import dataclass
 from itertools import islice
 
 from bus_sim.certify.model import ARRIVED, Model, State
-from bus_sim.certify.search import Search, Stuck, TooLargeError, task_sets
+from bus_sim.certify.search import Search, Stuck, Tasks, TooLargeError, task_sets
 from onboard.kinds.graph.network import Graph, complete, grid, ring
 from onboard.kinds.graph.rules import Rules
 
@@ -63,16 +64,18 @@ def _where(state: State) -> str:
 
 @dataclass(frozen=True)
 class Row:
-    """A row of SYSTEMS 2.4: a graph and a number of robots."""
+    """A row of SYSTEMS 2.4: a graph and a number of robots; ``sample`` is how many task sets are drawn, and a seed."""
 
     name: str
     graph: Graph
     robots: int
+    sample: tuple[int, int] | None = None
 
 
 ROWS: tuple[Row, ...] = (
     Row("3x3 grid", grid(3, 3), 2),
     Row("3x3 grid", grid(3, 3), 3),
+    Row("3x3 grid", grid(3, 3), 4, (4000, 7)),
     Row("ring C5", ring(5), 2),
     Row("ring C6", ring(6), 2),
     Row("ring C8", ring(8), 2),
@@ -83,8 +86,24 @@ ROWS: tuple[Row, ...] = (
 )
 
 
-def count_stuck(graph: Graph, robots: int, rules: Rules, capacity: int = 1, most: int | None = None) -> tuple[int, int]:
-    """How many task sets there are, and how many of them can stick; of the first ``most`` only where that is given."""
+def sampled(graph: Graph, robots: int, count: int, seed: int) -> list[Tasks]:
+    """Task sets drawn evenly and without repetition from all of them."""
+    return random.Random(seed).sample(list(task_sets(graph, robots)), count)
+
+
+def count_stuck(
+    graph: Graph,
+    robots: int,
+    rules: Rules,
+    capacity: int = 1,
+    most: int | None = None,
+    sample: tuple[int, int] | None = None,
+) -> tuple[int, int]:
+    """How many task sets there are, and how many of them can stick.
+
+    Of the first ``most`` only where that is given, or of those drawn by ``sample``, (count, seed).
+    """
     search = Search(Model(graph, rules, capacity))
-    judged = [search.can_stick(tasks) for tasks in islice(task_sets(graph, robots), most)]
+    every = sampled(graph, robots, *sample) if sample is not None else task_sets(graph, robots)
+    judged = [search.can_stick(tasks) for tasks in islice(every, most)]
     return len(judged), sum(judged)

@@ -150,10 +150,12 @@ def _table() -> int:
     print(f"{'graph':10} robots  task sets  {'rule off':>8}  {'rule on':>8}  seconds")
     for row in ROWS:
         began = time.perf_counter()
-        sets, off = count_stuck(row.graph, row.robots, Rules.PAPER)
-        _, on = count_stuck(row.graph, row.robots, Rules.KEEP)
+        sets, off = count_stuck(row.graph, row.robots, Rules.PAPER, sample=row.sample)
+        _, on = count_stuck(row.graph, row.robots, Rules.KEEP, sample=row.sample)
         print(
-            f"{row.name:10} {row.robots:6}  {sets:9}  {off:8}  {on:8}  {time.perf_counter() - began:7.1f}", flush=True
+            f"{row.name:10} {row.robots:6}  {sets:9}  {off:8}  {on:8}  {time.perf_counter() - began:7.1f}"
+            + (f"  drawn with seed {row.sample[1]}" if row.sample is not None else ""),
+            flush=True,
         )
     sys.stdout.flush()
     return 0

@@ -8,7 +8,7 @@ from onboard.config.constants import read_timing
 from onboard.config.machines import Fleet
 from onboard.config.problems import nearest
 from onboard.config.reader import Table
-from onboard.config.terminal_missions import read_blockages, read_missions
+from onboard.config.terminal_missions import read_blockages, read_missions, read_presses
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
 from onboard.kinds.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
@@ -99,6 +99,7 @@ def read_terminal(root: Table, common: "Common") -> Terminal:
         site,
         missions=read_missions(root, network, by_box, fleet.by_name, steward, begins_s),
         blockages=read_blockages(root, network),
+        presses=read_presses(root, fleet.by_name),
         stewards=_read_stewards(root.table("stewards"), network, fleet, steward),
     )
     if not root.problems.found:

@@ -7,10 +7,12 @@ from onboard.config.problems import nearest
 from onboard.config.reader import Table
 from onboard.core.codes import KindCode
 from onboard.core.site import Machine
-from onboard.kinds.terminal.site import Blockage, EntityKind, Mission
+from onboard.kinds.terminal.site import Blockage, EntityKind, Mission, Press
 
 _CLOCK = re.compile(r"(\d{1,2}):([0-5]\d) ?(am|pm)?", re.IGNORECASE)
 _DAY_S = 86_400
+#: What a person can do to a vehicle by hand.
+PRESSES = ("hold", "step", "release")
 #: A mission's boxes and count fit into five bits on the wire.
 MOST_BOXES = 31
 
@@ -112,4 +114,22 @@ def read_blockages(root: Table, network: Places) -> tuple[Blockage, ...]:
         lane = network.find(table, "lane", (EntityKind.LANE,))
         at_s, for_s = table.integer("at_s", 0, _DAY_S), table.integer("for_s", 1, _DAY_S)
         found.append(Blockage(lane, at_s * 1_000_000, (at_s + for_s) * 1_000_000))
+    return tuple(found)
+
+
+def read_presses(root: Table, machines: dict[str, Machine | None]) -> tuple[Press, ...]:
+    """What a person does to vehicles by hand (row M38)."""
+    found = []
+    vehicles = {name: one for name, one in machines.items() if one is not None and one.kind is KindCode.VEHICLE}
+    for table in root.tables("manual"):
+        at_s, name = table.integer("at_s", 0, _DAY_S), table.text("vehicle")
+        what = table.text("do")
+        if "do" not in table.wrong and what not in PRESSES:
+            table.bad("do", what, "nothing that one can do by hand", f"write {', '.join(PRESSES)}")
+        if "vehicle" in table.wrong:
+            continue
+        if name not in vehicles:
+            table.bad("vehicle", name, "no vehicle of this name", nearest(name, list(vehicles)))
+        else:
+            found.append(Press(at_s * 1_000_000, vehicles[name].node_id, what))
     return tuple(found)

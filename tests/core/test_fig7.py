@@ -18,7 +18,7 @@ from onboard.core.lift_itineraries import Ride, lift_itineraries
 from onboard.core.lift_uses import are_compatible, ride_us
 from onboard.core.messages import Itinerary, Leg, Stamp
 from onboard.core.occupancy import itinerary_windows, lift_uses
-from onboard.core.reservations import Reservations
+from onboard.core.reservations import FOREVER, Reservations, Window
 from onboard.core.sipp import Route, RouteLeg, Visit, plan_route
 from onboard.core.site import Axis, Segment, Site
 from tests.core.buildings import LEFT, RIGHT, building
@@ -194,6 +194,23 @@ def test_p37_their_number_on_any_number_of_floors(floors: int) -> None:
 
 def aboard(ride: Ride, floor: int) -> Segment:
     return Segment(floor, 0 if ride.lift_track == LEFT else PLACES + 1)
+
+
+@pytest.mark.parametrize("rides", lift_itineraries(park(FAST, 0), 1, 5), ids=lambda rides: str(len(rides)))
+def test_p37_the_planner_finds_each_of_the_eight_where_the_others_are_blocked(rides: tuple[Ride, ...]) -> None:
+    """Somebody stands for ever on the way to the lift at the other end, and on the alleys of the other floors."""
+    away = {LEFT: Segment(1, 12), RIGHT: Segment(1, 2)}[rides[0].lift_track]
+    back = {LEFT: Segment(5, 14), RIGHT: Segment(5, 3)}[rides[-1].lift_track]
+    crossed = {ride.to_floor for ride in rides[:-1]}
+    standing = [away, back, *(Segment(floor, 8) for floor in (2, 3, 4) if floor not in crossed)]
+    reservations = Reservations()
+    for owner, segment in enumerate(standing, start=ALPHA):
+        reservations.reserve(owner, [Window(segment, 0, FOREVER)])
+    visits = (Visit(GOAL, FAST.work_us),)
+    route = plan_route(park(FAST, 0), reservations, LAMBDA, START, 0, visits, frozenset({GOAL}), 4_000)
+    assert isinstance(route, Route)
+    found = [Ride(leg.track, leg.from_index, leg.to_index) for leg in route.legs if leg.action is LegAction.RIDE]
+    assert tuple(found) == rides
 
 
 @pytest.mark.parametrize("clock", [FAST, REAL])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.certify.certificate import certify, count_stuck
+from bus_sim.certify.certificate import certify, count_stuck, sampled
 from bus_sim.certify.model import Model
 from bus_sim.certify.search import Search, Tasks, task_sets
 from bus_sim.certify.throughput import Pace, measure
@@ -91,6 +91,17 @@ def test_g24_g29_what_is_certified_and_what_is_not(graph: Graph, robots: int, ru
             state = dict(model.moves(state))[move]
         assert not model.moves(state)
         assert not model.is_over(state)
+
+
+def test_g29_sampled_task_sets_are_the_same_every_time_and_judged_as_by_a_search_of_its_own() -> None:
+    graph, sample = grid(3, 3), (12, 7)
+    drawn = sampled(graph, 4, *sample)
+    assert drawn == sampled(graph, 4, *sample) != sampled(graph, 4, 12, 8)
+    assert len(set(drawn)) == 12
+    edges = frozenset(frozenset(ends) for ends in graph.lengths_mm)
+    for rules in (Rules.PAPER, Rules.KEEP):
+        expected = sum(can_stick(edges, *tasks, keep=rules is Rules.KEEP) for tasks in drawn)
+        assert count_stuck(graph, 4, rules, sample=sample) == (12, expected)
 
 
 def test_g02_a_dead_end_is_not_certified() -> None:

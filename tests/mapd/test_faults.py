@@ -1,9 +1,16 @@
 """Pick-up and delivery under faults drawn by seed: every task is served, and neither plant nor rules find anything."""
 
+from pathlib import Path
+
 import pytest
 
+import bus_sim
 from bus_sim.campaign.profiles import draw_faults
 from bus_sim.faults.injection import Injection
+from bus_sim.importers.command import import_files
+from bus_sim.importers.draft import site_text
+from bus_sim.importers.mapf import Wanted
+from onboard.config.site import parse_site
 from onboard.core.messages import Message
 from onboard.kinds.mapd.messages import (
     NO_TASK,
@@ -15,6 +22,7 @@ from onboard.kinds.mapd.messages import (
     TransportBid,
     TransportCall,
 )
+from onboard.kinds.mapd.site import Mapd
 from onboard.trace.check.checks import Checks, Verdict
 from onboard.trace.check.mapd import RULES
 from tests.mapd.sites import drawn, made, played
@@ -24,9 +32,12 @@ SITE = made(6, drawn(16, 1))
 BEGIN_S, SHARE = 4.0, 0.028
 
 
-def _faults(seed: int) -> tuple[Injection, ...]:
+PLANTS = Path(bus_sim.__file__).parent / "data" / "plants"
+
+
+def _faults(seed: int, site: Mapd = SITE) -> tuple[Injection, ...]:
     found = []
-    for fault in draw_faults(("bus", "crash")[seed % 2], seed, SITE):
+    for fault in draw_faults(("bus", "crash")[seed % 2], seed, site):
         given = dict(fault.given)
         at_s = given["at_s"]
         assert not isinstance(at_s, str)
@@ -47,8 +58,21 @@ def test_pick_up_and_delivery_under_faults(seed: int) -> None:
     assert verdict.is_good, verdict.lines()
 
 
-def _verdict(messages: list[tuple[int, Message]], *, disturbed: bool = False) -> Verdict:
-    checks = Checks(SITE, disturbed=disturbed, rules=RULES)
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("plant_file", ["hotel.building.yaml", "Demo-01.xml"])
+def test_an_imported_plant_under_faults(plant_file: str, seed: int) -> None:
+    draft = import_files([PLANTS / plant_file], Wanted(tasks=3, seed=7))
+    site = parse_site(site_text(draft), plant_file)
+    assert isinstance(site, Mapd)
+    run, plant = played(site, seed=seed, limit_s=900, faults=_faults(seed, site))
+    assert run.is_good
+    assert len(plant.served) == 3
+    verdict = _verdict(run.messages, site, disturbed=True)
+    assert verdict.is_good, verdict.lines()
+
+
+def _verdict(messages: list[tuple[int, Message]], site: Mapd = SITE, *, disturbed: bool = False) -> Verdict:
+    checks = Checks(site, disturbed=disturbed, rules=RULES)
     for time_us, message in messages:
         checks.feed_message(time_us, message)
     return checks.finish()

@@ -1,15 +1,24 @@
 """Pick-up and delivery on the bus: the same day as without one, judged by the plant and from the frames."""
 
+import random
 from pathlib import Path
 
 import pytest
 
 from bus_sim.cli import main as bus_sim
+from bus_sim.run import BusRun
+from bus_sim.systems.mapd.plant import make_plant
+from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.steps import Day
+from bus_sim.systems.registry import SystemOptions
+from bus_sim.systems.session import play
 from onboard.cli import main as onboard
-from onboard.kinds.mapd.messages import StepAward, StepState, TransportBid, TransportCall
+from onboard.kinds.mapd.messages import MESSAGES, StepAward, StepState, TransportBid, TransportCall
 from onboard.kinds.mapd.site import Mapd
+from onboard.wire.codec import codecs
+from onboard.wire.dbc_file import system_layouts
 from tests.mapd.sites import drawn, made, played, site_text
+from tests.wire.samples import random_value
 
 
 def without_bus(site: Mapd) -> Day:
@@ -80,3 +89,30 @@ def test_p59_tasks_of_another_seed_are_served_without_collisions() -> None:
         assert run.is_good
         assert len(plant.served) == 20
         assert plant.violations == []
+
+
+def test_the_published_mean_is_printed_beside_a_whole_file_only() -> None:
+    assert token_passing("kiva-10-500-5_kiva-0.5", 500) == 132.8
+    assert token_passing("kiva-30-500-5_kiva-10", 500) == 192.0
+    assert token_passing("kiva-10-500-5_kiva-0.5", 20) is None
+    assert token_passing("hotel", 500) is None
+
+
+def test_whatever_is_on_the_bus_no_machine_raises() -> None:
+    chance, both = random.Random(4), codecs("mapd", MESSAGES)
+    site = made(3, drawn(4, 1))
+    flags = ("bidding", "kept", "loaded", "served")
+
+    def babble(run: BusRun) -> None:
+        bus = run.fleet.attach("noise", None)
+        for number in range(400):
+            layout = chance.choice(system_layouts("mapd")[0])
+            kind = next(one for one in MESSAGES if one.__name__ == layout.name)
+            values = {one.name: random_value(one, chance) for one in layout.signals}
+            named = {name: bool(value) if name in flags else value for name, value in values.items()}
+            # From a machine that there is not; a robot's own number would only show that it stops for a double.
+            for frame in both.fleet.encode(kind(77, **named)):
+                run.loop.call_at(3 + number / 100, bus.send, frame)
+
+    run = play(site, SystemOptions(quiet=True, limit_s=200), make_plant, prepare=babble)
+    assert run.is_good

@@ -36,6 +36,15 @@ def test_one_may_follow_into_the_cell_that_another_leaves() -> None:
     others.put(1, Path(0, (1, 2)))
 
 
+def test_a_ring_that_moves_at_once_is_not_planned_and_a_train_is() -> None:
+    # Cells 0 1 over 3 4: three follow each other clockwise, and the fourth would close the ring.
+    block = grid_floor(["...", "..."])
+    others = paths_of(block, Path(0, (0, 1)), Path(0, (1, 4)), Path(0, (4, 3)))
+    assert not others.may_move(3, 0, 0)
+    train = paths_of(block, Path(0, (0, 1)), Path(0, (1, 4)), Path(0, (4, 5)))
+    assert train.may_move(3, 0, 0)
+
+
 def test_nobody_passes_one_who_stays_nor_stays_where_another_will_pass() -> None:
     others = paths_of(ROW, Path(0, (4, 3)))
     assert not others.may_move(2, 3, 7)

@@ -1,1 +1,1 @@
-"""Pick-up and delivery: the robots' own decisions step by step, without a bus, and how a run of that is shown."""
+"""Pick-up and delivery: plant, picture and run on the bus, and the robots' decisions alone, step by step."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 from bus_sim.run import BusRun
 from bus_sim.systems.mapd.plant import UnitPlant, make_plant
+from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.show import picture
 from bus_sim.systems.session import Played, SystemPlant, conclude, play
 from onboard.core.site import Site
@@ -46,6 +47,7 @@ def figures(played: Played) -> dict[str, object]:
     counts = {
         kind: sum(isinstance(one, kind) for one in said) for kind in (TransportCall, TransportBid, StepAward, PathHead)
     }
+    published = token_passing(site.name, len(site.tasks))
     return {
         "robots": len(site.homes),
         "tasks": len(site.tasks),
@@ -53,6 +55,7 @@ def figures(played: Played) -> dict[str, object]:
         "step_ms": site.step_ms,
         "steps": max((one.step for one in said if isinstance(one, StepRound)), default=0),
         "mean_service_steps": round(fmean(steps), 2) if steps else 0.0,
+        **({} if published is None else {"token_passing_published": published}),
         "makespan_steps": max((one.served_step or 0 for one in served), default=0),
         "mean_service_s": fmean(seconds) if seconds else 0.0,
         "calls": counts[TransportCall],

@@ -16,6 +16,8 @@ from onboard.kinds.terminal.messages import (
     HandlerOrder,
     HandlerState,
     LaneSensor,
+    ManualKey,
+    ManualMode,
     MissionKey,
     MoveMode,
     MoveOrder,
@@ -23,11 +25,13 @@ from onboard.kinds.terminal.messages import (
     Verb,
 )
 from onboard.kinds.terminal.missions import types_of
-from onboard.kinds.terminal.site import Blockage, EntityKind, Mission, Terminal
+from onboard.kinds.terminal.site import Blockage, EntityKind, Mission, Press, Terminal
 from onboard.ports.bus import Bus
 from onboard.wire.codec import codecs
 from onboard.wire.decoder import Decoder
 
+#: What a person presses, by the words of a site file.
+PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMode.AUTOMATIC}
 #: A body passes from one slot into the next in so long, us. Ours.
 HOP_US = 300_000
 #: Devices and cameras say again how things stand, us (dbc/terminal.dbc).
@@ -203,6 +207,8 @@ class TerminalPlant:
         for blockage in self.site.blockages:
             self.timers.call_at(blockage.at_us, _call(self.block, blockage))
             self.timers.call_at(blockage.until_us, _call(self.free, blockage.lane))
+        for number, press in enumerate(self.site.presses, start=1):
+            self.timers.call_at(press.at_us, _call(self._press, number, press))
         self._look()
 
     def now_us(self) -> int:
@@ -236,6 +242,11 @@ class TerminalPlant:
     def _camera(self, lane: int) -> None:
         desk = self.site.stewards[lane]
         self.links[desk].send(LaneSensor(desk, lane, lane in self.world.blocked))
+
+    def _press(self, number: int, press: Press) -> None:
+        """A person at the first desk has a hand in a vehicle."""
+        desk = self.site.desk
+        self.links[desk].send(ManualKey(desk, number, press.vehicle, PRESSES[press.what]))
 
     def _type(self, number: int, mission: Mission) -> None:
         """The operator types a mission at its desk."""

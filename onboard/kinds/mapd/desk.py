@@ -73,7 +73,7 @@ class OrderDesk(Plain):
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Where robots are and what they carry, what they bid, and their paths: a right is given by those."""
         match message:
-            case TransportBid():
+            case TransportBid() if message.sender in self.site.homes:
                 if self.tally is not None:
                     self.tally.hear(message)
             case StepState():

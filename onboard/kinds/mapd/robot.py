@@ -13,7 +13,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Plain
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Message, SyncRequest
+from onboard.core.messages import Message, SyncRequest, TokenGrant
 from onboard.core.serial import successor
 from onboard.kinds.mapd.auction import Offer, Rule, cost
 from onboard.kinds.mapd.bidding import Round, bid_timing
@@ -45,6 +45,23 @@ ASK_AT_ONCE = 3
 SAID_US = 100_000
 #: Tokens are said again for whoever asks at most this often, us. Ours.
 TOKENS_SAID_US = 1_000_000
+
+
+#: What may let a robot go on; all else, such as others' heartbeats, changes nothing for it.
+_OF_INTEREST = (
+    TransportBid,
+    StepState,
+    PathMoves,
+    PathHead,
+    StepAward,
+    TransportCall,
+    StepRound,
+    TokenGrant,
+)
+
+
+#: What only the desk says.
+_OF_DESK = (StepAward, TransportCall, StepRound)
 
 
 class Phase(Enum):
@@ -105,9 +122,12 @@ class UnitRobot(Plain):
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Everything that others say of tasks, steps, bids and paths."""
-        self._is_new = True
+        self._is_new |= isinstance(message, _OF_INTEREST)
+        if isinstance(message, _OF_DESK) and message.sender != self.site.desk:
+            self.fleet.drops[Reason.NOT_AUTHORISED] += 1
+            return []
         match message:
-            case TransportBid():
+            case TransportBid() if message.sender in self.site.homes:
                 self._heard_bids.append(message)
                 if self._bids is not None:
                     self._bids.hear(message)
@@ -216,8 +236,11 @@ class UnitRobot(Plain):
             # The others may still be on their way, and the desk keeps to its pace.
             self._ask_us = now_us + self.site.step_us + ASK_US
             effects.append(Send(self._said))
+        has_round = self.round is not None and self.round.step == self.step
+        if not has_round and self._ask_us is not None and now_us < self._ask_us:
+            return effects
         missing = [*self.knowledge.behind(self.step), *self.knowledge.pathless()]
-        if not missing and self.round is not None and self.round.step == self.step:
+        if not missing and self.round is not None and has_round:
             same = len(self.knowledge.open_tasks) == self.round.open_tasks
             # Once the round is closed others may have gone on and picked up: the number is of no use any more.
             if same or self.turns.is_complete or not self.round.bidding:

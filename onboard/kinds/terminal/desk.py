@@ -15,7 +15,17 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
-from onboard.kinds.terminal.messages import LaneSensor, LaneState, MissionKey, PlanHead, TaskTerms
+from onboard.kinds.terminal.messages import (
+    LaneSensor,
+    LaneState,
+    ManualKey,
+    ManualMode,
+    ManualOrder,
+    ManualState,
+    MissionKey,
+    PlanHead,
+    TaskTerms,
+)
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.missions import Orders, Transport
 from onboard.kinds.terminal.site import EntityKind, Terminal
@@ -25,6 +35,8 @@ from onboard.kinds.terminal.vehicle import NO_WHEELBASE_MM, terminal
 LOOK_US = 5_000_000
 #: A lane that is blocked is told again so often, us (dbc/terminal.dbc).
 LANE_REPEAT_US = 5_000_000
+#: An order by hand that its vehicle has not answered is said again after this, us (dbc/terminal.dbc).
+MANUAL_AGAIN_US = 1_000_000
 #: A task that was won and is in no plan for so long is called anew, us: its winner gave it up or lost it. Ours.
 LOST_US = 120_000_000
 
@@ -78,6 +90,11 @@ class Desk:
     _won_at_us: dict[Reference, int] = field(default_factory=dict)
     _lanes: dict[int, LaneState] = field(default_factory=dict)
     _is_new: bool = False
+    #: Vehicles in which a person has a hand, and orders to vehicles that were not heard to have come.
+    held: set[int] = field(default_factory=set)
+    _manual: dict[int, ManualOrder] = field(default_factory=dict)
+    _manual_at_us: int | None = None
+    _told_buried: set[int] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.orders = Orders(self.site, self.fleet.node_id)
@@ -120,6 +137,10 @@ class Desk:
                 return self._typed(message, now_us)
             case LaneSensor():
                 return self._seen(message, now_us)
+            case ManualKey() if message.vehicle in self.site.vehicles:
+                order = ManualOrder(self.fleet.node_id, message.vehicle, message.number, message.manual_mode)
+                self._manual[message.vehicle], self._manual_at_us = order, now_us + MANUAL_AGAIN_US
+                return [Send(order)]
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
@@ -134,6 +155,8 @@ class Desk:
                 return self.mirror.ask(message)
             case PlanHead():
                 self._is_new = True
+            case ManualState():
+                self._on_manual(message)
         return []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
@@ -163,15 +186,20 @@ class Desk:
         if self._repeat_at_us is not None and self._repeat_at_us <= now_us:
             self._repeat_at_us = now_us + LANE_REPEAT_US
             effects += self._lanes_told()
+        if self._manual_at_us is not None and self._manual_at_us <= now_us:
+            self._manual_at_us = now_us + MANUAL_AGAIN_US if self._manual else None
+            effects += [Send(order) for order in self._manual.values()]
         if self._is_new or (self._look_at_us is not None and self._look_at_us <= now_us):
             self._is_new = False
             self._look_at_us = now_us + LOOK_US if self.orders.missions or self.orders.won else None
-            effects += self._look_after(now_us) + self.call_next(now_us)
+            effects += self._look_after(now_us) + self.call_next(now_us) + self._tell_buried()
         return effects
 
     def next_wake(self) -> int | None:
         """The next look."""
-        return min((one for one in (self._look_at_us, self._repeat_at_us) if one is not None), default=None)
+        return min(
+            (one for one in (self._look_at_us, self._repeat_at_us, self._manual_at_us) if one is not None), default=None
+        )
 
     def statements(self, now_us: int) -> list[Effect]:
         """Lanes, the boxes that are not where they were at first, and the rights that I hold."""
@@ -199,6 +227,24 @@ class Desk:
                     effects += self._withdraw(terms, now_us)
         return effects + self.call_next(now_us)
 
+    def _on_manual(self, state: ManualState) -> None:
+        (self.held.discard if state.manual_mode is ManualMode.AUTOMATIC else self.held.add)(state.sender)
+        order = self._manual.get(state.sender)
+        if order is not None and order.number == state.number:
+            del self._manual[state.sender]
+
+    def _tell_buried(self) -> list[Effect]:
+        """Nobody clears a stack by itself (row M08): the operator is told once what waits for what."""
+        found = [pair for pair in self.orders.buried(self.mirror) if pair[0] not in self._told_buried]
+        self._told_buried.update(box for box, _ in found)
+        names = self.site.boxes
+        return [
+            Report(
+                f"box {names[box - 1].name} waits: {names[upper - 1].name} is above it, and nobody ordered that away"
+            )
+            for box, upper in found
+        ]
+
     def _withdraw(self, terms: CallTerms, now_us: int) -> list[Effect]:
         self.interrupted += 1
         effects: list[Effect] = []
@@ -212,7 +258,7 @@ class Desk:
     def candidates(self, now_us: int) -> list[int]:
         """Robots that have no plan, or one that ends before T + delta T (M24), and are alive."""
         alive = self.fleet.mirror.alive(now_us)
-        busy = set(self.orders.won.values()) - set(self.mirror.traffic.plans)
+        busy = set(self.orders.won.values()) - set(self.mirror.traffic.plans) | self.held
         limit_us = now_us + self.site.horizon_us
         ends = {node: self.mirror.traffic.end_of(node, now_us) for node in self.site.vehicles}
         return [node for node, end in ends.items() if end <= limit_us and node in alive and node not in busy]

@@ -27,6 +27,8 @@ class VehicleGeneration:
     mirror: TerminalMirror
     has_queue: bool = False
     promised: set[CallKey] = field(default_factory=set)
+    #: Whether a person has a hand in the vehicle: it bids for nothing then (row M38).
+    is_held: bool = False
     searches: int = 0
     _handling_us: int = field(init=False)
 
@@ -66,7 +68,7 @@ class VehicleGeneration:
     def is_candidate(self, now_us: int) -> bool:
         """Whether it has no plan, or one that ends before T + delta T."""
         end_us = self.mirror.traffic.end_of(self.machine.node_id, now_us)
-        return not self.has_queue and end_us <= now_us + self.site.horizon_us
+        return not self.has_queue and not self.is_held and end_us <= now_us + self.site.horizon_us
 
     def start(self, now_us: int) -> tuple[int, int]:
         """Where and when the machine is free: an area, bus us."""

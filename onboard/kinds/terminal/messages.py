@@ -53,6 +53,14 @@ class Verb(IntEnum):
     END = 2
 
 
+class ManualMode(IntEnum):
+    """How far a person has a hand in a vehicle (row M38)."""
+
+    AUTOMATIC = 0
+    HELD = 1
+    STEP = 2
+
+
 # --- fleet bus -----------------------------------------------------------------------------------------------------
 
 
@@ -135,6 +143,23 @@ class Assignment(Message):
     target: int
 
 
+@dataclass(frozen=True, slots=True)
+class ManualOrder(Message):
+    """A person at a desk holds ``vehicle``, has it do one elementary action, or lets it go; said again until heard."""
+
+    vehicle: int
+    number: int
+    manual_mode: ManualMode
+
+
+@dataclass(frozen=True, slots=True)
+class ManualState(Message):
+    """The vehicle's answer to the order of this ``number``."""
+
+    number: int
+    manual_mode: ManualMode
+
+
 # --- device buses --------------------------------------------------------------------------------------------------
 
 
@@ -205,7 +230,17 @@ class MissionKey(Message):
     urgent: bool
 
 
+@dataclass(frozen=True, slots=True)
+class ManualKey(Message):
+    """What a person presses for ``vehicle``; ``number`` grows by one with each press at a desk."""
+
+    number: int
+    vehicle: int
+    manual_mode: ManualMode
+
+
 MESSAGES = (
     PlanHead, PlanStep, PlanTask, StepReport, LaneState, TaskTerms, Assignment,
     MoveOrder, MoveState, HandlerOrder, HandlerState, LaneSensor, MissionKey,
+    ManualOrder, ManualState, ManualKey,
 )  # fmt: skip

@@ -113,6 +113,20 @@ class Orders:
                 return box
         return None
 
+    def buried(self, mirror: TerminalMirror) -> list[tuple[int, int]]:
+        """(box, box above it) of boxes ordered by name that lie under one that nobody has ordered away.
+
+        Where boxes should best stand, and what to move aside for another, is out of scope (row M08): people order it.
+        """
+        ordered = {box for order in self.missions.values() for box in order.named}
+        ordered |= {transport.box for transport in self.open.values()}
+        found = []
+        for box in sorted(ordered):
+            above = [one for one in mirror.above(box) if one not in ordered and mirror.in_plans(one) is None]
+            if above:
+                found.append((box, above[-1]))
+        return found
+
     def give_back(self, task: Reference) -> None:
         """Nobody does it: its box is a mission of its own again."""
         transport = self.open.pop(task, None)

@@ -91,6 +91,15 @@ class Blockage:
     until_us: int
 
 
+@dataclass(frozen=True, slots=True)
+class Press:
+    """What a person does to a vehicle by hand after ``at_us`` (row M38): "hold", "step" or "release"."""
+
+    at_us: int
+    vehicle: int
+    what: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class Terminal(Site):
     """A terminal. Durations in us; ``gap_us`` is the one tick that the paper's ``>`` on integers is between robots.
@@ -105,6 +114,7 @@ class Terminal(Site):
     boxes: tuple[Box, ...] = ()
     missions: tuple[Mission, ...] = ()
     blockages: tuple[Blockage, ...] = ()
+    presses: tuple[Press, ...] = ()
     dock_us: int = 2_000_000
     handle_us: int = 2_000_000
     undock_us: int = 2_000_000

@@ -17,12 +17,14 @@ from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.terminal.body import Body
 from onboard.kinds.terminal.generation import VehicleGeneration
+from onboard.kinds.terminal.manual import Manual
 from onboard.kinds.terminal.memory import step_record
 from onboard.kinds.terminal.messages import (
     Action,
     Assignment,
     HandlerMode,
     HandlerState,
+    ManualOrder,
     MoveMode,
     MoveState,
     StepResult,
@@ -70,6 +72,7 @@ class Vehicle:
     kind: KindCode = KindCode.VEHICLE
     body: Body = field(init=False)
     planner: Planner = field(init=False)
+    manual: Manual = field(init=False)
     _retry_at_us: int | None = None
     _may_retry: bool = False
     _told_blocked: bool = False
@@ -78,6 +81,7 @@ class Vehicle:
     def __post_init__(self) -> None:
         self.body = Body(self.fleet.node_id)
         self.planner = Planner(self.fleet, self.generation, self.body)
+        self.manual = Manual(self.fleet.node_id)
         self._actions = {
             Action.GOTO: self._goto,
             Action.DOCK: self._dock,
@@ -108,6 +112,8 @@ class Vehicle:
         """Heartbeat state."""
         if not self.body.is_known:
             return MachineState.STARTING
+        if not self.manual.is_automatic:
+            return MachineState.WAITING
         return MachineState.IDLE if self.owned is None else MachineState.WORKING
 
     @property
@@ -118,6 +124,8 @@ class Vehicle:
     def start(self, now_us: int) -> list[Effect]:
         """After a restart the journal knows the plan and how far it has come."""
         self.planner.start(now_us)
+        self.manual.replay(self.fleet.entries)
+        self.generation.is_held = not self.manual.is_automatic
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
@@ -132,6 +140,10 @@ class Vehicle:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Everybody's plans, reports, boxes and lanes; a central planner's order is as good as an award."""
         self.mirror.hear(message, now_us)
+        if isinstance(message, ManualOrder) and message.vehicle == self.fleet.node_id:
+            effects = self.manual.ordered(message, self.owned)
+            self.generation.is_held = not self.manual.is_automatic
+            return effects
         if isinstance(message, Assignment) and message.vehicle == self.fleet.node_id:
             return self.planner.assigned(message, now_us)
         if isinstance(message, CallForProposals):
@@ -175,6 +187,8 @@ class Vehicle:
         handler = self.body.handler
         if handler is not None and handler.box and self.fleet.tokens.holds(self._box_token(handler.box)):
             effects.append(Send(self._box_at(handler.box, ANY_STATION)))
+        if not self.manual.is_automatic:
+            effects.append(self.manual.told())
         return effects + self.fleet.tokens.statements()
 
     # --- motion -----------------------------------------------------------------------------------------------
@@ -216,6 +230,8 @@ class Vehicle:
         if move.mode is MoveMode.BLOCKED and not self._told_blocked:
             self._told_blocked = True
             return [Send(self.planner.report(owned, current, now_us, StepResult.BLOCKED))]
+        if not self.manual.may_begin(owned):
+            return []
         here = self.site.entities[move.entity]
         if here.kind is EntityKind.LANE and move.slot < here.capacity:
             return self._enter(move.entity, move.slot + 1, following, now_us)
@@ -255,6 +271,8 @@ class Vehicle:
     def _wanted_slots(self) -> list[TokenKey]:
         """The slot that comes next by the plan."""
         owned, move = self.owned, self.body.move
+        if owned is not None and not self.manual.may_begin(owned):
+            return []
         if owned is None or move is None or owned.current + 1 >= len(owned.plan.steps):
             return []
         here = self.site.entities[move.entity]
@@ -270,13 +288,12 @@ class Vehicle:
         return next((load for load in owned.plan.loads if step in (load.pick, load.put)), None)
 
     def _handle(self, action: Action, box: int, now_us: int) -> list[Effect]:
-        if self.body.is_handling or self._retry_at_us is not None:
+        owned = self.owned
+        if self.body.is_handling or self._retry_at_us is not None or owned is None or not self.manual.may_begin(owned):
             return []
         assert self.body.handler is not None
         if self.body.handler.gear is HandlerMode.FAILED and not self._may_retry:
             self._retry_at_us = now_us + RETRY_US
-            owned = self.owned
-            assert owned is not None
             return [Send(self.planner.report(owned, owned.current, now_us, StepResult.FAILED))]
         self._may_retry = False
         return self.body.handle(action, box, now_us)
@@ -320,7 +337,7 @@ class Vehicle:
             return self._done(owned, now_us)
         if handler.gear is not HandlerMode.FREE or self.body.is_handling:
             return self._handle(Action.UNDOCK, 0, now_us)
-        if self.body.is_moving:
+        if self.body.is_moving or not self.manual.may_begin(owned):
             return []
         steps = owned.plan.steps
         towards = steps[owned.current + 2].entity if owned.current + 2 < len(steps) else 0
