@@ -3,6 +3,7 @@
 import asyncio
 import json
 import tempfile
+import time
 from asyncio.subprocess import DEVNULL, PIPE
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,8 @@ class BoardDevice:
         self._machine = machine
         self._resources = resources
         self._bridges: list[Bridge] = []
+        #: Of this test alone: what a journal tells of another test's world is not so in this one.
+        self._journal = f"journal-{time.time_ns()}"
 
     async def open(self) -> None:
         """Join the simulated buses with the interfaces of this computer."""
@@ -48,7 +51,9 @@ class BoardDevice:
         """See ``Device``."""
         files = self._resources.files
         if files is not None:
-            text = machine_text(self._machine.name, "site.toml", files.fleet_bus, files.device_bus)
+            text = machine_text(
+                self._machine.name, "site.toml", files.fleet_bus, files.device_bus, journal=self._journal
+            )
             with tempfile.TemporaryDirectory(prefix="hil-") as name:
                 for file, content in (("machine.toml", text), ("site.toml", site_text)):
                     await asyncio.to_thread((Path(name) / file).write_text, content, encoding="utf-8")

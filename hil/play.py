@@ -7,6 +7,7 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from bus_sim.journal import WRITE_US
 from bus_sim.run import RunOptions, Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.bench import Bench, Capability, Target, TargetKind
@@ -19,6 +20,9 @@ from hil.scenarios.scenario import Scenario
 from hil.short_circuit import waiting_fault
 from hil.simulated_device import SimulatedDevice
 from hil.stage import Stage
+
+#: Journal entries that one machine may have waiting at the end; a bound for a broken one.
+MOST_WRITES = 1_000
 
 
 @dataclass(frozen=True)
@@ -96,7 +100,7 @@ async def _play(
     async with AsyncExitStack() as stack:
         stack.callback(simulation.close)
         device = await _open(simulation, target, directory)
-        stack.push_async_callback(_stop_fleet, simulation)
+        stack.push_async_callback(stop_fleet, simulation)
         stack.push_async_callback(device.close)
         if prepare is not None:
             prepare(device)
@@ -112,9 +116,16 @@ async def _play(
         return Outcome(failure, judgement, latencies_of(stage.said, target.machine.node_id))
 
 
-async def _stop_fleet(simulation: Simulation) -> None:
-    for controller in simulation.controllers.values():
+async def stop_fleet(simulation: Simulation) -> None:
+    """End every controller of a simulated fleet; what it has begun to write is written, and nothing new begins."""
+    controllers = list(simulation.controllers.values())
+    for controller in controllers:
+        controller.holon.halted = controller.holon.halted or "the test is over"
         await controller.stop()
+    for _ in range(MOST_WRITES):
+        if all(controller.is_idle for controller in controllers):
+            break
+        await asyncio.sleep(WRITE_US / 1e6)
 
 
 async def _open(simulation: Simulation, target: Target, directory: Path) -> Device:

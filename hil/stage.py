@@ -95,6 +95,10 @@ class Stage:
         """The present: what is said from now on has this place or a later one in ``said``."""
         return len(self.said)
 
+    def heard(self, kind: type[M], since: int = 0) -> list[Said[M]]:
+        """What anybody has said of one kind, on either bus, since a mark."""
+        return self._all(kind, since)
+
     def own(self, kind: type[M], since: int = 0) -> list[Said[M]]:
         """What the device has said of one kind, on the fleet bus, since a mark."""
         return [one for one in self._all(kind, since) if one.bus == FLEET and self._is_own(one.message)]

@@ -65,7 +65,8 @@ class Controller:
         """Leave both buses; pending journal writes are finished first."""
         if self._timer is not None:
             self._timer.cancel()
-        if self._writing is not None:
+        # A write that ends may begin the next one.
+        while self._writing is not None:
             await asyncio.wait([self._writing])
         await self.ports.fleet_bus.close()
         if self.ports.device_bus is not self.ports.fleet_bus:

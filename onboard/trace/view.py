@@ -199,6 +199,20 @@ class SiteView:
         _bound(self.tasks, TASK_LIMIT, lambda task: not task.is_waiting)
         return True
 
+    def own(self, reference: Reference, owner: int) -> None:
+        """Who has a task, 0 for nobody any more, where no award of a call tells it."""
+        if reference in self.tasks:
+            self.tasks[reference].owner = owner
+            self.tasks[reference].phase = TaskPhase.AWARDED if owner else TaskPhase.OPEN
+
+    def end(self, reference: Reference, time_us: int) -> None:
+        """A task is done, where no report tells it."""
+        task = self.tasks.get(reference)
+        if task is not None and task.phase not in TASKS_OVER:
+            task.phase = TaskPhase.DONE
+            self.done += 1
+            self.done_us += time_us - task.phase_us.get(TaskPhase.OPEN, time_us)
+
     def _on_bid(self, bid: Bid, time_us: int) -> None:
         self.bids += 1
         record = self.calls.get((bid.initiator, bid.call))

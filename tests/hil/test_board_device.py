@@ -67,8 +67,8 @@ def board(directory: Path, port: int, link: object) -> Path:
     home.mkdir()
     where = f'interface = "socketcand-asyncio"\nhost = "127.0.0.1"\nport = {port}\n'
     start = (
-        f"cd {home} && PYTHONPATH={ROOT} {sys.executable} -m onboard --machine machine.toml "
-        ">>console.log 2>&1 </dev/null & echo $! >pid"
+        f"cd {home} && {{ PYTHONPATH={ROOT} {sys.executable} -m onboard --machine machine.toml "
+        ">>console.log 2>&1 </dev/null & echo $! >pid; }"
     )
     stop = "test ! -f pid || kill -9 $(cat pid); rm -f pid"
     words = json.dumps
@@ -83,7 +83,7 @@ channel = "fleet"
 {where}[targets.device_bus]
 channel = "device"
 {where}[targets.power]
-on = ["sh", "-c", {words(start.replace(">pid", f">{home}/pid"))}]
+on = ["sh", "-c", {words(start)}]
 off = ["sh", "-c", {words(f"cd {home}; {stop}")}]
 [targets.files]
 install = ["cp", "{{directory}}/machine.toml", "{{directory}}/site.toml", {words(str(home))}]
@@ -110,7 +110,10 @@ def test_a_board_behind_interfaces_and_commands_works_in_the_simulated_fleet(tmp
     assert outcome.is_good, "\n".join(outcome.lines())
     assert not (tmp_path / "board" / "pid").exists(), "its power is cut when the test is over"
     assert (tmp_path / "board" / "site.toml").read_text() == (tmp_path / "bench.toml").read_text()
-    assert 'channel = "device"' in (tmp_path / "board" / "machine.toml").read_text()
+    machine = (tmp_path / "board" / "machine.toml").read_text()
+    assert 'channel = "device"' in machine
+    # A journal of its own for each test, as another test was another world.
+    assert [f'journal = "{entry.name}"' in machine for entry in (tmp_path / "board").glob("journal-*")] == [True]
 
 
 def test_error_counters_of_the_board_are_judged(tmp_path: Path, port: int) -> None:

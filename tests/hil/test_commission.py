@@ -13,6 +13,7 @@ from hil.commission.person import PersonGoneError
 from hil.commission.protocol import Protocol, Verdict
 from hil.commission.setting import Setting
 from hil.commission.walk import walk
+from hil.play import stop_fleet
 from onboard.config.site import parse_site
 from onboard.core.messages import DriveOrder, Message
 from onboard.core.site import Site
@@ -66,8 +67,7 @@ class Scene:
         self.spoke = [fleet, devices]
         protocol = Protocol(self.name, self.site.name, "2026-01-01 12:00:00+00:00")
         await walk(Setting(self.site, machine, Ears(fleet, codecs.fleet), Ears(devices, codecs.device), self, protocol))
-        for controller in self.simulation.controllers.values():
-            await controller.stop()
+        await stop_fleet(self.simulation)
         return protocol
 
     def switch_on(self) -> None:

@@ -13,6 +13,7 @@ from bus_sim.run import RunOptions, build
 from bus_sim.serve.socketcand import SocketcandServer
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.cli import main
+from hil.play import stop_fleet
 from onboard.config.site import parse_site
 from tests.hil.bench_files import BENCHES
 
@@ -59,8 +60,7 @@ async def play(directory: Path) -> tuple[int | None, str]:
                 simulation.start_controller(simulation.site.machines[11])
         status = await walk.wait()
     await server.close()
-    for controller in simulation.controllers.values():
-        await controller.stop()
+    await stop_fleet(simulation)
     return status, shown
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from onboard.core.authority import car_token
+from onboard.core.authority import car_token, station_token
 from onboard.core.codes import (
     ANY_STATION,
     DeskInput,
@@ -124,15 +124,30 @@ def test_the_giver_says_the_place_again_with_each_repeated_grant(is_restarted: b
     assert put_down() not in said(robot.wake(1_000_000))
 
 
+def test_rights_that_come_after_their_work_was_dropped_go_back_with_the_word_where_the_car_stands() -> None:
+    """A grant that is said again for long finds a robot that has given the task back: the car would be nobody's."""
+    robot = machine(ROBOT)
+    robot.sense(standing_at_home(robot), 10)
+    robot.receive(CarAt(BAY, CAR, PLACE, 1, WHEELBASE_MM), 20)
+    place = station_token(Station.from_number(PLACE))
+    got = said(robot.receive(TokenGrant(BAY, TokenKind.STATION, place.number, 1, ROBOT), 30))
+    assert TokenGrant(ROBOT, TokenKind.STATION, place.number, 2, BAY) in got
+    got = said(robot.receive(grant(2, BAY, ROBOT), 40))
+    assert got.index(put_down()) < got.index(grant(3))
+
+
+def standing_at_home(robot: Holon) -> DriveState:
+    home_mm = (robot.machine.home.index - 1) * SITE.tracks[1].pitch_mm
+    return DriveState(ROBOT, 0, home_mm, 0, DriveMode.STANDING, True)
+
+
 @pytest.mark.parametrize("has_gone_on", [False, True])
 def test_a_robot_killed_before_it_said_done_says_so_when_it_knows_where_it_is(has_gone_on: bool) -> None:
     entries: list[Entry] = [{"record": "handled", "task_origin": BAY, "task": 7, "handling": "leave", "station": PLACE}]
     if has_gone_on:
         entries.append({"record": "step", "phase": "reach", "handling": "take", "station": PLACE, "car": 1})
     robot = machine(ROBOT, entries)
-    home = SITE.machines[ROBOT].home
-    at_mm = robot.behaviour.carriage.axis.position_mm(home.index)  # type: ignore[attr-defined]  # the robot's own axis
-    standing = DriveState(ROBOT, 0, at_mm, 0, DriveMode.STANDING, True)
+    standing = standing_at_home(robot)
     effects = robot.sense(standing, 10)
     reports = [word for word in said(effects) if isinstance(word, TaskReport)]
     done = [word for word in reports if word.phase is TaskPhase.DONE]

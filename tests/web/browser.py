@@ -53,7 +53,7 @@ def served(words: list[str], folder: Path) -> Iterator[str]:
 
 def drawn(page: Page, what: str) -> dict[str, dict[str, Any]]:
     """What stands in the picture now, of one sort: boxes by their names or numbers."""
-    page.wait_for_function("document.querySelector('#picture').drawn !== undefined")
+    page.wait_for_function("() => document.querySelector('#picture').drawn !== undefined")
     boxes: list[dict[str, Any]] = page.evaluate("document.querySelector('#picture').drawn")
     return {str(box["id"]): box for box in boxes if box["what"] == what}
 

@@ -16,18 +16,31 @@ from onboard.trace.raw import RawFrame
 from onboard.trace.readers.open_log import Log
 from onboard.web.film import Film
 from onboard.wire.codec import Codecs, codecs
+from tests.mapd.sites import drawn, site_text
 
 ROOT = Path(__file__).parents[2]
 SITE_FILES = ROOT / "bus_sim" / "sites"
 #: What a site's run is asked for, where it is not its own day.
 _WORDS = {"small": ["--one-car", "60"], "turning": ["--for", "900"]}
+#: Where no site of a system ships, one that is made for tests.
+_MADE = {"mapd": lambda: site_text(4, drawn(8, 5))}
+
+
+@cache
+def file_of(name: str) -> Path:
+    """The site file of a shipped site, or of one that is made."""
+    if name not in _MADE:
+        return SITE_FILES / f"{name}.toml"
+    path = Path(mkdtemp(prefix="film-")) / f"{name}.toml"
+    path.write_text(_MADE[name](), encoding="utf-8")
+    return path
 
 
 @cache
 def log_of(name: str) -> Path:
     """The log of a run of a shipped site, device buses included."""
     path = Path(mkdtemp(prefix="film-")) / "run.log"
-    words = ["run", name, *_WORDS.get(name, []), "--trace", str(path), "--devices"]
+    words = ["run", str(file_of(name)), *_WORDS.get(name, []), "--trace", str(path), "--devices"]
     # In a process of its own: a browser's loop may run in this one.
     words = [sys.executable, "-m", "bus_sim.cli", *words]
     assert subprocess.run(words, env=environment(), capture_output=True, check=False).returncode in (0, 1)
@@ -47,7 +60,7 @@ def contract(site: Site) -> Codecs:
 
 def film_of(name: str, path: Path | None = None, *, fleet_only: bool = False) -> Film:
     """The film of a run; ``fleet_only`` as one sees it who hears no device bus."""
-    site = find_site(name)
+    site = find_site(str(file_of(name)))
     film = Film(site, contract(site))
     with Log(str(path or log_of(name))) as log:
         film.read(raw for raw in log if not fleet_only or raw.channel == "fleet")
@@ -57,7 +70,7 @@ def film_of(name: str, path: Path | None = None, *, fleet_only: bool = False) ->
 @cache
 def said_in(name: str) -> list[tuple[int, bool, Message]]:
     """All messages of a run: time in us of the log, whether it was the fleet bus, and what."""
-    listener, found = Listener(contract(find_site(name))), []
+    listener, found = Listener(contract(find_site(str(file_of(name))))), []
     with Log(str(log_of(name))) as log:
         for raw in log:
             heard = listener.hear(raw)

@@ -2,7 +2,9 @@
 
 import asyncio
 import json
+from collections.abc import Iterator
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -11,14 +13,15 @@ from bus_sim.sites import find_site
 from onboard.cli import main as onboard
 from onboard.core.messages import Heartbeat
 from onboard.trace.frame_bits import frame_bits
+from onboard.trace.raw import RawFrame
 from onboard.trace.readers.open_log import Log
 from onboard.web import film as films
 from onboard.web.app import CommandError
 from onboard.web.film import Film
 from onboard.web.live import LogSource
-from tests.web.logs import contract, film_of, frames_of, log_of
+from tests.web.logs import contract, file_of, film_of, frames_of, log_of
 
-SITES = ("small", "terminal", "graph", "cell", "turning")
+SITES = ("small", "terminal", "graph", "cell", "turning", "mapd")
 
 
 def shown(film: Film, time_us: int) -> dict[str, Any]:
@@ -78,6 +81,24 @@ def test_a_machine_that_says_nothing_any_more_is_silent() -> None:
                     picture.feed(Heartbeat(node, 1, site.digest, 0, 1, site.machines[node].kind, state), later_us)
         states = {node: one["state"] for node, one in picture.snapshot()["machines"].items()}
     assert states[11] == "silent" and {state for node, state in states.items() if node != 11} == {"idle"}
+
+
+@pytest.mark.parametrize("name", SITES)
+def test_frames_that_somebody_has_garbled_break_no_picture(name: str) -> None:
+    """Whatever numbers they hold: of machines, places, steps or tasks that this site does not have."""
+    chance, site = Random(f"garbled:{name}"), find_site(str(file_of(name)))
+
+    def garbled() -> Iterator[RawFrame]:
+        for number, raw in enumerate(frames_of(name)[:1_500]):
+            data = bytes(byte if chance.random() < 0.7 else chance.randrange(256) for byte in raw.data)
+            yield raw._replace(data=data if number % 3 else raw.data)
+
+    with Film(site, contract(site)) as film:
+        film.read(garbled())
+        for number in range(12):
+            time_us = film.first_us + (film.last_us - film.first_us) * number // 11
+            assert json.loads(json.dumps(film.show(time_us).snapshot()))["now_us"] == time_us
+            film.show(time_us).figures()
 
 
 def test_a_log_of_another_site_is_refused(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from onboard.core.codes import TaskPhase
 from onboard.core.messages import Message, TaskReport
 from onboard.kinds.cell.messages import ArmState, PartAt
 from onboard.kinds.graph.messages import BodyPlace, BodyState
+from onboard.kinds.mapd.messages import StepState
 from onboard.kinds.terminal.messages import MoveState
 from onboard.kinds.terminal.site import EntityKind, Terminal
 from onboard.kinds.turning.messages import NcState
@@ -155,6 +156,29 @@ def test_lathes_have_made_what_their_controls_count() -> None:
                 words, control = snapshot["machines"][node]["where"], last(said, NcState, node, time_us)
                 if words.startswith("turning"):
                     assert control.parts == int(words.split()[1])
+
+
+def test_robots_of_a_floor_are_in_the_cells_that_they_tell_and_what_they_serve_is_done() -> None:
+    said = said_in("mapd")
+    with film_of("mapd", fleet_only=True) as film:
+        layout = film.show(film.first_us).layout()
+        names = {one["name"]: one["points"] for one in layout["plan"]["shapes"]}
+        assert len(names) == 42, "cells of the map that are free"
+        for time_us, snapshot in moments(film, 1_000_000):
+            for node in (11, 12, 13, 14):
+                state, told = last(said, StepState, node, time_us), snapshot["machines"][node]
+                if state is None:
+                    continue
+                row, column = divmod(state.cell, 10)
+                assert told["where"] == f"{row},{column}, step {state.step}"
+                assert told["car"] == (str(state.task) if state.loaded else None)
+                owners = [one["owner"] for one in snapshot["tasks"] if one["owner"]]
+                assert len(owners) == len(set(owners)), "a robot has one task at a time"
+                ((x0, y0), (x1, y1)) = names[f"{row},{column}"]
+                assert x0 < told["path"][-1][0] < x1 and y0 < told["path"][-1][1] < y1
+        end = film.show(film.last_us).snapshot()
+    assert end["figures"]["done"] == sum(isinstance(one, StepState) and one.served for _, _, one in said) == 8
+    assert end["tasks"] == [] and end["things"] == []
 
 
 @pytest.mark.parametrize("name", ["terminal", "graph", "cell", "turning"])

@@ -7,9 +7,9 @@ car's token only when it has heard from the giver that the car stands there; its
 knows the token.
 """
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 
-from onboard.core.authority import car_token
+from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Send
@@ -89,3 +89,21 @@ def before_taking(fleet: Fleet, grant: TokenGrant) -> list[Effect] | None:
     said = CarAt(fleet.node_id, car_of(grant), record.station, grant.version, record.wheelbase_mm)
     fleet.mirror.on_car(said)
     return [car_record(said)]
+
+
+def give_back(fleet: Fleet, needed: Container[TokenKey], now_us: int) -> list[Effect]:
+    """Return rights to stations and cars that no work of mine needs: their grants came after the work was dropped.
+
+    A car goes with the word where it stands; one that is aboard, or that nobody has told of, is kept.
+    """
+    effects: list[Effect] = []
+    for key in [key for key in fleet.tokens.held if key.kind is not TokenKind.SEGMENT and key not in needed]:
+        if key.kind is TokenKind.STATION:
+            effects += fleet.tokens.give(key, keeper(fleet.site, Station.from_number(key.number)), now_us)
+            continue
+        car = Reference(key.number >> 16, key.number & 0xFFFF)
+        station, record = fleet.mirror.car_station(car), fleet.mirror.cars.get(car)
+        if station is not None and record is not None:
+            effects += state(fleet, car, station.number, record.wheelbase_mm)
+            effects += fleet.tokens.give(key, keeper(fleet.site, station), now_us)
+    return effects

@@ -16,6 +16,7 @@ from onboard.core.lifts import gate, lift_at
 from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
 from onboard.core.occupancy import itinerary_windows
 from onboard.core.site import Segment
+from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.program import Handling, Program, Step, Work, to_itinerary
@@ -46,6 +47,7 @@ class GoingAround:
     #: Whether the drive does not do what it is told.
     is_stuck: bool = False
     _seen: int = 0
+    _tokens_seen: int = -1
     _admissions: int = 0
     _since_us: int | None = None
     _retry_at_us: int | None = None
@@ -66,7 +68,7 @@ class GoingAround:
 
     def advance(self, now_us: int) -> list[Effect]:
         """Look whether the plan leads through an obstacle, where anything about them has changed."""
-        effects = self.say_again(now_us)
+        effects = self.say_again(now_us) + self._return_rights(now_us)
         if self.fleet.admissions != self._admissions:
             self._admissions = self.fleet.admissions
             self._since_us = self._retry_at_us = now_us
@@ -142,6 +144,18 @@ class GoingAround:
                 # Who waits aboard for its lift plans no further than off it: more would stand in the way of others.
                 self._cut_behind_ride()
         return self.take_up(kept, steps, works, now_us)
+
+    def _return_rights(self, now_us: int) -> list[Effect]:
+        """Give back what was granted for work that is dropped; looked for where tokens have moved."""
+        if self.fleet.tokens.changes == self._tokens_seen:
+            return []
+        works, at_hand = self.program.works(), self.shuttle.work
+        if at_hand is not None and self.shuttle.phase is not Phase.DONE:
+            works.append(at_hand)
+        needed = {key for work in works for key in (station_token(work.station), car_token(*work.car))}
+        effects = custody.give_back(self.fleet, needed, now_us)
+        self._tokens_seen = self.fleet.tokens.changes
+        return effects
 
     def _cut_behind_ride(self) -> None:
         steps = self.program.remaining[:2]

@@ -73,7 +73,8 @@ class GraphScene:
 
     def _on_robot(self, at: RobotAt, time_us: int) -> None:
         robot = self._robots[at.sender]
-        if at.node not in self._spots:
+        length = self._lengths.get(frozenset((at.behind, at.node)))
+        if at.node not in self._spots or (at.on_edge and length is None):
             return
         is_news = (at.node, at.behind, at.on_edge) != (robot.node, robot.behind, robot.is_on_edge)
         robot.node, robot.behind, robot.is_on_edge = at.node, at.behind, at.on_edge
@@ -82,7 +83,6 @@ class GraphScene:
         robot.goal = at.goal
         if not is_news:
             return
-        length = self._lengths.get(frozenset((at.behind, at.node)))
         if at.on_edge and length is not None:
             # The edge is told when the robot is on it; its line before the node is where it waits to be let in.
             share = max(0.1, 1 - self.site.approach_mm / length / 2)

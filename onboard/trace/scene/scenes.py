@@ -4,11 +4,13 @@ from onboard.core.messages import Message, Reference
 from onboard.core.site import Site
 from onboard.kinds.cell.site import Cell
 from onboard.kinds.graph.site import FactoryGraph
+from onboard.kinds.mapd.site import Mapd
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.turning.site import Turning
 from onboard.trace.scene.car_park import CarParkScene
 from onboard.trace.scene.cell import CellScene
 from onboard.trace.scene.graph import GraphScene
+from onboard.trace.scene.mapd import MapdScene
 from onboard.trace.scene.scene import Json, Scene
 from onboard.trace.scene.terminal import TerminalScene
 from onboard.trace.scene.turning import TurningScene
@@ -60,6 +62,8 @@ def scene_of(site: Site, view: SiteView) -> Scene:
             return GraphScene(site, view)
         case Cell():
             return CellScene(site, view)
+        case Mapd():
+            return MapdScene(site, view)
         case Turning():
             return TurningScene(site, view)
     return CarParkScene(site, view) if site.tracks else PlainScene()

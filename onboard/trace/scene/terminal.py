@@ -121,7 +121,7 @@ class TerminalScene:
         match message:
             case PlanHead():
                 self._on_head(message, time_us)
-            case PlanStep() if body.version == message.version:
+            case PlanStep() if body.version == message.version and message.entity in self.site.entities:
                 body.steps[message.step] = message
                 if message.step == body.current:
                     self._go(message.sender, body, time_us)

@@ -95,6 +95,11 @@ export class Plan {
       }
       if (one.kind === "lane") this.arrow(pen, one.points);
       pen.lineCap = "butt";
+    } else if (one.kind === "point") {
+      pen.fillStyle = css("--dim");
+      pen.beginPath();
+      pen.arc(this.x(one.points[0][0]), this.y(one.points[0][1]), Math.max(1.5, 4 * this.scale), 0, 7);
+      pen.fill();
     } else if (one.kind === "node") {
       pen.fillStyle = css("--card");
       pen.strokeStyle = css("--dim");
@@ -105,7 +110,11 @@ export class Plan {
       pen.stroke();
     } else {
       const box = this.box(one);
-      pen.strokeStyle = css(one.kind === "station" ? "--bay" : one.kind === "card" ? "--dim" : "--line");
+      if (one.kind === "cell") {
+        pen.fillStyle = css("--free");
+        return pen.fillRect(box.x, box.y, box.w, box.h);
+      }
+      pen.strokeStyle = css(one.kind === "station" || one.kind === "endpoint" ? "--bay" : one.kind === "card" ? "--dim" : "--line");
       pen.fillStyle = css(one.kind === "obstacle" ? "--line" : one.kind === "station" || one.kind === "card" ? "--card" : "--ground");
       pen.fillRect(box.x, box.y, box.w, box.h);
       pen.strokeRect(box.x, box.y, box.w, box.h);
@@ -164,6 +173,8 @@ export class Plan {
       const y = this.y((y0 + y1) / 2);
       pen.fillText(one.name, x + Math.cos(across) * size * 1.5, y + Math.sin(across) * size * 1.2);
       this.hits.push({ x: x - 14, y: y - 14, w: 28, h: 28, what: "shape", id: one.id });
+    } else if (one.kind === "cell" || one.kind === "endpoint") {
+      this.hits.push({ ...this.box(one), what: "shape", id: one.id });
     } else if (one.kind === "area") {
       const box = this.box(one);
       pen.textAlign = "left";
