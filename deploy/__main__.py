@@ -8,6 +8,7 @@ from pathlib import Path
 import onboard
 from deploy.archive import build_archive
 from deploy.fleet import write_fleet
+from deploy.image.root import build_root
 from deploy.package import build_package
 from deploy.wheels import DeployError
 from onboard.config.problems import ConfigError
@@ -20,6 +21,7 @@ exit status:
 examples:
   python -m deploy archive                 dist/onboard.pyz, which any Python 3.11 or newer runs
   python -m deploy deb                     a Debian package with the service
+  sudo python -m deploy root               the root file system for 64-bit ARM boards, its kernel and its digest
   python -m deploy machines mysite.toml    dist/machines/NAME/, the files for every board's boot partition
 """
 
@@ -38,6 +40,8 @@ def build_parser() -> argparse.ArgumentParser:
     deb = commands.add_parser("deb", help="a Debian package of it, with the systemd service")
     name = f"dist/onboard-fleet_{onboard.__version__}_all.deb"
     deb.add_argument("--out", type=Path, default=Path(name), metavar="FILE")
+    root = commands.add_parser("root", help="kernel and read-only root file system for 64-bit ARM boards")
+    root.add_argument("--out", type=Path, default=Path("dist/root"), metavar="DIR")
     machines = commands.add_parser("machines", help="the machine files of a whole fleet")
     machines.add_argument("site", type=Path, help="site file (docs/site-file.md)")
     machines.add_argument("--out", type=Path, default=Path("dist/machines"), metavar="DIR")
@@ -66,9 +70,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _build(args: argparse.Namespace) -> list[Path]:
+def _build(args: argparse.Namespace) -> list[Path | str]:
+    if args.command == "root":
+        made = build_root(args.out)
+        return [made.kernel, made.initrd, made.squashfs, f"sha256 {made.digest}"]
     if args.command == "machines":
-        return write_fleet(args.site, args.out, args.fleet, args.device)
+        return [*write_fleet(args.site, args.out, args.fleet, args.device)]
     args.out.parent.mkdir(parents=True, exist_ok=True)
     return [build_archive(args.out) if args.command == "archive" else build_package(args.out)]
 

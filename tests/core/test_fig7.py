@@ -14,7 +14,6 @@ import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.kinematics import run_duration_us
-from onboard.core.lift_itineraries import Ride, lift_itineraries
 from onboard.core.lift_uses import are_compatible, ride_us
 from onboard.core.messages import Itinerary, Leg, Stamp
 from onboard.core.occupancy import itinerary_windows, lift_uses
@@ -22,6 +21,7 @@ from onboard.core.reservations import FOREVER, Reservations, Window
 from onboard.core.sipp import Route, RouteLeg, Visit, plan_route
 from onboard.core.site import Axis, Segment, Site
 from tests.core.buildings import LEFT, RIGHT, building
+from tests.core.lift_itineraries import Ride, lift_itineraries
 
 PLACES = 16
 PITCH_MM, FLOOR_MM = 2_400, 2_500

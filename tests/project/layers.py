@@ -128,7 +128,7 @@ LAYERS: dict[str, Layer] = {
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
-    "deploy": Layer(("onboard", "onboard.config", *CORE_TYPES)),
+    "deploy": Layer(("onboard", "onboard.config", *CORE_TYPES, "hil.guest.initrd", "hil.guest.kernel"), ("pytest",)),
     # A bench starts the programs themselves.
     "hil": Layer(("onboard", "onboard.cli", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
 }
