@@ -4,8 +4,12 @@ from dataclasses import dataclass
 
 from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
-from onboard.core.effects import Effect
+from onboard.core.effects import Effect, Send
 from onboard.core.lifts import gate, platform
+from onboard.core.messages import SyncRequest
+
+#: Who holds the gate and has not heard where the lift stands asks for it after so long, and again, us. Ours.
+ASK_AGAIN_US = 1_000_000
 
 
 @dataclass
@@ -17,11 +21,13 @@ class Riding:
     leave: int = 0
     done: bool = True
     _gate_returned: bool = False
+    _ask_at_us: int | None = None
 
     def begin(self, lift_track: int, leave: int) -> list[Effect]:
         """The carrier stands on the platform."""
         self.lift_track, self.leave = lift_track, leave
         self.done = self._gate_returned = False
+        self._ask_at_us = None
         return []
 
     def advance(self, now_us: int) -> list[Effect]:
@@ -40,4 +46,10 @@ class Riding:
         # The grant alone would do; the lift's own word for where it stands makes a wrong floor impossible to miss.
         seen = self.fleet.mirror.progress.get(lift)
         self.done = seen is not None and seen.index == self.leave and seen.speed_mm_s == 0
-        return []
+        due_us = now_us + ASK_AGAIN_US if self._ask_at_us is None else self._ask_at_us
+        if self.done or now_us < due_us:
+            self._ask_at_us = due_us
+            return []
+        # It grants the gate where it stands: its word was lost, and by itself it says it only once.
+        self._ask_at_us = now_us + ASK_AGAIN_US
+        return [Send(SyncRequest(self.fleet.node_id, lift))]
