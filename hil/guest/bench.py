@@ -8,19 +8,20 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from hil.guest.initrd import WORK
 from hil.guest.mesh import Mesh, inside, join_pair
 
 #: The device's namespace and the fleet's; the third node acknowledges, and is where a person would listen.
 DEVICE, FLEET, TOOLS = "MR1", "fleet", "tools"
-#: The device's own files; in the guest's memory, as it writes a journal.
-HOME = Path("/run/work/board")
+#: The device's own files, in the guest's memory, as it writes a journal; ``$HOME/board`` to benches/guest.toml.
+BOARD = Path(WORK) / "board"
 BENCH = Path(__file__).parents[1] / "benches" / "guest.toml"
 
 
 def main(words: Sequence[str]) -> None:
     """Make the buses, and become pytest in the fleet's namespace."""
     share, *options = words
-    HOME.mkdir(parents=True)
+    BOARD.mkdir(parents=True)
     Mesh([DEVICE, FLEET, TOOLS])
     join_pair(FLEET, f"d{DEVICE}", DEVICE, "can1")
     os.environ["PYTHON"] = sys.executable

@@ -9,6 +9,8 @@ from hil.guest.kernel import Kernel
 BUSYBOX = Path("/bin/busybox")
 #: Where the guest finds the folder that it shares with the host, for its script and its results.
 SHARE = "/run/share"
+#: The guest's own memory and its home: what a script leaves here ends with the guest.
+WORK = "/run/guest"
 
 #: Virtual file systems are mounted below the new root; the host's own files are the lower, read-only layer.
 _INIT = """\
@@ -31,10 +33,10 @@ $b mkdir -p /new/dev/pts /new/dev/shm
 $b mount -t devpts devpts /new/dev/pts
 $b mount -t tmpfs shm /new/dev/shm
 $b mount -t tmpfs run /new/run
-$b mkdir -p @SHARE@ /new@SHARE@ /new/run/netns /new/run/work
+$b mkdir -p @SHARE@ /new@SHARE@ /new/run/netns /new@WORK@
 $b mount -t 9p -o $options share /new@SHARE@ || echo "guest: no share"
-export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/run/work LANG=C.UTF-8
-$b chroot /new /bin/sh -c 'cd /run/work && exec /bin/sh @SHARE@/script' > /new@SHARE@/output 2>&1 < /dev/null
+export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=@WORK@ LANG=C.UTF-8
+$b chroot /new /bin/sh -c 'cd @WORK@ && exec /bin/sh @SHARE@/script' > /new@SHARE@/output 2>&1 < /dev/null
 $b echo $? > /new@SHARE@/status
 $b sync
 $b reboot -f
@@ -48,7 +50,7 @@ def build_initrd(kernel: Kernel, to: Path) -> Path:
         ("bin", 0o040755, b""),
         ("modules", 0o040755, b""),
         ("bin/busybox", 0o100755, BUSYBOX.read_bytes()),
-        ("init", 0o100755, _INIT.replace("@SHARE@", SHARE).encode()),
+        ("init", 0o100755, _INIT.replace("@SHARE@", SHARE).replace("@WORK@", WORK).encode()),
         ("modules/order", 0o100644, "".join(f"{file.name}\n" for file in order).encode()),
         *((f"modules/{file.name}", 0o100644, file.read_bytes()) for file in order),
     ]

@@ -16,6 +16,7 @@ from pathlib import Path
 from bus_sim.cli import main as bus_sim
 from hil.guest.ears import Ears, NotHeardError
 from hil.guest.forked import Forked, Main
+from hil.guest.initrd import WORK
 from hil.guest.mesh import Mesh, hand_out_boards, inside, join_pair, run
 from onboard.cli import main as onboard
 from onboard.config.site import parse_site
@@ -26,7 +27,7 @@ from onboard.wire.codec import codecs
 #: Further nodes of the fleet bus: the simulated plant, which only listens there, and the tools of a person.
 PLANT, TOOLS = "plant", "tools"
 #: The guest's own memory: a journal is synchronised after every entry.
-JOURNALS = "/run/work/journals"
+JOURNALS = f"{WORK}/journals"
 #: A receive buffer of 8 MiB: the emulated processor is late at times.
 _CANDUMP = ("candump", "-L", "-r", "8388608")
 

@@ -12,9 +12,9 @@ from typing import Protocol
 from onboard.core.authority import TokenBook, TokenKey, car_token
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect
-from onboard.core.messages import Message
+from onboard.core.messages import CallForProposals, Message
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent
+from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.petitions import Petitions
 from onboard.core.site import Machine, Site
 
@@ -91,6 +91,22 @@ class BehaviourFactory(Protocol):
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """The machine's steps."""
+
+
+class NoEstimator:
+    """The task-generation function of a machine that bids for nothing: a desk, a host of node agents."""
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """Asked for in vain: whoever has no lower bound has no floor either."""
+        return 0
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """None: it can do nothing."""
+        return None
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        """None: it can do nothing."""
+        return None
 
 
 @dataclass

@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 from onboard.config.site import parse_site
 from onboard.core.all_or_none import AllOrNone
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
 from onboard.core.effects import Effect, Halt, Record, Send
 from onboard.core.holon import Holon
 from onboard.core.messages import (
-    CallForProposals,
     DriveState,
     Itinerary,
     Leg,
@@ -27,7 +26,7 @@ from onboard.core.messages import (
     TokenRequest,
 )
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Estimator, NegotiationEvent, Proposal
+from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.car_park.travel import ORDER_PATIENCE_US
@@ -62,19 +61,6 @@ home = "p(1,12)"
     "walk.toml",
     crowded=True,
 )
-
-
-class NoEstimator:
-    """Walkers are never called."""
-
-    def floor(self, call: CallForProposals, now_us: int) -> int:
-        return 0
-
-    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
-        return None
-
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        return None
 
 
 @dataclass

@@ -12,14 +12,13 @@ import pytest
 from bus_sim.run import BusRun, RunOptions, buses_of
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.behaviour import Fleet, Plain
+from onboard.core.behaviour import Fleet, NoEstimator, Plain
 from onboard.core.codes import Criterion, KindCode, Operation, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import NO_REFERENCE, Award, Bid, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Segment, Site
-from onboard.kinds.cell.desk import NoEstimator
 from onboard.kinds.registry import System, add_system, remove_system
 
 PAGE = Path(__file__).parents[2] / "docs" / "new-kind.md"

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from hil.guest.initrd import SHARE, WORK
 from hil.guest.machine import GuestRun, run_guest
 from tests.io.test_conformance import VIRTUAL
 from tests.qemu.guest import ROOT, once, require_guest
@@ -15,7 +16,7 @@ LIMIT_S = 230.0
 
 def conform(share: Path) -> GuestRun:
     share.mkdir()
-    words = "-q -p no:cacheprovider -p no:xdist --basetemp=/run/work/pytest --junitxml=/run/share/junit.xml"
+    words = f"-q -p no:cacheprovider -p no:xdist --basetemp={WORK}/pytest --junitxml={SHARE}/junit.xml"
     script = (
         f"export PYTHONPATH={ROOT} PYTHONDONTWRITEBYTECODE=1\ncd {ROOT}\n"
         f"{sys.executable} -m pytest {words} tests/qemu/guest_conformance.py\nexit 0\n"

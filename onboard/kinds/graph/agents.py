@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from zlib import crc32
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import CallForProposals, Heartbeat, Message, TokenGrant
+from onboard.core.messages import Heartbeat, Message, TokenGrant
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Estimator, NegotiationEvent, Proposal
+from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Site
 from onboard.kinds.graph.messages import (
     NO_NODE,
@@ -32,22 +32,6 @@ from onboard.kinds.graph.site import FactoryGraph
 PROMISE_US = 3_000_000
 #: A robot that waits and has not been heard so long has another way, us. Ours.
 WAITING_US = 6_000_000
-
-
-class NoEstimator:
-    """Neither node agents nor desks have anything to offer."""
-
-    def floor(self, call: CallForProposals, now_us: int) -> int:
-        """Never asked for."""
-        return 0
-
-    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
-        """None: it can do nothing."""
-        return None
-
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """None: it can do nothing."""
-        return None
 
 
 class HostFactory:

@@ -4,14 +4,13 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Closed, Estimator, NegotiationEvent
 from onboard.core.site import Machine, Site
-from onboard.kinds.graph.agents import NoEstimator
 from onboard.kinds.graph.messages import VisitAnswer, VisitKey, VisitList, VisitResult, five, stops_of
 from onboard.kinds.graph.planning import call_terms
 

@@ -7,12 +7,12 @@ whoever plans to carry it.
 from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import CallResult, Criterion, KindCode, MachineState, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import CallForProposals, CarAt, Heartbeat, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent, Proposal
+from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.kinds.terminal.messages import (
@@ -41,23 +41,11 @@ MANUAL_AGAIN_US = 1_000_000
 LOST_US = 120_000_000
 
 
-class DeskGeneration:
+class DeskGeneration(NoEstimator):
     """A desk does no transports; it holds the picture of the terminal."""
 
     def __init__(self, mirror: TerminalMirror) -> None:
         self.mirror = mirror
-
-    def floor(self, call: CallForProposals, now_us: int) -> int:
-        """Nothing that a desk could bid for."""
-        return 0
-
-    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
-        """It cannot."""
-        return None
-
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """It cannot."""
-        return None
 
 
 class DeskFactory:

@@ -103,8 +103,8 @@ class VehicleGeneration:
         began = kept.end if kept is not None else left.begin
         # Where others will be without what is planned now.
         alone = copy_of(traffic)
-        stub = kept if kept is not None else replace(left, steps=left.steps[:1], loads=())
-        alone.take_up(replace(stub, version=left.version), now_us)
+        begun = kept if kept is not None else replace(left, steps=left.steps[:1], loads=())
+        alone.take_up(replace(begun, version=left.version), now_us)
         search = self.search(now_us, alone)
         for load in loads:
             source = left.steps[load.pick].entity if load.pick < len(left.steps) else 0

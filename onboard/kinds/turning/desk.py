@@ -5,12 +5,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
-from onboard.core.messages import CallForProposals, Message, Reference, SyncRequest, TaskReport
+from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Closed, Estimator, NegotiationEvent, Proposal
+from onboard.core.negotiation import Closed, Estimator, NegotiationEvent
 from onboard.core.site import Machine, Site
 from onboard.kinds.turning.generation import call_terms
 from onboard.kinds.turning.lathe import Job
@@ -48,22 +48,6 @@ class Order:
     calls: int = 0
     answer_at_us: int | None = None
     ask_at_us: int | None = None
-
-
-class NoEstimator:
-    """A desk turns nothing."""
-
-    def floor(self, call: CallForProposals, now_us: int) -> int:
-        """Never asked for: no call is for desks."""
-        return 0
-
-    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
-        """None: it can do nothing."""
-        return None
-
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """None: it can do nothing."""
-        return None
 
 
 class DeskFactory:

@@ -4,6 +4,7 @@
 overhangs its sill.
 """
 
+from abc import abstractmethod
 from collections.abc import Callable
 
 from onboard.core.codes import DriveMode, KindCode
@@ -43,9 +44,9 @@ class _LiftRule(Rule):
         if track is not None:
             self._moves(event, track, event.message.sender, "is sent")
 
+    @abstractmethod
     def _moves(self, event: Event[Message], track: int, node: int, how: str) -> None:
         """A lift moves, or is about to."""
-        raise NotImplementedError
 
     def _track(self, node: int) -> int | None:
         if self.picture.kind(node) is not KindCode.LIFT:

@@ -1,5 +1,6 @@
 """The base of all rules: what they are called, where they come from, which messages they want to see."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
@@ -11,7 +12,7 @@ from onboard.trace.check.picture import Picture
 Handlers = Mapping[type[Message], Callable[[Any], None]]
 
 
-class Rule:
+class Rule(ABC):
     """One rule over one run. ``handlers`` says which messages it sees; ``tick`` lets it see time pass.
 
     ``needs_site``: it cannot be judged without the site file. ``undisturbed``: it holds only where no frame was lost or
@@ -32,15 +33,17 @@ class Rule:
         self.picture = picture
         self._report = report
 
+    @abstractmethod
     def handlers(self) -> Handlers:
         """Message class to handler. A handler sees the picture as it was before the event."""
-        raise NotImplementedError
 
     def tick(self, now_us: int) -> None:
-        """About once a second of the log's time: what should have happened by now."""
+        """About once a second of the log's time: what should have happened by now; for most rules nothing."""
+        return
 
     def finish(self, now_us: int) -> None:
-        """The log ends, or another run begins."""
+        """The log ends, or another run begins; most rules have said all by then."""
+        return
 
     def find(self, event: Event[Any], machines: tuple[int, ...], what: str) -> None:
         """Report what an event shows."""
