@@ -13,6 +13,15 @@ SUITE = "bookworm"
 _BUILD_S = 3_600
 #: apt's settings that decide whether a mirror can be reached. Its hooks stay on the host.
 _TRANSPORT = re.compile(r"Acquire::(https?|ftp|tor|Check-|Retries|Force|Proxy|AllowInsecure)", re.IGNORECASE)
+#: Of tools that are not called as their packages are.
+_PACKAGES = {
+    "mksquashfs": " (apt-get install squashfs-tools)",
+    "unsquashfs": " (apt-get install squashfs-tools)",
+    "mcopy": " (apt-get install mtools)",
+    "mkfs.vfat": " (apt-get install dosfstools)",
+    "mkfs.ext4": " (apt-get install e2fsprogs)",
+    "depmod": " (apt-get install kmod)",
+}
 
 
 class Apt:
@@ -53,21 +62,26 @@ class Apt:
         return "".join(f"{line}\n" for line in said if _TRANSPORT.match(line) and not line.endswith(' "";'))
 
 
-def run_tool(words: Sequence[str], folder: Path | None = None, **environment: str) -> str:
-    """What a tool said; it runs with the system's own folders in its path. Raises ``DeployError``."""
+def run_tool(words: Sequence[str], folder: Path | None = None, source: Path | None = None, **environment: str) -> str:
+    """What a tool said; it runs with the system's own folders in its path, and reads ``source``.
+
+    Raises ``DeployError``.
+    """
     path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
     try:
-        done = subprocess.run(
-            words,
-            cwd=folder,
-            env={**os.environ, "PATH": path, **environment},
-            capture_output=True,
-            text=True,
-            timeout=_BUILD_S,
-            check=False,
-        )
+        with (source or Path(os.devnull)).open("rb") as given:
+            done = subprocess.run(
+                words,
+                cwd=folder,
+                env={**os.environ, "PATH": path, **environment},
+                stdin=given,
+                capture_output=True,
+                text=True,
+                timeout=_BUILD_S,
+                check=False,
+            )
     except FileNotFoundError:
-        raise DeployError(f"{words[0]} is not installed") from None
+        raise DeployError(f"{words[0]} is not installed{_PACKAGES.get(words[0], '')}") from None
     if done.returncode:
         last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
         raise DeployError(f"{words[0]}: {last}")

@@ -4,7 +4,6 @@ import hashlib
 import io
 import re
 import shutil
-import subprocess
 import tarfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,16 +14,14 @@ from deploy.image.debian import EPOCH_S, STORE, Debian, fetch_debian
 from deploy.image.disk import SIGNATURE
 from deploy.image.layer import build_layer
 from deploy.image.release import Release
-from deploy.wheels import DeployError
+from deploy.image.squash import make_squashfs
 from hil.guest.initrd import newc
 from hil.guest.kernel import Kernel
 
 #: Who the controller is; the number is the image's own.
 USER, USER_ID = "onboard", 900
 #: Modules that lead to the root file system on emulated machines and on SD cards.
-_FIRST_MODULES = ("virtio_pci", "virtio_blk", "sdhci_iproc", "bcm2835", "mmc_block", "squashfs", "ext4")
-#: A fifth larger than at the highest level, and made in a tenth of the time.
-LEVEL = "3"
+_FIRST_MODULES = ("virtio_pci", "virtio_blk", "sdhci_iproc", "bcm2835", "squashfs", "ext4")
 #: What came with the making of the archive and says nothing.
 _LEFT_OUT = re.compile(
     r"\./(var/cache/apt/|var/lib/apt/lists/|var/log/|dev/|etc/\.pwd\.lock$|var/cache/ldconfig/|etc/apt/(sources\.list|apt\.conf\.d/99mmdebstrap)).*"
@@ -92,7 +89,7 @@ def build_root(to: Path, release: Release, store: Path = STORE) -> Root:
     with tarfile.open(merged, "w", format=tarfile.GNU_FORMAT) as archive:
         for entry, content in _merged(debian.base, layer):
             archive.addfile(entry, content)
-    _squash(merged, squashfs)
+    make_squashfs(merged, squashfs)
     merged.unlink()
     shutil.rmtree(layer)
     kernel = _kernel(debian)
@@ -145,25 +142,6 @@ def _edited(name: str, text: bytes) -> bytes:
             return re.sub(rb"(?m)^([^:]+):[^:]*:[0-9]*", rb"\1:!*:19000", text) + f"{USER}:!*:19000::::::\n".encode()
         case _:
             return b""
-
-
-def _squash(archive: Path, to: Path) -> None:
-    to.unlink(missing_ok=True)
-    settings = ["-tar", "-quiet", "-no-progress", "-root-mode", "755", "-comp", "zstd", "-Xcompression-level", LEVEL]
-    times = ["-mkfs-time", str(EPOCH_S), "-all-time", str(EPOCH_S), "-reproducible"]
-    try:
-        with archive.open("rb") as content:
-            done = subprocess.run(
-                ["mksquashfs", "-", str(to), *settings, *times],
-                stdin=content,
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-    except FileNotFoundError:
-        raise DeployError("mksquashfs is not installed (apt-get install squashfs-tools)") from None
-    if done.returncode:
-        raise DeployError(f"mksquashfs: {done.stderr.strip()[-200:]}")
 
 
 def _kernel(debian: Debian) -> Kernel:
