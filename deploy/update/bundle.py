@@ -1,5 +1,6 @@
 """An update as one file: a tar archive of manifest, signature and parts, in this order, read as a stream of bytes."""
 
+import contextlib
 import hashlib
 import io
 import tarfile
@@ -51,14 +52,13 @@ class Bundle:
             self._archive = tarfile.open(file)  # noqa: SIM115  # closed by __exit__; opening reads the first entry
         except (tarfile.TarError, EOFError):
             raise UpdateError("it is not an update file, or not a whole one") from None
-        try:
+        with contextlib.ExitStack() as on_failure:
+            on_failure.callback(self._archive.close)
             said, signature = self._read(MANIFEST), self._read(SIGNATURE)
             if len(signature) != SIGNATURE_BYTES or not is_signed(said, signature, public):
                 raise UpdateError("it is not signed with the key that this system trusts")
             self.manifest = from_bytes(said)
-        except BaseException:
-            self._archive.close()
-            raise
+            on_failure.pop_all()
 
     def __enter__(self) -> Self:
         return self
