@@ -10,12 +10,13 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
-from onboard.core.codes import MachineState, ManualMode, Reason, TaskPhase
+from onboard.core.codes import DriveMode, MachineState, ManualMode, Reason, TaskPhase
 from onboard.core.lifts import lift_at
-from onboard.core.messages import Bid, Heartbeat, ManualOrder, ManualState, Progress, TaskReport
-from onboard.core.site import Segment
+from onboard.core.messages import Bid, DriveState, Heartbeat, ManualOrder, ManualState, Progress, TaskReport
+from onboard.core.site import Segment, Site
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
+from tests.system.test_spurs import alley
 
 PERSON = 254
 SITE = find_site("small")
@@ -32,7 +33,7 @@ def say(bus: SimulatedBus, order: ManualOrder) -> None:
         bus.send(frame)
 
 
-def held(orders: Orders, *faults: str) -> Scene:
+def held(orders: Orders, *faults: str, site: Site = SITE, cars: Sequence[tuple[float, float | None]] = CARS) -> Scene:
     """Three cars, and a person who gives these orders (s, robot, mode), each said once."""
 
     def before(simulation: Simulation) -> None:
@@ -43,7 +44,7 @@ def held(orders: Orders, *faults: str) -> Scene:
     def plant(simulation: Simulation) -> None:
         arm(simulation, [parse_injection(fault) for fault in faults])
 
-    return play(SITE, stays(*CARS), before=before, plant=plant, limit_s=1_200)
+    return play(site, stays(*cars), before=before, plant=plant, limit_s=1_200)
 
 
 def rests_us(scene: Scene, node: int) -> int:
@@ -128,3 +129,23 @@ def test_a_task_that_is_won_while_being_held_is_given_back() -> None:
     _, given_back = scene.first(TaskReport, lambda one: one.phase is TaskPhase.FORFEITED)
     assert (given_back.sender, given_back.reason) == (bid.sender, Reason.OPERATOR)
     assert scene.simulation.plant.street.summary().parked == 3
+
+
+def test_a_task_that_was_taken_from_a_held_robot_is_not_clung_to() -> None:
+    """Its next car's custodian takes the right back after 8 s; the other robot cannot come by, so nobody is won."""
+    site = alley(("p(192,1)", "p(193,1)"), ("p(1,2)", "p(1,8)"))
+    scene = held([(228, FIRST, HELD), (288, FIRST, AUTOMATIC)], site=site, cars=((0, 150), (40, 190), (80, 230)))
+    scene.assert_sound()
+    lost_us, lost = scene.first(TaskReport, lambda one: one.phase is TaskPhase.FORFEITED, after_us=228_000_000)
+    assert lost.sender not in (FIRST, OTHER) and lost.reason is Reason.NODE_SILENT
+    assert scene.simulation.plant.street.summary().served == 3
+
+
+@pytest.mark.parametrize("at_s", [27.0, 30.9, 32.0, 85.0, 90.0, 92.5])
+def test_a_turn_in_the_mouth_of_a_spur_is_ended(at_s: float) -> None:
+    site = alley(("p(192,1)", "p(193,1)"), ("p(1,2)", "p(1,8)"))
+    scene = held([(at_s, FIRST, HELD), (at_s + 40, FIRST, AUTOMATIC)], site=site, cars=((0, 150), (40, 190)))
+    scene.assert_sound()
+    turned = [t for t, one in scene.all(DriveState, "MR1") if one.mode is DriveMode.TURNING]
+    assert not [t for t in turned if rests_us(scene, FIRST) < t < (at_s + 40) * 1e6]
+    assert scene.simulation.plant.street.summary().served == 2

@@ -8,10 +8,10 @@ begun. Let go, it plans the same work anew from where it stands.
 from dataclasses import dataclass, field
 
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import DriveMode, LegAction
+from onboard.core.codes import DriveMode, LegAction, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.manual import Manual
-from onboard.core.messages import ManualOrder
+from onboard.core.messages import ManualOrder, Message, Reference, TaskReport
 from onboard.core.site import TrackKind
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
@@ -51,6 +51,12 @@ class Holding:
         if was_held and not self.is_held:
             self.fleet.admissions += 1
         return effects
+
+    def loses(self, message: Message) -> Reference | None:
+        """A task that is given back in another's name while I am held: its car's custodian did not wait for me."""
+        if not self.is_held or not isinstance(message, TaskReport) or message.phase is not TaskPhase.FORFEITED:
+            return None
+        return message.task
 
     def stops(self, begun: bool) -> bool:
         """Whether nothing more is done for the step in hand, which is ``begun`` or not."""

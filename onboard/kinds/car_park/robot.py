@@ -157,6 +157,9 @@ class Robot:
             return forfeited + self._yield_task(message, now_us)
         if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
             return self.holding.ordered(message)
+        lost = self.holding.loses(message)
+        if lost is not None and lost in self.going_around.untouched():
+            return self._lose(lost, now_us)
         if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or self.program.standing is None:
             return []
         # Nobody counts on the plan of a robot that is held: it is made anew once it is let go.
