@@ -24,6 +24,11 @@ from bus_sim.sites import find_site
 from onboard.core.site import Site
 from onboard.kinds.car_park.site import CarPark
 
+#: Longest mean time between two cars, s: nobody plays longer runs than this. Ours.
+LONGEST_S = 1_000_000
+#: One fault a second: more is no fleet under faults, but a fleet that is off. Ours.
+MOST_AN_HOUR = 3_600
+
 HELP = """\
 Each seed brings its own customers and its own faults, drawn from the profile. A run with a failure is shrunk to the
 fewest faults that still fail; its scenario (bus-sim run --scenario FILE) and its trace are kept. Every run is judged
@@ -41,6 +46,7 @@ exit status:
 
 examples:
   bus-sim campaign small --seeds 1-100 --faults crash
+  bus-sim campaign standard --seeds 1-8 --cars 300 --apart 90 --faults-an-hour 6 --no-baseline --limit 86400
   bus-sim campaign small --exhaustive crash --sample 400
   bus-sim campaign standard --seeds 1-2000 --dask tcp://10.0.0.5:8786
 """
@@ -64,6 +70,20 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--cars", type=int, default=6, metavar="N", help="cars in each run (default: 6)")
+    parser.add_argument(
+        "--apart", type=float, default=120.0, metavar="SECONDS", help="mean time between two cars (default: 120)"
+    )
+    parser.add_argument(
+        "--faults-an-hour",
+        type=float,
+        metavar="N",
+        help="so many faults in the mean, over the whole run (default: 1 to 4 in its first 900 s)",
+    )
+    parser.add_argument(
+        "--no-baseline",
+        action="store_true",
+        help="do not play each seed without its faults first: twice as fast, and no run is called delayed",
+    )
     parser.add_argument("--limit", type=float, default=7200.0, metavar="SECONDS", help="longest run (default: 7200)")
     parser.add_argument(
         "--out", type=Path, default=Path("campaign"), metavar="DIR", help="failures (default: campaign)"
@@ -118,13 +138,25 @@ def _plan(args: argparse.Namespace) -> Plan:
         raise DemandError(f"--jobs {args.jobs}: must be 1 or more; leave it out for one a core")
     if args.cars < 1:
         raise DemandError(f"--cars {args.cars}: must be 1 or more")
+    if not (0 < args.apart <= LONGEST_S):
+        raise DemandError(f"--apart {args.apart:g}: must be seconds above 0, and at most {LONGEST_S}")
+    if args.faults_an_hour is not None and not (0 < args.faults_an_hour <= MOST_AN_HOUR):
+        raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
     if not args.limit > 0:
         raise DemandError(f"--limit {args.limit}: must be above 0")
     if args.sample is not None and (args.sample < 1 or args.exhaustive is None):
         raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive")
     if args.exhaustive is not None:
         return Plan(args.site, args.exhaustive, args.limit, SCENE, args.out)
-    return Plan(args.site, args.faults, args.limit, Arrivals(cars=args.cars), args.out)
+    return Plan(
+        args.site,
+        args.faults,
+        args.limit,
+        Arrivals(args.cars, args.apart, args.apart / 2),
+        args.out,
+        faults_an_hour=args.faults_an_hour,
+        has_baseline=not args.no_baseline,
+    )
 
 
 def _seeds(text: str) -> range:

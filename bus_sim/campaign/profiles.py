@@ -1,7 +1,8 @@
 """Which faults a seed brings: a profile names the kinds, the seed draws machines, times and sizes."""
 
 import random
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
 from typing import Final
 
 from bus_sim.faults.injection import Injection
@@ -13,6 +14,9 @@ from onboard.core.site import Site
 SPAN_S = (20.0, 900.0)
 #: So many faults a run.
 COUNT = (1, 4)
+
+#: At a rate, a fault that names a car names one of so many that came last, or the next. Ours.
+CARS_AROUND = 5
 
 Draw = Callable[[random.Random, Site], dict[str, Value]]
 
@@ -120,3 +124,27 @@ def draw_faults(profile: str, seed: int, site: Site) -> tuple[Injection, ...]:
         when: dict[str, Value] = {} if kind in _WITHOUT_TIME else {"at_s": at_s}
         drawn.append((at_s, Injection(kind, {**when, **kinds[kind](chance, site)})))
     return tuple(injection for _, injection in sorted(drawn, key=lambda one: one[0]))
+
+
+def draw_at_rate(
+    profile: str, seed: int, site: Site, an_hour: float, until_s: float, arrivals_s: Sequence[float] = ()
+) -> tuple[Injection, ...]:
+    """The faults of a long run: ``an_hour`` in the mean at random moments (a Poisson process) until ``until_s``.
+
+    ``arrivals_s`` is when each car comes, in order, s after power-up. Always the same for the same arguments.
+    """
+    kinds = PROFILES[profile]
+    if not kinds:
+        return ()
+    chance = random.Random(f"faults:{profile}:{site.name}:{seed}:{an_hour:g}")
+    found, at_s = [], SPAN_S[0] + chance.expovariate(an_hour / 3600)
+    while at_s < until_s:
+        kind = chance.choice(list(kinds))
+        when: dict[str, Value] = {} if kind in _WITHOUT_TIME else {"at_s": round(at_s, 6)}
+        given = {**when, **kinds[kind](chance, site)}
+        if "car" in given:
+            number = bisect_right(arrivals_s, at_s) + 1 - chance.randrange(CARS_AROUND + 1)
+            given["car"] = max(1, min(number, len(arrivals_s)))
+        found.append(Injection(kind, given))
+        at_s += chance.expovariate(an_hour / 3600)
+    return tuple(found)

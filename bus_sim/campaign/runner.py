@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.points import reference
-from bus_sim.campaign.profiles import draw_faults
+from bus_sim.campaign.profiles import draw_at_rate, draw_faults
 from bus_sim.campaign.shrink import shrink
-from bus_sim.campaign.trial import FAILURES, Report, Verdict, play
+from bus_sim.campaign.trial import FAILURES, ORIGIN_US, Report, Verdict, play
 from bus_sim.faults.injection import AnyFault
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.sites import find_site
@@ -28,6 +28,10 @@ class Plan:
     out: Path | None = None
     #: The longest wait without faults, s, where it is known: of the reference scene, for single faults.
     usual_wait_s: float | None = None
+    #: Faults at this rate over the whole run; None: a few in its first quarter of an hour.
+    faults_an_hour: float | None = None
+    #: Whether each seed is played without its faults first: a run can be called delayed only then.
+    has_baseline: bool = True
 
 
 class Point(NamedTuple):
@@ -51,13 +55,27 @@ def run_seed(plan: Plan, seed: int) -> Result:
     """Play one seed: first without its faults, to know how long one usually waits, then with them."""
     site = find_site(plan.site)
     bare = Scenario(plan.site, seed, plan.limit_s, plan.arrivals)
-    usual = play(site, bare)
-    scenario = bare.with_faults(draw_faults(plan.profile, seed, site))
-    report = play(site, scenario, usual_wait_s=usual.longest_wait_s) if scenario.faults else usual
+    scenario = bare.with_faults(_faults(plan, bare, site))
+    usual = play(site, bare) if plan.has_baseline or not scenario.faults else None
+    if usual is not None and not scenario.faults:
+        report = usual
+    else:
+        report = play(site, scenario, usual_wait_s=usual.longest_wait_s if usual is not None else None)
     if report.verdict not in FAILURES:
         return Result(seed, report)
     least = scenario.with_faults(shrink(scenario.faults, partial(_still_fails, site, scenario, report.verdict)))
     return Result(seed, report, least, _keep(plan, site, seed, least, report))
+
+
+def _faults(plan: Plan, bare: Scenario, site: Site) -> tuple[AnyFault, ...]:
+    """At a rate they strike until the last car is fetched, or has come where nobody fetches it."""
+    if plan.faults_an_hour is None:
+        return draw_faults(plan.profile, bare.seed, site)
+    stays = bare.arrivals.demand(bare.seed).stays
+    moments = [max(one.arrival_us, one.departure_us or 0) for one in stays]
+    until_s = min(bare.limit_s, (ORIGIN_US + max(moments)) / 1e6)
+    arrivals_s = [(ORIGIN_US + one.arrival_us) / 1e6 for one in stays]
+    return draw_at_rate(plan.profile, bare.seed, site, plan.faults_an_hour, until_s, arrivals_s)
 
 
 def run_point(plan: Plan, point: Point) -> Result:

@@ -63,10 +63,16 @@ class Scenario:
     def to_toml(self, comment: str = "") -> str:
         """The text that ``load_scenario`` reads."""
         lines = [f"# {line}" for line in comment.splitlines()]
-        lines += ["[scenario]", f"site = {quoted(self.site)}", f"seed = {self.seed}", f"limit_s = {self.limit_s:g}", ""]
+        lines += [
+            "[scenario]",
+            f"site = {quoted(self.site)}",
+            f"seed = {self.seed}",
+            f"limit_s = {self.limit_s:.15g}",
+            "",
+        ]
         arrivals = self.arrivals
-        lines += ["[demand]", f"cars = {arrivals.cars}", f"mean_s = {arrivals.mean_s:g}"]
-        lines += [f"sigma_s = {arrivals.sigma_s:g}", f"min_stay_s = {arrivals.min_stay_s:g}"]
+        lines += ["[demand]", f"cars = {arrivals.cars}", f"mean_s = {arrivals.mean_s:.15g}"]
+        lines += [f"sigma_s = {arrivals.sigma_s:.15g}", f"min_stay_s = {arrivals.min_stay_s:.15g}"]
         for fault in self.faults:
             kind, _, settings = str(fault).partition(":")
             lines += ["", "[[fault]]", f"kind = {quoted(kind)}"]

@@ -14,6 +14,7 @@ from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Arrivals, Scenario, load_scenario
 from bus_sim.sites import find_site
+from onboard.core.site import Site
 
 SCENARIOS = Path(__file__).parent / "scenarios"
 #: Scenarios found by campaigns that are known to fail, and why; each comes off this list with its repair.
@@ -102,6 +103,30 @@ def test_the_command_tells_and_answers_by_its_status(tmp_path: Path, capsys: pyt
     assert not (tmp_path / "out").exists()
 
 
+def test_long_runs_bring_customers_and_faults_at_a_rate(tmp_path: Path) -> None:
+    figures = tmp_path / "figures.json"
+    command = ["campaign", "small", "--seeds", "4", "--faults", "bus", "--jobs", "1", "--out", str(tmp_path / "out")]
+    options = ["--cars", "3", "--apart", "600", "--faults-an-hour", "20", "--no-baseline"]
+    assert main([*command, *options, "--json", str(figures)]) == 0
+    (one,) = json.loads(figures.read_text(encoding="utf-8"))["runs"]
+    times_s = [parse_injection(text).at_us / 1e6 for text in one["faults"]]  # type: ignore[union-attr]  # the profile has no faults of frames
+    assert len(times_s) > 5 and max(times_s) > 1_000
+
+
+def test_without_a_baseline_each_seed_is_played_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    played: list[int] = []
+
+    def counted(site: Site, scenario: Scenario, **_: object) -> Report:
+        played.append(len(scenario.faults))
+        return Report(scenario, Verdict.SERVED, longest_wait_s=500.0)
+
+    monkeypatch.setattr("bus_sim.campaign.runner.play", counted)
+    for has_baseline, profile in ((True, "bus"), (False, "bus"), (True, "none"), (False, "none")):
+        run_seed(Plan("small", profile, has_baseline=has_baseline), 1)
+    faults = played[1]
+    assert faults > 0 and played == [0, faults, faults, 0, 0]
+
+
 @pytest.mark.parametrize(
     ("option", "value", "told"),
     [
@@ -110,6 +135,9 @@ def test_the_command_tells_and_answers_by_its_status(tmp_path: Path, capsys: pyt
         ("--jobs", "-1", "--jobs -1: must be 1 or more"),
         ("--cars", "0", "--cars 0: must be 1 or more"),
         ("--limit", "0", "--limit 0.0: must be above 0"),
+        ("--apart", "0", "--apart 0: must be seconds above 0"),
+        ("--apart", "nan", "--apart nan: must be seconds above 0"),
+        ("--faults-an-hour", "-2", "--faults-an-hour -2: must be above 0"),
     ],
 )
 def test_a_mistake_in_the_command_line_is_one_line(

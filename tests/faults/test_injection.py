@@ -2,7 +2,7 @@
 
 import pytest
 
-from bus_sim.campaign.profiles import PROFILES, draw_faults
+from bus_sim.campaign.profiles import PROFILES, draw_at_rate, draw_faults
 from bus_sim.can.faults import Fault
 from bus_sim.faults.arm import ACTIONS, check_targets, frame_faults
 from bus_sim.faults.injection import Injection, parse_injection
@@ -22,6 +22,20 @@ def test_what_a_profile_draws_is_read_back_and_fits_the_site(profile: str) -> No
             seen.add(fault.kind)
             assert parse_injection(str(fault)) == fault
     assert seen == set(PROFILES[profile])
+
+
+def test_at_a_rate_faults_fill_the_whole_run_and_name_cars_that_are_there() -> None:
+    site, arrivals_s = find_site("small"), [200.0 * number for number in range(1, 180)]
+    faults = [fault for seed in range(8) for fault in draw_at_rate("all", seed, site, 6, 36_000, arrivals_s)]
+    assert 8 * 60 * 0.85 < len(faults) < 8 * 60 * 1.15
+    times_s = [fault.number("at_s") for fault in faults if "at_s" in fault.given]
+    assert min(times_s) < 1_000 and 35_000 < max(times_s) < 36_000
+    early = [
+        fault.count("car") for fault in draw_at_rate("people", 1, site, 60, 2_000, arrivals_s) if "car" in fault.given
+    ]
+    assert early and max(early) <= 11
+    assert draw_at_rate("none", 1, site, 6, 36_000) == ()
+    assert [parse_injection(str(fault)) for fault in faults] == faults
 
 
 def test_every_kind_of_the_table_does_something() -> None:
