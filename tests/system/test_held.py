@@ -136,7 +136,7 @@ def test_a_task_that_was_taken_from_a_held_robot_is_not_clung_to() -> None:
     site = alley(("p(192,1)", "p(193,1)"), ("p(1,2)", "p(1,8)"))
     scene = held([(228, FIRST, HELD), (288, FIRST, AUTOMATIC)], site=site, cars=((0, 150), (40, 190), (80, 230)))
     scene.assert_sound()
-    lost_us, lost = scene.first(TaskReport, lambda one: one.phase is TaskPhase.FORFEITED, after_us=228_000_000)
+    _lost_us, lost = scene.first(TaskReport, lambda one: one.phase is TaskPhase.FORFEITED, after_us=228_000_000)
     assert lost.sender not in (FIRST, OTHER) and lost.reason is Reason.NODE_SILENT
     assert scene.simulation.plant.street.summary().served == 3
 
