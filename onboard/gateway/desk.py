@@ -3,14 +3,15 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from onboard.core.messages import CallForProposals, CarAt, Message, TaskReport
+from onboard.core.messages import CallForProposals, CarAt, ManualState, Message, TaskReport
 from onboard.core.site import Site
-from onboard.gateway.actions import REFUSED, InstantActions
+from onboard.gateway.actions import InstantActions
 from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.factsheet import MOST_ID
 from onboard.gateway.inbox import Inbox, Incoming
 from onboard.gateway.order import Life, Order
 from onboard.gateway.orders import Orders, Outcome, name_of
+from onboard.gateway.pauses import MODES, Closed, Pauses
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import level
@@ -46,6 +47,8 @@ class OrderDesk:
         seed = (settings.epoch_us + now_us) // 1_000_000
         self.orders = Orders(site, wishes, settings.node_id, reports.others, now_us=now_us, seed=seed)
         reports.keep = self.orders.entries
+        self.pauses = Pauses(settings.node_id, seed)
+        self._no_pause = wishes.no_pause
         self._waiting: deque[Publication] = deque()
         self._actions = {machine.name: InstantActions() for machine in site.machines.values()}
         self._errors: dict[int, deque[Json]] = {}
@@ -59,16 +62,25 @@ class OrderDesk:
 
     def next_wake(self) -> int | None:
         """When something is due, us; None for never. What waits is due at once."""
-        return 0 if self._waiting else self.orders.next_wake()
+        if self._waiting:
+            return 0
+        times = (self.orders.next_wake(), *self.pauses.due())
+        return min((time for time in times if time is not None), default=None)
 
     async def work(self, now_us: int) -> None:
         """Judge what waits and say what is due."""
         while self._waiting:
             await self._judge(self._waiting.popleft(), now_us)
         await self._perform(self.orders.wake(now_us), now_us)
+        said, closed = self.pauses.wake(now_us)
+        for message in said:
+            self._send(message)
+        self._close(closed, now_us)
 
     async def feed(self, message: Message, now_us: int) -> None:
         """Take up one message of the fleet bus."""
+        if isinstance(message, ManualState):
+            self._close(self.pauses.feed(message), now_us)
         if isinstance(message, _HEARD) and self.orders.open:
             await self._perform(self.orders.feed(message), now_us)
 
@@ -96,10 +108,21 @@ class OrderDesk:
         for action in incoming.told["actions"]:
             if known.is_known(action):
                 continue
-            failure = await self._act_once(node, action["actionType"], now_us)
+            kind = action["actionType"]
+            if kind in MODES and not self._no_pause:
+                known.begin(action)
+                self._close(self.pauses.ask(node, action, now_us), now_us)
+                continue
+            failure = await self._act_once(node, kind, now_us)
             known.close(self._publisher.settings.dialect, action, failure)
         self._tell_machine(node, now_us)
         self._post(self._publisher.tell_now(node, now_us))
+
+    def _close(self, closed: list[Closed], now_us: int) -> None:
+        """Instant actions that took their time are over."""
+        for node, action, failure in closed:
+            self._actions[self._site.machines[node].name].close(self._publisher.settings.dialect, action, failure)
+            self._tell_machine(node, now_us)
 
     async def _act_once(self, node: int, kind: str, now_us: int) -> str:
         """Why it failed; empty where it was done."""
@@ -110,7 +133,7 @@ class OrderDesk:
             await self._perform(outcome, now_us)
             return failure
         elif kind != "stateRequest":
-            return REFUSED.get(kind, "not supported")
+            return self._no_pause if kind in MODES else "not supported"
         return ""
 
     # --- out -----------------------------------------------------------------------------------------------------

@@ -16,6 +16,7 @@ from onboard.gateway.order import Order, Wish
 from onboard.kinds.car_park.site import CarPark
 from onboard.kinds.graph.messages import VisitList, five
 from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph
+from onboard.kinds.mapd.site import Mapd
 from onboard.trace.view import SiteView
 
 #: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
@@ -45,7 +46,9 @@ class Said:
 
 
 class Wishes(Protocol):
-    """One system's way."""
+    """One system's way. ``no_pause`` tells why its machines cannot be held; empty where they can."""
+
+    no_pause: str
 
     def ask_all(self, sender: int) -> tuple[Message, ...]:
         """What is asked of all machines at the start."""
@@ -78,10 +81,14 @@ class NoWishes:
 
     def __init__(self, site: Site) -> None:
         self._site = site
+        in_step = isinstance(site, Mapd)
+        self.no_pause = (
+            "not supported: these robots move in step, and one that is held would hold all" if in_step else ""
+        )
 
     def ask_all(self, sender: int) -> tuple[Message, ...]:
-        """Nothing is asked."""
-        return ()
+        """What they vouch for, and who is held."""
+        return (SyncRequest(sender, 0),)
 
     def transport(self, told: dict[str, Any]) -> Wish:
         """None is taken."""
@@ -111,10 +118,6 @@ class ParkWishes(NoWishes):
         super().__init__(site)
         self._view, self._place = view, place
         self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
-
-    def ask_all(self, sender: int) -> tuple[Message, ...]:
-        """Where the cars are."""
-        return (SyncRequest(sender, 0),)
 
     def transport(self, told: dict[str, Any]) -> Wish:
         """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""

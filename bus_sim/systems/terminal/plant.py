@@ -8,6 +8,7 @@ from functools import partial
 from bus_sim.plant.link import BusDeviceLink
 from bus_sim.plant.timers import LoopTimers
 from bus_sim.systems.terminal.world import VehicleBody, World
+from onboard.core.codes import ManualMode
 from onboard.core.messages import Message
 from onboard.kinds.registry import system_of
 from onboard.kinds.terminal.messages import (
@@ -17,7 +18,6 @@ from onboard.kinds.terminal.messages import (
     HandlerState,
     LaneSensor,
     ManualKey,
-    ManualMode,
     MissionKey,
     MoveMode,
     MoveOrder,
