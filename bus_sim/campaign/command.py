@@ -14,10 +14,11 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from bus_sim.campaign import table
 from bus_sim.campaign.engine import on_cores, on_dask
-from bus_sim.campaign.points import SCENE, Single, count, points, reference
+from bus_sim.campaign.points import SCENE, SCENE_LIMIT_S, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES
+from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
-from bus_sim.campaign.trial import FAILURES, play
+from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
@@ -123,7 +124,7 @@ def _trials(args: argparse.Namespace, plan: Plan, site: Site, console: Console) 
         head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
         console.print(f"{head}, {plan.arrivals.cars} cars each", highlight=False)
         return play_all(partial(run_seed, plan), seeds), len(seeds)
-    counts = count(site, reference(plan.site, plan.limit_s))
+    counts = count(site, reference(plan.site, plan.limit_s or SCENE_LIMIT_S))
     plan = replace(plan, usual_wait_s=counts.longest_wait_s)
     every = [Point(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)]
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))

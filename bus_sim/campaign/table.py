@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from bus_sim.campaign.report import Verdict, kinds_of
 from bus_sim.campaign.runner import Plan, Result
-from bus_sim.campaign.trial import Verdict, kinds_of
 
 #: In the order of the table's columns.
 COLUMNS = (

@@ -28,6 +28,7 @@ from bus_sim.demand import Demand, DemandError
 from bus_sim.faults.arm import check_targets
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.sites import SiteNotFoundError, find_site
+from bus_sim.systems.orders import Orders
 from onboard.config.problems import ConfigError, Problems, nearest, quoted
 from onboard.core.site import Site
 
@@ -55,6 +56,8 @@ class Scenario:
     limit_s: float = 7_200.0
     arrivals: Arrivals = field(default_factory=Arrivals)
     faults: tuple[AnyFault, ...] = ()
+    #: What the seed draws for a site that is no car park; None: the site's own orders.
+    orders: Orders | None = None
 
     def with_faults(self, faults: Iterable[AnyFault]) -> "Scenario":
         """The same with other faults."""

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign.profiles import draw_faults
+from bus_sim.campaign.report import Report, Verdict
 from bus_sim.campaign.runner import Plan, Result, run_campaign, run_seed
 from bus_sim.campaign.table import lines, to_json
-from bus_sim.campaign.trial import Report, Verdict, play
+from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Arrivals, Scenario, load_scenario

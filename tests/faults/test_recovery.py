@@ -3,7 +3,8 @@
 import pytest
 
 from bus_sim.campaign.recovery import Measure, healed_us
-from bus_sim.campaign.trial import Report, Verdict, play
+from bus_sim.campaign.report import Report, Verdict
+from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.planted.registry import BUGS
