@@ -20,6 +20,8 @@ ORIGIN_US = 10_000_000
 class CarPark:
     """See ``Stage``."""
 
+    who = "customers"
+
     def __init__(self, site: Site, scenario: Scenario, options: RunOptions, loop: VirtualTimeLoop) -> None:
         self.run: Simulation = build(site, options, loop)
         self._street, self._oracle = self.run.plant.street, self.run.plant.oracle

@@ -59,6 +59,8 @@ class Report:
     recovery: tuple[tuple[str, int], ...] = ()
     is_apart: bool = False
     error: str = ""
+    #: What ``served``, ``told`` and ``waiting`` count.
+    who: str = "customers"
 
     def why(self) -> str:
         """One line for a person."""

@@ -31,8 +31,6 @@ class Plan:
     #: None: by the site's orders.
     limit_s: float | None = 7_200.0
     arrivals: Arrivals = field(default_factory=Arrivals)
-    #: What each seed brings to a site of another system; None: the site's own orders.
-    orders: Orders | None = None
     out: Path | None = None
     #: The longest wait without faults, s, where it is known: of the reference scene, for single faults.
     usual_wait_s: float | None = None
@@ -40,6 +38,8 @@ class Plan:
     faults_an_hour: float | None = None
     #: Whether each seed is played without its faults first: a run can be called delayed only then.
     has_baseline: bool = True
+    #: What each seed brings to a site that is no car park.
+    orders: Orders | None = None
 
 
 class Point(NamedTuple):

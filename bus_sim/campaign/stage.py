@@ -17,6 +17,9 @@ from onboard.core.site import Site
 class Stage(Protocol):
     """One run of a system, connected but not switched on."""
 
+    #: Who comes: what the report counts.
+    who: str
+
     @property
     def run(self) -> BusRun:
         """Buses, plant and controllers."""

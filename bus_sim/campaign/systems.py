@@ -38,7 +38,7 @@ def usual_orders(site: Site, count: int | None, apart_s: float | None) -> Orders
 
 def with_orders(site: Site, orders: Orders | None, seed: int) -> Site:
     """The site with what a seed brings. Raises ``DemandError`` for orders that it cannot bring."""
-    return site if orders is None else SYSTEMS[site.system].draw(site, orders, seed)
+    return site if orders is None or not orders.count else SYSTEMS[site.system].draw(site, orders, seed)
 
 
 def span_s(site: Site) -> tuple[float, float]:
@@ -57,6 +57,7 @@ class SystemStage:
 
     def __init__(self, site: Site, scenario: Scenario, options: RunOptions, loop: VirtualTimeLoop) -> None:
         self._system = SYSTEMS[site.system]
+        self.who = self._system.who
         check_faults(scenario.faults, site)
         self.run: BusRun
         drawn = with_orders(site, scenario.orders, scenario.seed)

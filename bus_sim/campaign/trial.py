@@ -124,6 +124,7 @@ def _judge(
         tuple((measure.value, us) for measure, us in sorted(recovery.longest_us.items())),
         is_apart,
         error,
+        stage.who,
     )
 
 

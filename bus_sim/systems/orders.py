@@ -12,7 +12,7 @@ from onboard.core.site import Site
 
 @dataclass(frozen=True)
 class Orders:
-    """So many orders at normal intervals of mean ``apart_s`` and half of it as deviation."""
+    """So many orders at normal intervals of mean ``apart_s`` and half of it as deviation; 0: the site's own ones."""
 
     count: int
     apart_s: float
@@ -54,6 +54,8 @@ class System:
     tally: Callable[[SystemPlant], Tally]
     order_s: Callable[[Site], float]
     usual: Callable[[Site], Orders]
+    #: What ``tally`` counts.
+    who: str = "orders"
 
 
 class Ended(NamedTuple):

@@ -60,4 +60,4 @@ def count(plant: SystemPlant) -> Tally:
     return tally(ended, len(cell.site.wishes), cell.timers.now_us())
 
 
-CELL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(6, 20.0))
+CELL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(6, 20.0), who="goals")

@@ -60,4 +60,4 @@ def usual(site: Site) -> Orders:
     return Orders(16, order_s(site) / max(1, len(site.robots)))
 
 
-MAPD = System(make_plant, draw, last_s, count, order_s, usual)
+MAPD = System(make_plant, draw, last_s, count, order_s, usual, who="tasks")

@@ -71,10 +71,11 @@ def draw(site: Site, orders: Orders, seed: int) -> Terminal:
     yard.by_type = {one for one in yard.standing if chance.random() < 0.5}
     desks = [node for node, one in place.machines.items() if one.kind is KindCode.DESK]
     moments = orders.moments_ms(chance)
+    most = yard.left
     for number, at_ms in enumerate(moments):
         spare = yard.left - (len(moments) - number)
         if spare < 0:
-            raise DemandError(f"--orders {orders.count}: {site.name} has boxes for {number} missions only")
+            raise DemandError(f"--orders {orders.count}: {site.name} has boxes for {most} missions at most, one each")
         source, boxes, target = yard.take(chance, min(MOST_BOXES, spare + 1))
         at_us, desk, urgent = ORIGIN_US + at_ms * 1000, chance.choice(desks), chance.random() < URGENT
         if source in yard.by_type:
@@ -109,4 +110,4 @@ def count(plant: SystemPlant) -> Tally:
     return Tally(len(found), 0, left, max(waits_us, default=0) / 1e6)
 
 
-TERMINAL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(5, 30.0))
+TERMINAL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(5, 30.0), who="boxes")
