@@ -8,8 +8,12 @@ from pathlib import Path
 import onboard
 from deploy.archive import build_archive
 from deploy.fleet import write_fleet
+from deploy.image.image import build_image, build_update
+from deploy.image.release import Release
 from deploy.image.root import build_root
 from deploy.package import build_package
+from deploy.update.manifest import UpdateError, version_key
+from deploy.update.signature import make_keys
 from deploy.wheels import DeployError
 from onboard.config.problems import ConfigError
 
@@ -22,6 +26,11 @@ examples:
   python -m deploy archive                 dist/onboard.pyz, which any Python 3.11 or newer runs
   python -m deploy deb                     a Debian package with the service
   sudo python -m deploy root               the root file system for 64-bit ARM boards, its kernel and its digest
+  python -m deploy keys                    update-key.pem, which signs updates and stays here, and update-key.pub.pem
+  sudo python -m deploy image --key update-key.pub.pem
+                                           dist/onboard.img, which boards are flashed with
+  sudo python -m deploy update --secret update-key.pem --version 0.2.0
+                                           a signed update for boards that were flashed with such an image
   python -m deploy machines mysite.toml    dist/machines/NAME/, the files for every board's boot partition
 """
 
@@ -42,6 +51,7 @@ def build_parser() -> argparse.ArgumentParser:
     deb.add_argument("--out", type=Path, default=Path(name), metavar="FILE")
     root = commands.add_parser("root", help="kernel and read-only root file system for 64-bit ARM boards")
     root.add_argument("--out", type=Path, default=Path("dist/root"), metavar="DIR")
+    _add_image(commands)
     machines = commands.add_parser("machines", help="the machine files of a whole fleet")
     machines.add_argument("site", type=Path, help="site file (docs/site-file.md)")
     machines.add_argument("--out", type=Path, default=Path("dist/machines"), metavar="DIR")
@@ -50,6 +60,24 @@ def build_parser() -> argparse.ArgumentParser:
         "--device", default="can1", metavar="CHANNEL", help="of the device bus; may be the same (can1)"
     )
     return parser
+
+
+def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    image = commands.add_parser("image", help="the image that 64-bit ARM boards are flashed with")
+    image.add_argument("--out", type=Path, default=Path("dist/onboard.img"), metavar="FILE")
+    image.add_argument("--key", type=Path, metavar="PEM", help="public key of its updates; without one it takes none")
+    keys = commands.add_parser("keys", help="a pair of keys for updates")
+    keys.add_argument("--out", type=Path, default=Path("update-key.pem"), metavar="FILE", help="the secret one")
+    update = commands.add_parser("update", help="a signed update for boards with such an image")
+    update.add_argument("--out", type=Path, metavar="FILE", help="dist/onboard-VERSION.update")
+    update.add_argument(
+        "--secret", type=Path, required=True, metavar="PEM", help="the secret key (python -m deploy keys)"
+    )
+    update.add_argument("--site", default="", metavar="NAME", help="only machines of this site take it")
+    for parser in (image, update):
+        parser.add_argument(
+            "--version", default=onboard.__version__, help=f"of the whole system ({onboard.__version__})"
+        )
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -61,7 +89,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     except ConfigError as error:
         print(error, file=sys.stderr)
         return 2
-    except DeployError as error:
+    except (DeployError, UpdateError) as error:
         print(f"deploy: {error}", file=sys.stderr)
         return 2
     except OSError as error:
@@ -71,13 +99,26 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _build(args: argparse.Namespace) -> list[Path | str]:
-    if args.command == "root":
-        made = build_root(args.out)
-        return [made.kernel, made.initrd, made.squashfs, f"sha256 {made.digest}"]
-    if args.command == "machines":
-        return [*write_fleet(args.site, args.out, args.fleet, args.device)]
-    args.out.parent.mkdir(parents=True, exist_ok=True)
-    return [build_archive(args.out) if args.command == "archive" else build_package(args.out)]
+    match args.command:
+        case "root":
+            made = build_root(args.out, Release())
+            return [made.kernel, made.initrd, made.squashfs, f"sha256 {made.digest}"]
+        case "machines":
+            return [*write_fleet(args.site, args.out, args.fleet, args.device)]
+        case "image":
+            args.out.parent.mkdir(parents=True, exist_ok=True)
+            version_key(args.version)
+            image = build_image(args.out, Release(args.version, args.key.read_bytes() if args.key else b""))
+            return [image.disk, f"sha256 {image.digest}", f"root file system: sha256 {image.root.digest}"]
+        case "keys":
+            public = args.out.with_suffix(".pub.pem")
+            make_keys(args.out, public)
+            return [args.out, public]
+        case "update":
+            return [build_update(args.out, args.secret, args.version, args.site)]
+        case command:
+            args.out.parent.mkdir(parents=True, exist_ok=True)
+            return [build_archive(args.out) if command == "archive" else build_package(args.out)]
 
 
 if __name__ == "__main__":

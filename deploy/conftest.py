@@ -1,13 +1,48 @@
 """``pytest deploy``: what takes minutes and root, and is not part of ``make test``."""
 
+import shutil
 from pathlib import Path
 
 import pytest
 
-from deploy.image.root import Root, build_root
+from deploy.fleet import write_fleet
+from deploy.image.emulate import personalise
+from deploy.image.image import Image, build_image
+from deploy.image.release import Release
+from deploy.update.signature import make_keys
+
+SITE = Path(__file__).parents[1] / "bus_sim" / "sites" / "level1.toml"
 
 
 @pytest.fixture(scope="session")
-def root(tmp_path_factory: pytest.TempPathFactory) -> Root:
-    """The root file system, freshly built."""
-    return build_root(Path(tmp_path_factory.mktemp("root")))
+def secret(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The secret key of the updates that the image takes; the public one is beside it."""
+    folder = Path(tmp_path_factory.mktemp("keys"))
+    make_keys(folder / "key.pem", folder / "key.pub.pem")
+    return folder / "key.pem"
+
+
+@pytest.fixture(scope="session")
+def release(secret: Path) -> Release:
+    """What the image says of itself."""
+    return Release("1.0", secret.with_suffix(".pub.pem").read_bytes())
+
+
+@pytest.fixture(scope="session")
+def image(release: Release, tmp_path_factory: pytest.TempPathFactory) -> Image:
+    """The image, freshly built."""
+    return build_image(Path(tmp_path_factory.mktemp("image")) / "onboard.img", release)
+
+
+@pytest.fixture
+def disk(image: Image, tmp_path: Path) -> Path:
+    """A card as it comes from flashing, without a machine's files."""
+    return Path(shutil.copyfile(image.disk, tmp_path / "disk.img"))
+
+
+@pytest.fixture
+def mr1(disk: Path, tmp_path: Path) -> Path:
+    """MR1's card: its files on the boot partition."""
+    write_fleet(SITE, tmp_path / "fleet")
+    personalise(disk, [tmp_path / "fleet" / "MR1" / name for name in ("machine.toml", "site.toml")])
+    return disk

@@ -5,18 +5,18 @@ the host changes; only making the root file system needs root, and the emulation
 """
 
 import os
+import shutil
 import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from deploy.image.apt import ARCHITECTURE, SUITE, Apt, run_tool
 from deploy.wheels import DeployError
 
 STORE = Path(__file__).parents[2] / "build" / "image"
-ARCHITECTURE = "arm64"
-SUITE = "bookworm"
 #: The least with which systemd, udev, CAN and the program work; all else stays away.
-PACKAGES = ("systemd-sysv", "udev", "dbus", "kmod", "python3", "iproute2", "can-utils")
+PACKAGES = ("systemd-sysv", "udev", "dbus", "kmod", "python3", "iproute2", "can-utils", "openssl")
 #: Time stamps later than this become this, so that a root file system built twice is the same.
 EPOCH_S = 1_700_000_000
 #: Folders of the package with the modules that boards and emulated machines need.
@@ -30,19 +30,25 @@ _KERNEL_PARTS = (
         "drivers/mmc",
         "drivers/watchdog",
     ),
+    *("drivers/usb/host", "drivers/usb/dwc2", "drivers/usb/storage", "drivers/usb/core", "drivers/usb/common"),
+    *("drivers/usb/gadget/udc", "drivers/usb/roles", "drivers/usb/phy", "drivers/char/hw_random"),
     *("fs/squashfs", "fs/ext4", "fs/jbd2", "fs/fat", "fs/nls", "crypto", "lib", "arch/arm64/crypto"),
 )
-_SINGLE_PARTS = ("fs/mbcache.ko",)
-_BUILD_S = 3_600
+_SINGLE_PARTS = (
+    *("fs/mbcache.ko", "drivers/reset/reset-raspberrypi.ko"),
+    *("drivers/scsi/scsi_mod.ko", "drivers/scsi/scsi_common.ko", "drivers/scsi/sd_mod.ko"),
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Debian:
-    """What was fetched: the root file system as an archive, the kernel's and busybox' files unpacked."""
+    """What was fetched: the root file system as an archive; kernel, busybox and the boot loaders unpacked."""
 
     base: Path
     kernel: Path
     busybox: Path
+    grub: Path
+    u_boot: Path
 
     @property
     def release(self) -> str:
@@ -53,64 +59,58 @@ class Debian:
 def fetch_debian(store: Path = STORE) -> Debian:
     """Fetch and unpack what the store lacks. Raises ``DeployError``."""
     store.mkdir(parents=True, exist_ok=True)
-    found = Debian(store / "base.tar", store / "kernel", store / "busybox")
-    if not found.kernel.exists() or not found.busybox.exists():
-        _fetch_packages(store, found)
+    found = Debian(store / "base.tar", *(store / name for name in ("kernel", "busybox", "grub", "u-boot")))
+    apt = Apt(store / "apt")
+    if not all(folder.exists() for folder in (found.kernel, found.busybox, found.grub, found.u_boot)):
+        apt.run("apt-get", "update", "-q")
+        _fetch_packages(apt, found)
     if not found.base.exists():
-        _make_base(found.base)
+        apt.run("apt-get", "update", "-q")
+        _make_base(apt, found.base)
     return found
 
 
-def _fetch_packages(store: Path, to: Debian) -> None:
-    apt = _Apt(store / "apt")
-    apt.run("apt-get", "update", "-q")
+def _fetch_packages(apt: Apt, to: Debian) -> None:
     said = apt.run("apt-cache", "depends", f"linux-image-{ARCHITECTURE}").split()
     kernel = next((word for word in said if word.startswith("linux-image-6")), None)
     if kernel is None:
         raise DeployError(f"linux-image-{ARCHITECTURE}: apt does not know it; is this a Debian host?")
-    apt.run("apt-get", "download", "-q", kernel, "busybox-static")
+    modules = [f"./lib/modules/*/kernel/{part}/*" for part in _KERNEL_PARTS]
+    modules += [f"./lib/modules/*/kernel/{part}" for part in _SINGLE_PARTS]
+    trees = "./usr/lib/linux-image-*/broadcom/bcm2*"
+    wanted = {
+        kernel: (to.kernel, ["./boot/vmlinuz-*", "./lib/modules/*/modules.*", trees, *modules]),
+        "busybox-static": (to.busybox, ["./bin/busybox"]),
+        "grub-efi-arm64-bin": (to.grub, ["./usr/lib/grub/arm64-efi/monolithic/grubaa64.efi"]),
+        "u-boot-rpi": (to.u_boot, ["./usr/lib/u-boot/rpi_arm64/u-boot.bin"]),
+    }
+    for old in apt.folder.glob("*.deb"):
+        old.unlink()
+    apt.run("apt-get", "download", "-q", *wanted)
     debs = {file.name.partition("_")[0]: file for file in apt.folder.glob("*.deb")}
-    wanted = [f"./lib/modules/*/kernel/{part}/*" for part in _KERNEL_PARTS]
-    wanted += [f"./lib/modules/*/kernel/{part}" for part in _SINGLE_PARTS]
-    _unpack(debs[kernel], to.kernel, ["./boot/vmlinuz-*", "./lib/modules/*/modules.*", *wanted])
-    _unpack(debs["busybox-static"], to.busybox, ["./bin/busybox"])
+    for name, (folder, parts) in wanted.items():
+        shutil.rmtree(folder, ignore_errors=True)
+        _unpack(debs[name], folder, parts)
     # The links in it are relative to the folder's own root.
-    _run(["depmod", "-b", str(to.kernel), to.release])
+    run_tool(["depmod", "-b", str(to.kernel), to.release])
 
 
-class _Apt:
-    """apt for another architecture, with lists and packages of its own."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        for part in ("lists/partial", "cache/archives/partial"):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-
-    def run(self, tool: str, *words: str) -> str:
-        settings = {
-            "APT::Architecture": ARCHITECTURE,
-            "APT::Architectures": ARCHITECTURE,
-            "Dir::State::Lists": str(self.folder / "lists"),
-            "Dir::State::status": "/dev/null",
-            "Dir::Cache": str(self.folder / "cache"),
-            "APT::Sandbox::User": "",
-            "Debug::NoLocking": "1",
-        }
-        options = [word for name, value in settings.items() for word in ("-o", f"{name}={value}")]
-        return _run([tool, *options, *words], self.folder)
-
-
-def _make_base(to: Path) -> None:
+def _make_base(apt: Apt, to: Path) -> None:
     if os.geteuid() != 0:
         raise DeployError("the root file system is made by mmdebstrap, which needs root here; use sudo")
     if not Path("/proc/sys/fs/binfmt_misc/qemu-aarch64").exists() and not _runs_arm():
         raise DeployError(
             "this host cannot run ARM programs; apt-get install qemu-user-static binfmt-support arch-test"
         )
-    without = [f"--dpkgopt=path-exclude=/usr/share/{part}/*" for part in ("doc", "man", "locale", "info")]
+    sources = apt.folder / "sources.list"
+    sources.write_text("".join(f"deb {line}\n" for line in apt.mirrors()), encoding="utf-8")
+    settings = apt.folder / "apt.conf"
+    settings.write_text(apt.transport(), encoding="utf-8")
     words = ["mmdebstrap", f"--architectures={ARCHITECTURE}", "--variant=minbase", f"--include={','.join(PACKAGES)}"]
+    words += [f"--aptopt={settings}"]
+    words += [f"--dpkgopt=path-exclude=/usr/share/{part}/*" for part in ("doc", "man", "locale", "info")]
     part = to.with_suffix(".part.tar")
-    _run([*words, *without, SUITE, str(part)], SOURCE_DATE_EPOCH=str(EPOCH_S))
+    run_tool([*words, SUITE, str(part), str(sources)], SOURCE_DATE_EPOCH=str(EPOCH_S))
     part.rename(to)
 
 
@@ -130,23 +130,3 @@ def _unpack(deb: Path, to: Path, wanted: Sequence[str]) -> None:
         )
     if not any(to.iterdir()):
         raise DeployError(f"{deb.name}: holds nothing of what was looked for")
-
-
-def _run(words: Sequence[str], folder: Path | None = None, **environment: str) -> str:
-    path = f"{os.environ.get('PATH', '')}:/usr/sbin:/sbin"
-    try:
-        done = subprocess.run(
-            words,
-            cwd=folder,
-            env={**os.environ, "PATH": path, **environment},
-            capture_output=True,
-            text=True,
-            timeout=_BUILD_S,
-            check=False,
-        )
-    except FileNotFoundError:
-        raise DeployError(f"{words[0]} is not installed") from None
-    if done.returncode:
-        last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
-        raise DeployError(f"{words[0]}: {last}")
-    return done.stdout

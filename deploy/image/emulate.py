@@ -1,69 +1,47 @@
-"""A board in QEMU (``-M virt``): the root file system that boards boot, without any board's own boot path."""
+"""A board in QEMU (``-M virt``): UEFI firmware, then the image as it would be flashed, boot loader and all."""
 
 import os
 import select
 import subprocess
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from deploy.image.root import Root
+from deploy.image.boot import add_files
 from deploy.wheels import DeployError
 
 QEMU = "qemu-system-aarch64"
+#: Of Debian's package qemu-efi-aarch64.
+FIRMWARE = Path("/usr/share/qemu-efi-aarch64/QEMU_EFI.fd")
 MEMORY_MB = 512
 #: The guest's clock counts instructions while it works, and follows the host's while it waits. Jumping over waits, as
 #: ``hil.guest.machine`` does, would jump over those for the disk too: the service's start ran into its time-out.
 _ICOUNT = "shift=1,sleep=on"
-_APPEND = "console=ttyAMA0 panic=-1 quiet mitigations=off onboard.root=/dev/vda onboard.emulated"
+#: Where the boot partition begins in an image.
+_BOOT_OFFSET = 1 << 20
 
 
-def make_boot_partition(to: Path, files: list[Path]) -> Path:
-    """A FAT file system called ONBOARD that holds these files, as a person's laptop would write it."""
-    _make(to, 64, ["mkfs.vfat", "-n", "ONBOARD", str(to)])
-    for file in files:
-        _run(["mcopy", "-i", str(to), str(file), "::"])
-    return to
-
-
-def make_journal_partition(to: Path) -> Path:
-    """An empty ext4 file system called journal."""
-    _make(to, 64, ["mkfs.ext4", "-q", "-F", "-L", "journal", str(to)])
-    return to
-
-
-def _make(to: Path, size_mb: int, words: list[str]) -> None:
-    with to.open("wb") as file:
-        file.truncate(size_mb << 20)
-    _run(words)
-
-
-def _run(words: list[str]) -> None:
-    try:
-        done = subprocess.run(
-            words, env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin"}, capture_output=True, text=True, check=False
-        )
-    except FileNotFoundError:
-        raise DeployError(f"{words[0]} is not installed") from None
-    if done.returncode:
-        raise DeployError(f"{words[0]}: {done.stderr.strip()[-200:]}")
+def personalise(disk: Path, files: Sequence[Path], options: str = "onboard.emulated") -> None:
+    """Put a machine's files onto an image's boot partition, as a person's laptop would, and the kernel's parameters."""
+    board = disk.with_name("board.cfg")
+    board.write_text(f'set options="{options}"\n', encoding="utf-8")
+    add_files(disk, [*files, board], _BOOT_OFFSET)
 
 
 class Board:
-    """A running board. Leaving cuts its power: whatever it was writing stays half written."""
+    """A running board with its disk, and with sticks in it. Leaving cuts its power, whatever it was writing."""
 
-    def __init__(self, root: Root, boot: Path, journal: Path) -> None:
+    def __init__(self, disk: Path, sticks: Sequence[Path] = ()) -> None:
         self.console = ""
-        drives = [(root.squashfs, "on"), (boot, "off"), (journal, "off")]
         self._words = [
             *(QEMU, "-M", "virt", "-cpu", "cortex-a53", "-accel", "tcg", "-icount", _ICOUNT, "-rtc", "clock=vm"),
-            *("-smp", "1", "-m", str(MEMORY_MB), "-nographic", "-no-reboot", "-nic", "none", "-monitor", "none"),
-            *("-serial", "stdio", "-kernel", str(root.kernel), "-initrd", str(root.initrd), "-append", _APPEND),
+            *("-smp", "1", "-m", str(MEMORY_MB), "-nographic", "-nic", "none", "-monitor", "none"),
+            *("-serial", "stdio", "-bios", str(FIRMWARE), "-device", "i6300esb"),
         ]
-        for number, (file, readonly) in enumerate(drives):
-            drive = f"file={file},format=raw,if=none,id=d{number},readonly={readonly}"
+        for number, file in enumerate([disk, *sticks]):
+            drive = f"file={file},format=raw,if=none,id=d{number}"
             self._words += ["-drive", drive, "-device", f"virtio-blk-pci,drive=d{number}"]
 
     def __enter__(self) -> Self:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from deploy.archive import build_archive
 from deploy.image.debian import Debian
+from deploy.image.release import Release
 from deploy.wheels import DeployError
 
 FILES = Path(__file__).with_name("files")
@@ -36,7 +37,7 @@ _MASKED = (
 _PROGRAM = "#!/usr/bin/python3 -I\nimport sys\n\nfrom onboard.cli import main\n\nsys.exit(main())\n"
 
 
-def build_layer(debian: Debian, to: Path) -> Path:
+def build_layer(debian: Debian, release: Release, to: Path) -> Path:
     """Write the layer as a folder. Raises ``DeployError`` where a wheel cannot be had, ``OSError``."""
     shutil.rmtree(to, ignore_errors=True)
     for source, place in _PLACES.items():
@@ -47,6 +48,10 @@ def build_layer(debian: Debian, to: Path) -> Path:
     program.parent.mkdir(parents=True)
     program.write_text(_PROGRAM, encoding="utf-8")
     program.chmod(0o755)
+    for name, content in release.files().items():
+        file = to / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(content)
     (to / "etc/hostname").write_text("onboard\n", encoding="utf-8")
     for folder in ("boot/onboard", "var/lib/onboard"):
         (to / folder).mkdir(parents=True)

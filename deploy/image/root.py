@@ -4,7 +4,6 @@ import hashlib
 import io
 import re
 import shutil
-import subprocess
 import tarfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,19 +11,21 @@ from pathlib import Path
 from typing import IO
 
 from deploy.image.debian import EPOCH_S, STORE, Debian, fetch_debian
+from deploy.image.disk import SIGNATURE
 from deploy.image.layer import build_layer
-from deploy.wheels import DeployError
+from deploy.image.release import Release
+from deploy.image.squash import make_squashfs
 from hil.guest.initrd import newc
 from hil.guest.kernel import Kernel
 
 #: Who the controller is; the number is the image's own.
 USER, USER_ID = "onboard", 900
 #: Modules that lead to the root file system on emulated machines and on SD cards.
-_FIRST_MODULES = ("virtio_pci", "virtio_blk", "squashfs", "ext4")
-#: A fifth larger than at the highest level, and made in a tenth of the time.
-LEVEL = "3"
+_FIRST_MODULES = ("virtio_pci", "virtio_blk", "sdhci_iproc", "bcm2835", "squashfs", "ext4")
 #: What came with the making of the archive and says nothing.
-_LEFT_OUT = re.compile(r"\./(var/cache/apt/|var/lib/apt/lists/|var/log/|dev/|etc/\.pwd\.lock$|var/cache/ldconfig/).*")
+_LEFT_OUT = re.compile(
+    r"\./(var/cache/apt/|var/lib/apt/lists/|var/log/|dev/|etc/\.pwd\.lock$|var/cache/ldconfig/|etc/apt/(sources\.list|apt\.conf\.d/99mmdebstrap)).*"
+)
 _INIT = """\
 #!/bin/busybox sh
 b=/bin/busybox
@@ -34,13 +35,32 @@ $b mount -t sysfs sysfs /sys
 $b mount -t devtmpfs dev /dev
 while read module; do $b insmod /modules/$module; done < /modules/order
 root=
+number=
 for word in $($b cat /proc/cmdline); do
-    case $word in onboard.root=*) root=${word#onboard.root=} ;; esac
+    case $word in
+    onboard.root=*) root=${word#onboard.root=} ;;
+    onboard.slot=a) number=2 ;;
+    onboard.slot=b) number=3 ;;
+    esac
 done
+# Our disk has our signature, whatever the board calls it.
+look() {
+    for file in /sys/class/block/*/partition; do
+        [ -e $file ] && [ "$($b cat $file)" = "$number" ] || continue
+        part=${file%/partition}
+        disk=$($b readlink -f $part/..)
+        [ "$($b dd if=/dev/${disk##*/} bs=4 skip=110 count=1 2>/dev/null)" = @SIGNATURE@ ] && root=/dev/${part##*/}
+    done
+}
 tries=0
-while [ ! -b "$root" ] && [ $tries -lt 100 ]; do $b sleep 0.1; tries=$((tries + 1)); done
+while [ ! -b "$root" ] && [ $tries -lt 100 ]; do
+    [ -z "$number" ] || look
+    $b sleep 0.1
+    tries=$((tries + 1))
+done
 if ! $b mount -t squashfs -o ro "$root" /new; then
-    echo "onboard: no root file system in $root"
+    echo "onboard: no root file system in ${root:-slot with partition number $number}"
+    $b sleep 3
     $b reboot -f
 fi
 $b mount --move /dev /new/dev
@@ -60,16 +80,16 @@ class Root:
     digest: str
 
 
-def build_root(to: Path, store: Path = STORE) -> Root:
+def build_root(to: Path, release: Release, store: Path = STORE) -> Root:
     """Write ``vmlinuz``, ``initrd`` and ``root.squashfs`` into a folder. Raises ``DeployError``, ``OSError``."""
     debian = fetch_debian(store)
     to.mkdir(parents=True, exist_ok=True)
-    layer = build_layer(debian, to / "layer")
+    layer = build_layer(debian, release, to / "layer")
     merged, squashfs = to / "root.tar", to / "root.squashfs"
     with tarfile.open(merged, "w", format=tarfile.GNU_FORMAT) as archive:
         for entry, content in _merged(debian.base, layer):
             archive.addfile(entry, content)
-    _squash(merged, squashfs)
+    make_squashfs(merged, squashfs)
     merged.unlink()
     shutil.rmtree(layer)
     kernel = _kernel(debian)
@@ -124,25 +144,6 @@ def _edited(name: str, text: bytes) -> bytes:
             return b""
 
 
-def _squash(archive: Path, to: Path) -> None:
-    to.unlink(missing_ok=True)
-    settings = ["-tar", "-quiet", "-no-progress", "-root-mode", "755", "-comp", "zstd", "-Xcompression-level", LEVEL]
-    times = ["-mkfs-time", str(EPOCH_S), "-all-time", str(EPOCH_S), "-reproducible"]
-    try:
-        with archive.open("rb") as content:
-            done = subprocess.run(
-                ["mksquashfs", "-", str(to), *settings, *times],
-                stdin=content,
-                capture_output=True,
-                text=True,
-                check=False,
-            )
-    except FileNotFoundError:
-        raise DeployError("mksquashfs is not installed (apt-get install squashfs-tools)") from None
-    if done.returncode:
-        raise DeployError(f"mksquashfs: {done.stderr.strip()[-200:]}")
-
-
 def _kernel(debian: Debian) -> Kernel:
     modules = {file.stem.replace("-", "_"): file for file in sorted(debian.kernel.rglob("*.ko"))}
     return Kernel(next(debian.kernel.glob("boot/vmlinuz-*")), modules)
@@ -156,7 +157,7 @@ def _initrd(debian: Debian, kernel: Kernel) -> bytes:
             ("bin", 0o040755, b""),
             ("modules", 0o040755, b""),
             ("bin/busybox", 0o100755, busybox),
-            ("init", 0o100755, _INIT.encode()),
+            ("init", 0o100755, _INIT.replace("@SIGNATURE@", SIGNATURE.decode()).encode()),
             ("modules/order", 0o100644, "".join(f"{file.name}\n" for file in order).encode()),
             *((f"modules/{file.name}", 0o100644, file.read_bytes()) for file in order),
         ]

@@ -138,9 +138,10 @@ class Robot:
                 effects += self._find_place(now_us)
             return effects
         if isinstance(message, ShuttleState):
-            self.shuttle.sense(message)
+            effects = self.shuttle.sense(message, now_us)
             if self.shuttle.fault and self._fault is Reason.NONE:
-                return self._fail(Reason.ACTUATOR_FAULT, now_us)
+                effects += self._fail(Reason.ACTUATOR_FAULT, now_us)
+            return effects
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:

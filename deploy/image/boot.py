@@ -1,0 +1,66 @@
+"""The boot partition: boot loaders, a kernel for each slot, and what a person puts there on a laptop."""
+
+import os
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+
+from deploy.image.apt import run_tool
+from deploy.image.debian import EPOCH_S, Debian
+from deploy.image.layer import FILES
+from deploy.image.root import Root
+from deploy.update.slots import SLOTS, STATE_NAME, Slots, to_block
+
+#: Two kernels of 33 MB, one more while an update is written, and room for a person's files.
+BOOT_MB = 160
+LABEL = "ONBOARD"
+#: Any constant: a serial number drawn at random would make every image another.
+_SERIAL = "0B0A2D01"
+#: Where UEFI looks on a disk that it does not know (UEFI 2.10, section 3.5.1.1), and where Debian's GRUB looks.
+_LOADER, _CONFIG = "EFI/BOOT/BOOTAA64.EFI", "EFI/debian/grub.cfg"
+
+
+def boot_files(debian: Debian, root: Root, to: Path) -> Path:
+    """Write the partition's content as a folder. Raises ``OSError``."""
+    shutil.rmtree(to, ignore_errors=True)
+    _put(next(debian.grub.rglob("grubaa64.efi")), to / _LOADER)
+    _put(FILES / "grub.cfg", to / _CONFIG)
+    _put(next(debian.u_boot.rglob("u-boot.bin")), to / "u-boot.bin")
+    for name in ("board.cfg", "config.txt", "README.txt"):
+        _put(FILES / name, to / name)
+    for tree in sorted(debian.kernel.rglob("*.dtb")):
+        _put(tree, to / tree.name)
+    for slot in SLOTS:
+        (to / slot).mkdir()
+    _put(root.kernel, to / SLOTS[0] / "vmlinuz")
+    _put(root.initrd, to / SLOTS[0] / "initrd")
+    (to / STATE_NAME).write_bytes(to_block(Slots()))
+    return to
+
+
+def make_boot_partition(to: Path, files: Iterable[Path], size_mb: int = BOOT_MB) -> Path:
+    """A FAT file system called ONBOARD that holds these files and folders; same content, same bytes."""
+    with to.open("wb") as file:
+        file.truncate(size_mb << 20)
+    run_tool(["mkfs.vfat", "-F", "32", "-n", LABEL, "-i", _SERIAL, "--invariant", str(to)])
+    add_files(to, files)
+    return to
+
+
+def add_files(partition: Path, files: Iterable[Path], offset: int = 0) -> None:
+    """Copy files and folders into a FAT file system, which may begin within its file at ``offset`` bytes.
+
+    What is there by the same name is replaced. Raises ``DeployError``.
+    """
+    where = f"{partition}@@{offset}" if offset else str(partition)
+    for file in files:
+        for inner in [file, *file.rglob("*")]:
+            os.utime(inner, (EPOCH_S, EPOCH_S))
+        run_tool(
+            ["mcopy", "-s", "-m", "-D", "o", "-i", where, str(file), "::"], TZ="UTC", SOURCE_DATE_EPOCH=str(EPOCH_S)
+        )
+
+
+def _put(file: Path, to: Path) -> None:
+    to.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(file, to)

@@ -1,0 +1,58 @@
+"""Ed25519 signatures (RFC 8032) by the command ``openssl``: no cipher of our own, and no library on the boards."""
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+from deploy.update.manifest import UpdateError
+
+SIGNATURE_BYTES = 64
+_LIMIT_S = 60
+
+
+def make_keys(secret: Path, public: Path) -> None:
+    """Write a pair of keys as PEM files. Raises ``UpdateError``, also where a secret key is there already."""
+    if secret.exists():
+        raise UpdateError(f"{secret}: is there already, and boards may know its public key; name another with --out")
+    _openssl("genpkey", "-algorithm", "ed25519", "-out", str(secret))
+    secret.chmod(0o600)
+    public.write_bytes(public_key(secret))
+
+
+def public_key(secret: Path) -> bytes:
+    """The public key of a secret one, as PEM. Raises ``UpdateError``."""
+    return _openssl("pkey", "-in", str(secret), "-pubout").encode()
+
+
+def sign(said: bytes, secret: Path) -> bytes:
+    """The signature of some bytes. Raises ``UpdateError``."""
+    with tempfile.TemporaryDirectory() as folder:
+        file, signature = Path(folder, "said"), Path(folder, "signature")
+        file.write_bytes(said)
+        _openssl("pkeyutl", "-sign", "-inkey", str(secret), "-rawin", "-in", str(file), "-out", str(signature))
+        return signature.read_bytes()
+
+
+def is_signed(said: bytes, signature: bytes, public: Path) -> bool:
+    """Whether the owner of the key has signed these bytes. Raises ``UpdateError`` where there is no openssl."""
+    with tempfile.TemporaryDirectory() as folder:
+        file, sealed = Path(folder, "said"), Path(folder, "signature")
+        file.write_bytes(said)
+        sealed.write_bytes(signature)
+        words = ["-verify", "-pubin", "-inkey", str(public), "-rawin", "-in", str(file), "-sigfile", str(sealed)]
+        return _run("pkeyutl", *words).returncode == 0
+
+
+def _openssl(*words: str) -> str:
+    done = _run(*words)
+    if done.returncode:
+        last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
+        raise UpdateError(f"openssl {words[0]}: {last}")
+    return done.stdout
+
+
+def _run(*words: str) -> subprocess.CompletedProcess[str]:
+    try:
+        return subprocess.run(["openssl", *words], capture_output=True, text=True, timeout=_LIMIT_S, check=False)
+    except FileNotFoundError:
+        raise UpdateError("openssl is not installed") from None
