@@ -136,8 +136,8 @@ def test_without_a_baseline_each_seed_is_played_once(monkeypatch: pytest.MonkeyP
         ("--jobs", "-1", "--jobs -1: must be 1 or more"),
         ("--cars", "0", "--cars 0: must be 1 or more"),
         ("--limit", "0", "--limit 0: must be above 0"),
-        ("--apart", "0", "--apart 0: must be seconds above 0"),
-        ("--apart", "nan", "--apart nan: must be seconds above 0"),
+        ("--apart", "0", "--apart 0: must be above 0"),
+        ("--apart", "nan", "--apart nan: must be above 0"),
         ("--faults-an-hour", "-2", "--faults-an-hour -2: must be above 0"),
     ],
 )
