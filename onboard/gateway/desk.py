@@ -19,7 +19,7 @@ from onboard.gateway.state import Subject
 from onboard.gateway.wishes import wishes_of
 from onboard.ports.broker import Publication
 
-#: Publications that wait to be judged; of more the newest is refused unread and counted.
+#: Publications that wait to be judged; of more the newest is counted and stays with the broker until the next session.
 MOST_WAITING = 64
 #: Errors of refused orders that a machine's state tells, the newest so many.
 MOST_ERRORS = 4
@@ -49,16 +49,16 @@ class OrderDesk:
         reports.keep = self.orders.entries
         self.pauses = Pauses(settings.node_id, seed)
         self._no_pause = wishes.no_pause
-        self._waiting: deque[Publication] = deque()
+        self._waiting: deque[tuple[Publication, Callable[[], None]]] = deque()
         self._actions = {machine.name: InstantActions() for machine in site.machines.values()}
         self._errors: dict[int, deque[Json]] = {}
 
-    def on_publication(self, publication: Publication) -> None:
-        """One publication on a topic subscribed to. Never blocks."""
+    def on_publication(self, publication: Publication, taken: Callable[[], None]) -> None:
+        """One publication on a topic subscribed to; ``taken`` is called once what comes of it is on disk."""
         if len(self._waiting) >= MOST_WAITING:
             self.overflows += 1
             return
-        self._waiting.append(publication)
+        self._waiting.append((publication, taken))
 
     def next_wake(self) -> int | None:
         """When something is due, us; None for never. What waits is due at once."""
@@ -70,7 +70,10 @@ class OrderDesk:
     async def work(self, now_us: int) -> None:
         """Judge what waits and say what is due."""
         while self._waiting:
-            await self._judge(self._waiting.popleft(), now_us)
+            publication, taken = self._waiting.popleft()
+            await self._judge(publication, now_us)
+            # Only now: had the power failed before, the broker would bring it again.
+            taken()
         await self._perform(self.orders.wake(now_us), now_us)
         said, closed = self.pauses.wake(now_us)
         for message in said:

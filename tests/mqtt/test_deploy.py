@@ -57,6 +57,7 @@ async def heard_until(broker: MqttBroker, patterns: tuple[str, ...], last: bytes
     async with asyncio.timeout(20), broker.session("listener", None, patterns) as session:
         ready.set()
         async for one in session.incoming():
+            session.taken(one)
             if one.payload == last:
                 return found
             found.add(one.topic)

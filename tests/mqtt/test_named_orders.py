@@ -16,7 +16,7 @@ from onboard.core.messages import TaskReport
 from onboard.kinds.graph.messages import RobotAt, VisitList
 from tests.graph.sites import hall, made
 from tests.mqtt.logs import VERSIONS, validator
-from tests.mqtt.ordered import NODE, Ordered, park_and_order
+from tests.mqtt.ordered import NODE, FatalJournal, Ordered, park_and_order
 from tests.sites import one_floor
 
 #: The run lasts until the desk's own order at 150 s is done; the gateway ends before.
@@ -105,6 +105,17 @@ def test_an_order_is_driven_once_though_the_gateway_dies(deaths_s: tuple[float, 
     assert len({one.order for _, one in played.messages if isinstance(one, VisitList) and one.sender == NODE}) == 1
     phases = [one["phase"] for one in ordered.told("made", "R1/a")]
     assert phases.count("done") == 1 and "refused" not in phases
+
+
+@pytest.mark.parametrize("written", [False, True])
+def test_an_order_that_the_broker_has_handed_over_is_not_lost_where_the_gateway_dies(written: bool) -> None:
+    """Given once; the power fails between its delivery and `accepted`."""
+    journal = FatalJournal(written=written)
+    played, ordered = run([(20, topic(), order("a", (0, ""), (4, "pick"), (3, "drop")))], journal=journal)
+    assert journal.is_over and played.is_good and ends(played) == [(21, TaskPhase.DONE)]
+    phases = [one["phase"] for one in ordered.told("made", "R1/a")]
+    assert phases.count("done") == 1 and "refused" not in phases
+    assert len({one.order for _, one in played.messages if isinstance(one, VisitList) and one.sender == NODE}) == 1
 
 
 REFUSED: list[tuple[dict[str, Any], str, str]] = [
