@@ -103,6 +103,8 @@ def _actions(dialect: Dialect, site: Site) -> list[Json]:
     if not isinstance(site, Mapd):
         found.append(_action(dialect, "startPause", "held: comes to rest where its rights end, and stands"))
         found.append(_action(dialect, "stopPause", "goes on with the same task"))
+    if isinstance(site, FactoryGraph):
+        found.append(_action(dialect, "cancelOrder", "ends its edge and does nothing more for the order"))
     return found
 
 

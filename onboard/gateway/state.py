@@ -23,6 +23,7 @@ class Subject:
     """What a message tells of, beside the machine: the order's name as its giver knows it, and refused orders."""
 
     order_id: str | None = None
+    update_id: int | None = None
     errors: tuple[Json, ...] = ()
     actions: tuple[Json, ...] = ()
 
@@ -47,7 +48,7 @@ def state(
     nodes, edges = _way(where, sequence)
     told: Json = {
         "orderId": _order_id(task, subject),
-        "orderUpdateId": max(0, task.updates - 1) if task is not None else 0,
+        "orderUpdateId": _update_id(task, subject),
         "lastNodeId": where.node,
         "lastNodeSequenceId": sequence,
         "nodeStates": nodes,
@@ -82,6 +83,12 @@ def _order_id(task: TaskInHand | None, subject: Subject) -> str:
     if subject.order_id is not None:
         return subject.order_id
     return reference_text(task.task) if task is not None else ""
+
+
+def _update_id(task: TaskInHand | None, subject: Subject) -> int:
+    if subject.update_id is not None:
+        return subject.update_id
+    return max(0, task.updates - 1) if task is not None else 0
 
 
 def _way(where: Whereabouts, sequence: int) -> tuple[list[Json], list[Json]]:

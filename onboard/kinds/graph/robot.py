@@ -82,6 +82,8 @@ class GraphRobot:
     body: BodyState | None = None
     mode: RobotMode = RobotMode.FREE
     over: set[Reference] = field(default_factory=set)
+    #: Of these, what was taken back by who gave it.
+    cancelled: set[Reference] = field(default_factory=set)
     #: Whether a host of node agents tells another site: then my map is wrong or old, and I stay where I am (row G27).
     has_other_map: bool = False
     #: Waits at nodes that ended in STOP, for the indicators.
@@ -109,6 +111,8 @@ class GraphRobot:
                 self.planning.errands[task] = errand
             else:
                 self.over.add(task)
+            if errand.is_cancelled:
+                self.cancelled.add(task)
 
     @property
     def site(self) -> FactoryGraph:
@@ -164,7 +168,8 @@ class GraphRobot:
             case RobotAt():
                 self.planning.others[message.sender] = message
             case VisitList() if message.robot == self.fleet.node_id:
-                return self._take_on(Reference(message.sender, message.order), stops_of(message))
+                task, stops = Reference(message.sender, message.order), stops_of(message)
+                return self._take_on(task, stops) if stops else self._take_back(task)
             case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
                 return self._on_award(message)
             case ManualOrder() if message.machine == self.fleet.node_id:
@@ -229,6 +234,16 @@ class GraphRobot:
         self.planning.errands[task] = errand
         return [errand_record(errand), self._report(task)]
 
+    def _take_back(self, task: Reference) -> list[Effect]:
+        """Who gave an order by name wants it no more: it ends its edge, and does nothing more for it."""
+        if task not in self.over:
+            self.planning.errands.pop(task, None)
+            self.over.add(task)
+            self.cancelled.add(task)
+            self._loaded_at_us = None
+            return [errand_record(Errand(task, (), is_cancelled=True)), self._report(task)]
+        return [self._report(task)]
+
     def _on_award(self, award: Award) -> list[Effect]:
         """Said again: my word was lost. For a bid that I have forgotten: it is given back."""
         if award.task in self.planning.errands or award.task in self.over:
@@ -239,6 +254,8 @@ class GraphRobot:
 
     def _report(self, task: Reference) -> Send:
         phase = TaskPhase.AWARDED if task in self.planning.errands else TaskPhase.DONE
+        if task in self.cancelled:
+            return Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.CANCELLED))
         return Send(TaskReport(self.fleet.node_id, task, phase, 0, Reason.NONE))
 
     @property
