@@ -182,8 +182,17 @@ class GraphWishes(NoWishes):
         self._graph = site
 
     def transport(self, told: dict[str, Any]) -> Wish:
-        """Only an order desk calls for the nearest robot (onboard/kinds/graph/desk.py)."""
-        raise RefusedError("UNSUPPORTED", "give a VDA 5050 order to a robot; transports come in at a desk")
+        """``from`` one node ``to`` another: a desk calls for it, and the robot that does it best has it (row G28)."""
+        desks = sorted(node for node, one in self._graph.machines.items() if one.kind is KindCode.DESK)
+        if not desks:
+            raise RefusedError("UNSUPPORTED", "this site has no desk that calls for a transport")
+        if "car" in told:
+            raise RefusedError("UNSUPPORTED", "loads have no names here; say from where to where", "$.car")
+        for key in ("from", "to"):
+            if key not in told:
+                raise RefusedError("INCOMPLETE", "say from where to where", f"$.{key}")
+            self._node(told[key], f"$.{key}")
+        return Wish("send", desks[0], stops=(int(told["from"]), int(told["to"])))
 
     def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
         """The nodes with an action and the last one are stops; between them the robot goes its own way.
@@ -210,12 +219,15 @@ class GraphWishes(NoWishes):
         return Wish("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
 
     def _check(self, node: dict[str, Any], path: str) -> None:
-        if not node["nodeId"].isdecimal() or int(node["nodeId"]) not in self._graph.graph.neighbours:
-            raise RefusedError("UNKNOWN_PLACE", "no node of this graph", f"{path}.nodeId")
+        self._node(node["nodeId"], f"{path}.nodeId")
         for number, action in enumerate(node["actions"]):
             if action["actionType"] not in ("pick", "drop"):
                 where = f"{path}.actions[{number}].actionType"
                 raise RefusedError("UNSUPPORTED", "of actions only pick and drop are known", where)
+
+    def _node(self, name: str, path: str) -> None:
+        if not name.isdecimal() or int(name) not in self._graph.graph.neighbours:
+            raise RefusedError("UNKNOWN_PLACE", "no node of this graph", path)
 
     def say(self, order: Order, sender: int) -> Said:
         """The list of nodes until the robot answers; without any node, that the order is taken back."""
