@@ -224,24 +224,24 @@ class Orders:
             order.owner = report.sender if by_robot and life is not Life.CALLED else 0
             outcome.changed.append(order)
 
-    def wake(self, now_us: int) -> Outcome:
-        """Say what is due."""
+    def wake(self, now_us: int, wall_us: int) -> Outcome:
+        """Say what is due; ``wall_us`` is the same moment since 1970."""
         outcome = Outcome()
         if not self._asked:
             self._asked = True
             outcome.say += self._wishes.ask_all(self._node_id)
         for order in self.open:
             if order.due_us is not None and order.due_us <= now_us:
-                self._say(order, now_us, outcome)
+                self._say(order, now_us, wall_us, outcome)
         return outcome
 
     def next_wake(self) -> int | None:
         """When something is due; None for never."""
         return min((order.due_us for order in self.open if order.due_us is not None), default=None)
 
-    def _say(self, order: Order, now_us: int, outcome: Outcome) -> None:
+    def _say(self, order: Order, now_us: int, wall_us: int, outcome: Outcome) -> None:
         try:
-            said = self._wishes.say(order, self._node_id)
+            said = self._wishes.say(order, self._node_id, wall_us)
         except RefusedError as refused:
             gone = order.was_said and refused.reason == "UNKNOWN_TICKET"
             # Asked for before, and not in the park any more: somebody has it.
