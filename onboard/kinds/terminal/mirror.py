@@ -97,7 +97,7 @@ class TerminalMirror:
     def _on_box(self, statement: CarAt) -> None:
         record = self.fleet.cars.get(statement.car)
         number = statement.car.number
-        if record is None or statement.car.origin != self.site.desk:
+        if record is None or statement.car.origin != self.site.desk or not 0 < number <= len(self.site.boxes):
             return
         station = record.station if record.station != ANY_STATION else 0
         if any(number in row for at, row in self.standing.items() if at == station):

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from onboard.core.messages import Reference
 from onboard.kinds.terminal.messages import MissionKey, Verb
 from onboard.kinds.terminal.mirror import TerminalMirror
-from onboard.kinds.terminal.site import Terminal
+from onboard.kinds.terminal.site import EntityKind, Terminal
 
 
 @dataclass
@@ -66,13 +66,21 @@ class Orders:
         del self._typed[key.mission]
         if key.verb is Verb.LOAD:
             types = types_of(self.site)
-            if key.what >= len(types) or key.source not in self.site.entities:
+            if key.what >= len(types) or not (self._is_place(key.source) or self._is_area(key.source)):
                 return None
             order.left, order.type, order.source = key.count, types[key.what], key.source
-        if key.mission in self.missions or key.target not in self.site.entities:
+        if key.mission in self.missions or not (order.left or order.named) or not self._is_place(key.target):
             return None
         self.missions[key.mission] = order
         return order
+
+    def _is_place(self, number: int) -> bool:
+        entity = self.site.entities.get(number)
+        return entity is not None and entity.kind is EntityKind.STATION
+
+    def _is_area(self, number: int) -> bool:
+        entity = self.site.entities.get(number)
+        return entity is not None and entity.kind is EntityKind.AREA
 
     def next(self, mirror: TerminalMirror, taken: set[int]) -> Transport | None:
         """The transport to be called for next: the best mission with an available box (nothing above, M23)."""
