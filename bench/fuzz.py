@@ -1,7 +1,7 @@
 """Live controllers under random and mutated frames.
 
-``python -m bench.fuzz [FRAMES] [SEED] [SITE ...]``: a million frames for one machine of each kind on the small site, or on
-those named (shipped ones, or site files of any system). Each line: frames, program errors (must be 0), drops that no
+``python -m bench.fuzz [FRAMES] [SEED] [SITE ...]``: a million frames for one machine of each kind on the small site, or
+on those named (shipped ones, or site files of any system). Each line: frames, program errors (must be 0), drops that no
 reason counted (must be 0), size of all tables over time, frames a second.
 """
 

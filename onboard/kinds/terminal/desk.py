@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import CallResult, Criterion, KindCode, MachineState, Operation, Reason, TaskPhase, TokenKind
-from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
 from onboard.core.messages import CallForProposals, CarAt, Heartbeat, Message, Reference, TaskReport, TokenGrant
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent
@@ -23,6 +23,7 @@ from onboard.kinds.terminal.messages import (
     ManualMode,
     ManualOrder,
     ManualState,
+    MissionAnswer,
     MissionKey,
     PlanHead,
     TaskTerms,
@@ -222,9 +223,13 @@ class Desk:
     def _typed(self, key: MissionKey, now_us: int) -> list[Effect]:
         """A mission; an urgent one interrupts: what was called for and not awarded waits (row M29)."""
         order = self.orders.key(key)
+        is_taken = self.orders.answer(key)
         if order is None:
-            return []
-        effects: list[Effect] = [Record(self.orders.record())]
+            return [] if is_taken is None else [Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
+        effects: list[Effect] = [
+            Record(self.orders.record()),
+            Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True)),
+        ]
         if order.urgent:
             for task, terms in list(self.calls.items()):
                 transport = self.orders.open.get(task)

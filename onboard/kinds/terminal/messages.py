@@ -231,6 +231,14 @@ class MissionKey(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class MissionAnswer(Message):
+    """A mission that came whole is in the desk's journal, or is nothing that can be carried out."""
+
+    mission: int
+    is_taken: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ManualKey(Message):
     """What a person presses for ``vehicle``; ``number`` grows by one with each press at a desk."""
 
@@ -242,5 +250,5 @@ class ManualKey(Message):
 MESSAGES = (
     PlanHead, PlanStep, PlanTask, StepReport, LaneState, TaskTerms, Assignment,
     MoveOrder, MoveState, HandlerOrder, HandlerState, LaneSensor, MissionKey,
-    ManualOrder, ManualState, ManualKey,
+    MissionAnswer, ManualOrder, ManualState, ManualKey,
 )  # fmt: skip

@@ -1,5 +1,6 @@
 """Missions at a desk: orders become transports, one box each (rows M04 to M06, M23); kept in the journal."""
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -7,6 +8,9 @@ from onboard.core.messages import Reference
 from onboard.kinds.terminal.messages import MissionKey, Verb
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.site import EntityKind, Terminal
+
+#: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
+KNOWN = 127
 
 
 @dataclass
@@ -51,10 +55,14 @@ class Orders:
     won: dict[Reference, int] = field(default_factory=dict)
     done: int = 0
     last_task: int = 0
+    #: The newest missions that were taken, so that one said again is not carried out again.
+    taken: deque[int] = field(default_factory=lambda: deque(maxlen=KNOWN))
     _typed: dict[int, Order] = field(default_factory=dict)
 
     def key(self, key: MissionKey) -> Order | None:
         """What an operator types; the mission that it completes, or None. Unknown types and boxes are passed over."""
+        if key.mission in self.taken:
+            return None
         order = self._typed.setdefault(
             key.mission,
             Order(key.mission, key.target, before_us=key.before_s * 1_000_000, urgent=key.urgent),
@@ -62,6 +70,8 @@ class Orders:
         if key.verb is Verb.TRANSHIP:
             if 1 <= key.what <= len(self.site.boxes) and key.what not in order.named:
                 order.named.append(key.what)
+            return None
+        if key.verb is Verb.END and len(order.named) < key.count:
             return None
         del self._typed[key.mission]
         if key.verb is Verb.LOAD:
@@ -72,7 +82,14 @@ class Orders:
         if key.mission in self.missions or not (order.left or order.named) or not self._is_place(key.target):
             return None
         self.missions[key.mission] = order
+        self.taken.append(key.mission)
         return order
+
+    def answer(self, key: MissionKey) -> bool | None:
+        """Whether what was typed is a mission that will be carried out; None while more of it is to come."""
+        if key.mission in self.taken:
+            return True
+        return None if key.verb is Verb.TRANSHIP or key.mission in self._typed else False
 
     def _is_place(self, number: int) -> bool:
         entity = self.site.entities.get(number)
@@ -172,7 +189,9 @@ class Orders:
             f"{self.won.get(one.task, 0)}"
             for one in self.open.values()
         )
-        return {"record": "orders", "missions": missions, "tasks": tasks, "last": self.last_task, "done": self.done}
+        taken = ";".join(str(number) for number in self.taken)
+        counts: dict[str, str | int] = {"last": self.last_task, "done": self.done}
+        return {"record": "orders", "missions": missions, "tasks": tasks, "taken": taken, **counts}
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """What the newest entry says."""
@@ -180,6 +199,7 @@ class Orders:
         if newest is None:
             return
         self.last_task, self.done = int(newest["last"]), int(newest["done"])
+        self.taken.extend(int(number) for number in str(newest.get("taken", "")).split(";") if number)
         for row in str(newest["missions"]).split(";"):
             if row:
                 number, target, left, kind, source, before, is_urgent, named = row.split(",")
