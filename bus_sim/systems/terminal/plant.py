@@ -8,7 +8,7 @@ from bus_sim.plant.link import BusDeviceLink
 from bus_sim.plant.timers import Timers
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.world import VehicleBody, World
-from onboard.core.codes import KindCode
+from onboard.core.codes import KindCode, ManualMode
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.kinds.terminal.messages import (
@@ -18,7 +18,6 @@ from onboard.kinds.terminal.messages import (
     HandlerState,
     LaneSensor,
     ManualKey,
-    ManualMode,
     MissionAnswer,
     MissionKey,
     MoveMode,
