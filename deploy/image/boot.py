@@ -38,11 +38,11 @@ def boot_files(debian: Debian, root: Root, to: Path) -> Path:
     return to
 
 
-def make_boot_partition(to: Path, files: Iterable[Path], size_mb: int = BOOT_MB) -> Path:
-    """A FAT file system called ONBOARD that holds these files and folders; same content, same bytes."""
+def make_fat(to: Path, files: Iterable[Path], size_mb: int = BOOT_MB, label: str = LABEL) -> Path:
+    """A FAT file system that holds these files and folders; same content, same bytes."""
     with to.open("wb") as file:
         file.truncate(size_mb << 20)
-    run_tool(["mkfs.vfat", "-F", "32", "-n", LABEL, "-i", _SERIAL, "--invariant", str(to)])
+    run_tool(["mkfs.vfat", "-F", "32", "-n", label, "-i", _SERIAL, "--invariant", str(to)])
     add_files(to, files)
     return to
 
