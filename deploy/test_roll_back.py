@@ -1,4 +1,4 @@
-"""Updates from a stick, in an emulated machine: one cut off by the loss of power, a good one, and one that is broken."""
+"""Updates from a stick, in an emulated machine: one cut off by a power cut, a good one, and one that is broken."""
 
 from functools import partial
 from pathlib import Path
