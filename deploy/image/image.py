@@ -30,11 +30,11 @@ class Image:
     root: Root
 
 
-def build_image(to: Path, release: Release, store: Path = STORE) -> Image:
+def build_image(to: Path, release: Release, store: Path = STORE, pi_firmware: Path | None = None) -> Image:
     """Write the image, and beside it, in a folder, what it was made from. Raises ``DeployError``, ``OSError``."""
     parts = to.with_suffix("")
     root = build_root(parts, release, store)
-    boot = boot_files(fetch_debian(store), root, parts / "boot")
+    boot = boot_files(fetch_debian(store), root, parts / "boot", pi_firmware)
     partition = make_fat(parts / "boot.img", sorted(boot.iterdir()))
     journal = make_journal_partition(parts / "journal.img")
     slots = [Part(LINUX, SLOT_MB, root.squashfs), Part(LINUX, SLOT_MB)]
