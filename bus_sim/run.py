@@ -14,6 +14,7 @@ from bus_sim.can.medium import Medium, Tap
 from bus_sim.can.node import SimulatedBus
 from bus_sim.journal import SimulatedJournal
 from bus_sim.plant.plant import Plant
+from bus_sim.plant.timers import Timers
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.controller.shell import Controller, Ports
 from onboard.core.behaviour import BehaviourFactory
@@ -76,6 +77,10 @@ class NoWatchdog:
 
 class PlantPort(Protocol):
     """What a run asks of the plant of any system: everything that is not a controller."""
+
+    @property
+    def timers(self) -> Timers:
+        """The loop's time and calls at chosen times, for whatever happens to the run from outside."""
 
     def start(self) -> None:
         """Power on: every device tells how it stands."""

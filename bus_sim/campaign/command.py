@@ -14,30 +14,37 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from bus_sim.campaign import table
 from bus_sim.campaign.engine import on_cores, on_dask
-from bus_sim.campaign.points import SCENE, Single, count, points, reference
-from bus_sim.campaign.profiles import PROFILES
+from bus_sim.campaign.points import SCENE, SCENE_LIMIT_S, Single, count, points, reference
+from bus_sim.campaign.profiles import PROFILES, kinds_for
+from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
-from bus_sim.campaign.trial import FAILURES, play
+from bus_sim.campaign.systems import SYSTEMS, usual_orders, with_orders
+from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
+from bus_sim.systems.orders import Orders
 from onboard.core.site import Site
-from onboard.kinds.car_park.site import CarPark
 
-#: Longest mean time between two cars, s: nobody plays longer runs than this. Ours.
+#: What comes to a car park in a run, and how far apart, s.
+CARS, APART_S = 6, 120.0
+#: Longest run, and longest mean time between two cars, s: eleven days. Ours.
 LONGEST_S = 1_000_000
+#: Most orders of a run: their numbers have 16 bits on the wire, of which some systems use a part. Ours.
+MOST_ORDERS = 10_000
 #: One fault a second: more is no fleet under faults, but a fleet that is off. Ours.
 MOST_AN_HOUR = 3_600
 
 HELP = """\
-Each seed brings its own customers and its own faults, drawn from the profile. A run with a failure is shrunk to the
-fewest faults that still fail; its scenario (bus-sim run --scenario FILE) and its trace are kept. Every run is judged
-by the plant's oracle and by the checkers of `onboard trace check`: safety at any time, and when all faults are over
-also that everything goes on, that everybody is served or told why, and that all mirrors become equal.
+Each seed brings its own customers to a car park, or its own orders to any other site, and its own faults, drawn from
+the profile. A run with a failure is shrunk to the fewest faults that still fail; its scenario (bus-sim run --scenario
+FILE) and its trace are kept. Every run is judged by the plant's oracle and by the checkers of `onboard trace check`:
+safety at any time, and when all faults are over also that everything goes on, that everybody is served or told why,
+and that all mirrors become equal.
 
-With --exhaustive one reference scene (a car in and out) is played again and again, each time with one single fault:
-every frame lost or doubled at each receiver, or every controller killed before each of its frames and around each of
-its journal writes.
+With --exhaustive one reference scene of a car park (a car in and out) is played again and again, each time with one
+single fault: every frame lost or doubled at each receiver, or every controller killed before each of its frames and
+around each of its journal writes.
 
 exit status:
   0  every run was safe, and went on once its faults were over
@@ -47,6 +54,7 @@ exit status:
 examples:
   bus-sim campaign small --seeds 1-100 --faults crash
   bus-sim campaign standard --seeds 1-8 --cars 300 --apart 90 --faults-an-hour 6 --no-baseline --limit 86400
+  bus-sim campaign graph --seeds 1-30 --orders 40
   bus-sim campaign small --exhaustive crash --sample 400
   bus-sim campaign standard --seeds 1-2000 --dask tcp://10.0.0.5:8786
 """
@@ -69,22 +77,36 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--sample", type=int, metavar="N", help="with --exhaustive: only so many, spread over all")
     parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
-    parser.add_argument("--cars", type=int, default=6, metavar="N", help="cars in each run (default: 6)")
+    parser.add_argument("--cars", type=int, metavar="N", help=f"cars in each run of a car park (default: {CARS})")
     parser.add_argument(
-        "--apart", type=float, default=120.0, metavar="SECONDS", help="mean time between two cars (default: 120)"
+        "--orders",
+        type=int,
+        metavar="N",
+        help="orders in each run of any other site; 0 for those of the site file (default: a few, by the system)",
+    )
+    parser.add_argument(
+        "--apart",
+        type=float,
+        metavar="SECONDS",
+        help=f"mean time between two cars, or orders (default: {APART_S:g} for cars, else by the system)",
     )
     parser.add_argument(
         "--faults-an-hour",
         type=float,
         metavar="N",
-        help="so many faults in the mean, over the whole run (default: 1 to 4 in its first 900 s)",
+        help="so many faults in the mean, over the whole run (default: 1 to 4, in the first 900 s of a car park's run)",
     )
     parser.add_argument(
         "--no-baseline",
         action="store_true",
         help="do not play each seed without its faults first: twice as fast, and no run is called delayed",
     )
-    parser.add_argument("--limit", type=float, default=7200.0, metavar="SECONDS", help="longest run (default: 7200)")
+    parser.add_argument(
+        "--limit",
+        type=float,
+        metavar="SECONDS",
+        help=f"longest run (default: {SCENE_LIMIT_S:g} on a car park, else by the orders)",
+    )
     parser.add_argument(
         "--out", type=Path, default=Path("campaign"), metavar="DIR", help="failures (default: campaign)"
     )
@@ -94,9 +116,7 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
 def run_campaign_command(args: argparse.Namespace) -> int:
     """Play it. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for an unknown site."""
     site = find_site(args.site)
-    if not isinstance(site, CarPark):
-        raise DemandError(f"{args.site}: a {site.system}, and campaigns bring cars; name a car park")
-    plan = _plan(args)
+    plan = _plan(args, site)
     console = Console()
     trials, total = _trials(args, plan, site, console)
     results: list[Result] = []
@@ -121,9 +141,9 @@ def _trials(args: argparse.Namespace, plan: Plan, site: Site, console: Console) 
     if args.exhaustive is None:
         seeds = _seeds(args.seeds)
         head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
-        console.print(f"{head}, {plan.arrivals.cars} cars each", highlight=False)
+        console.print(f"{head}, {brought(site, plan.arrivals, plan.orders)} each", highlight=False)
         return play_all(partial(run_seed, plan), seeds), len(seeds)
-    counts = count(site, reference(plan.site, plan.limit_s))
+    counts = count(site, reference(plan.site, plan.limit_s or SCENE_LIMIT_S))
     plan = replace(plan, usual_wait_s=counts.longest_wait_s)
     every = [Point(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)]
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
@@ -131,32 +151,75 @@ def _trials(args: argparse.Namespace, plan: Plan, site: Site, console: Console) 
     return play_all(partial(run_point, plan), chosen), len(chosen)
 
 
-def _plan(args: argparse.Namespace) -> Plan:
-    if args.faults not in PROFILES:
-        raise DemandError(f"--faults {args.faults}: no such profile; profiles are {', '.join(PROFILES)}")
-    if args.jobs < 0:
-        raise DemandError(f"--jobs {args.jobs}: must be 1 or more; leave it out for one a core")
-    if args.cars < 1:
-        raise DemandError(f"--cars {args.cars}: must be 1 or more")
-    if not (0 < args.apart <= LONGEST_S):
-        raise DemandError(f"--apart {args.apart:g}: must be seconds above 0, and at most {LONGEST_S}")
-    if args.faults_an_hour is not None and not (0 < args.faults_an_hour <= MOST_AN_HOUR):
-        raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
-    if not args.limit > 0:
-        raise DemandError(f"--limit {args.limit}: must be above 0")
-    if args.sample is not None and (args.sample < 1 or args.exhaustive is None):
-        raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive")
+def brought(site: Site, arrivals: Arrivals, orders: Orders | None) -> str:
+    """What comes to a site in a run, in words."""
+    if site.system not in SYSTEMS:
+        return f"{arrivals.cars} cars"
+    return f"{orders.count} orders" if orders is not None and orders.count else "the site's own orders"
+
+
+def _plan(args: argparse.Namespace, site: Site) -> Plan:
+    _check(args)
+    if site.system in SYSTEMS:
+        return _plan_of_system(args, site)
+    if args.orders is not None:
+        raise DemandError(f"--orders {args.orders}: {site.name} is a car park; write --cars")
+    limit_s = SCENE_LIMIT_S if args.limit is None else args.limit
     if args.exhaustive is not None:
-        return Plan(args.site, args.exhaustive, args.limit, SCENE, args.out)
+        return Plan(args.site, args.exhaustive, limit_s, SCENE, out=args.out)
+    apart_s = APART_S if args.apart is None else args.apart
+    return Plan(
+        args.site,
+        args.faults,
+        limit_s,
+        Arrivals(CARS if args.cars is None else args.cars, apart_s, apart_s / 2),
+        out=args.out,
+        faults_an_hour=args.faults_an_hour,
+        has_baseline=not args.no_baseline,
+    )
+
+
+def _plan_of_system(args: argparse.Namespace, site: Site) -> Plan:
+    """A plan for a site that is no car park, of which a seed's orders have been drawn once to see that they can be."""
+    for option, value in (("cars", args.cars), ("exhaustive", args.exhaustive)):
+        if value is not None:
+            raise DemandError(f"--{option} {value}: {site.name} is a {site.system}, and only a car park has it")
+    if args.faults != "none" and not kinds_for(args.faults, site):
+        raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, and only a car park has them")
+    orders = usual_orders(site, args.orders, args.apart)
+    with_orders(site, orders, seed=_seeds(args.seeds)[0])
     return Plan(
         args.site,
         args.faults,
         args.limit,
-        Arrivals(args.cars, args.apart, args.apart / 2),
-        args.out,
+        orders=orders,
+        out=args.out,
         faults_an_hour=args.faults_an_hour,
         has_baseline=not args.no_baseline,
     )
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Raise ``DemandError`` for the first value that no site takes."""
+    if args.faults not in PROFILES:
+        raise DemandError(f"--faults {args.faults}: no such profile; profiles are {', '.join(PROFILES)}")
+    if args.jobs < 0:
+        raise DemandError(f"--jobs {args.jobs}: must be 1 or more; leave it out for one a core")
+    if args.cars is not None and args.cars < 1:
+        raise DemandError(f"--cars {args.cars}: must be 1 or more")
+    if args.orders is not None and not 0 <= args.orders <= MOST_ORDERS:
+        raise DemandError(f"--orders {args.orders}: must be from 0 to {MOST_ORDERS}")
+    _check_seconds("apart", args.apart)
+    _check_seconds("limit", args.limit)
+    if args.faults_an_hour is not None and not 0 < args.faults_an_hour <= MOST_AN_HOUR:
+        raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
+    if args.sample is not None and (args.sample < 1 or args.exhaustive is None):
+        raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive")
+
+
+def _check_seconds(option: str, value: float | None) -> None:
+    if value is not None and not 0 < value <= LONGEST_S:
+        raise DemandError(f"--{option} {value:g}: must be above 0, and at most {LONGEST_S} seconds")
 
 
 def _seeds(text: str) -> range:
@@ -174,8 +237,8 @@ def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
     scenario, site = load_scenario(path)
     console = Console()
     console.print(
-        f"scenario {path.name}: site {site.name}, {scenario.arrivals.cars} cars, seed {scenario.seed}, "
-        f"{len(scenario.faults)} faults",
+        f"scenario {path.name}: site {site.name}, {brought(site, scenario.arrivals, scenario.orders)}, "
+        f"seed {scenario.seed}, {len(scenario.faults)} faults",
         highlight=False,
         soft_wrap=True,
     )
@@ -184,7 +247,7 @@ def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
     report = play(site, scenario, trace=trace)
     told = [
         f"outcome      {report.verdict.value}",
-        f"customers    served {report.served}   told why {report.told}   waiting {report.waiting}   "
+        f"{table.who([report]):<13}served {report.served}   told why {report.told}   waiting {report.waiting}   "
         f"longest wait {report.longest_wait_s:.0f} s   in {report.simulated_s:.0f} s",
         *(f"HALTED       {line}" for line in report.halted),
         *(f"VIOLATION    {line}" for line in report.violations),

@@ -9,10 +9,7 @@ from functools import partial
 from bus_sim.can.medium import Medium
 from bus_sim.run import FLEET, BusRun
 from onboard.core.frame import Frame
-from onboard.trace.check.checks import RULES, Checks
-
-#: Rules that say that something must happen in time; all others are rules of safety.
-LIVENESS = frozenset(rule.name for rule in RULES if rule.liveness)
+from onboard.trace.check.systems import checks_for, rules_for
 
 
 class Judges:
@@ -20,7 +17,9 @@ class Judges:
 
     def __init__(self, run: BusRun, *, disturbed: bool) -> None:
         self._site = run.site
-        self._checks = Checks(run.site, disturbed=disturbed, fleet=run.codecs.fleet, device=run.codecs.device)
+        #: Rules that say that something must happen in time; all others are rules of safety.
+        self._liveness = frozenset(rule.name for rule in rules_for(run.site) if rule.liveness)
+        self._checks = checks_for(run.site, disturbed=disturbed)
         self._listen(FLEET, run.fleet)
         for node_id, medium in run.devices.items():
             self._listen(run.site.machines[node_id].name, medium)
@@ -34,7 +33,7 @@ class Judges:
     @property
     def is_unsafe(self) -> bool:
         """Whether a rule was broken that holds at any time, also under faults."""
-        return bool(self._checks.verdict.counts.keys() - LIVENESS)
+        return bool(self._checks.verdict.counts.keys() - self._liveness)
 
     def excuse(self, until_us: int) -> None:
         """Faults last until then, loop time in us: what must happen in time has time from there."""
@@ -43,8 +42,8 @@ class Judges:
     def finish(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """The run is over: what was unsafe, and what stood still though nothing was broken any more."""
         findings = self._checks.finish().findings
-        unsafe = tuple(one.line(self._name) for one in findings if one.rule not in LIVENESS)
-        return unsafe, tuple(one.line(self._name) for one in findings if one.rule in LIVENESS)
+        unsafe = tuple(one.line(self._name) for one in findings if one.rule not in self._liveness)
+        return unsafe, tuple(one.line(self._name) for one in findings if one.rule in self._liveness)
 
     def _name(self, node: int) -> str:
         machine = self._site.machines.get(node)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
 
-from bus_sim.campaign.trial import ORIGIN_US, STEP_US, is_over
+from bus_sim.campaign.car_park import ORIGIN_US, is_over
+from bus_sim.campaign.trial import STEP_US
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.scenario import Arrivals, Scenario
@@ -34,6 +35,10 @@ class Single(StrEnum):
 
 #: One car, fetched two minutes later.
 SCENE = Arrivals(cars=1, mean_s=5.0, sigma_s=1.0, min_stay_s=120.0)
+
+
+#: The longest that it may take under a fault, s, unless another limit is asked for. Ours.
+SCENE_LIMIT_S = 7_200.0
 
 
 @dataclass

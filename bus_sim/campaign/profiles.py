@@ -7,8 +7,10 @@ from typing import Final
 
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.table import Value
+from bus_sim.systems.session import FAULTS
 from onboard.core.codes import KindCode
 from onboard.core.site import Site
+from onboard.kinds.car_park.site import CarPark
 
 #: Faults begin in this span after power-up, s: all of it while customers come and go, and all end before it is over.
 SPAN_S = (20.0, 900.0)
@@ -111,16 +113,24 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
 _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
 
 
-def draw_faults(profile: str, seed: int, site: Site) -> tuple[Injection, ...]:
-    """The faults of one seed, by time; always the same for the same profile, seed and site."""
+def kinds_for(profile: str, site: Site) -> dict[str, Draw]:
+    """The kinds of a profile that this site can have: what only a car park has is left out on any other."""
     kinds = PROFILES[profile]
+    if site.system == CarPark.system:
+        return kinds
+    return {kind: draw for kind, draw in kinds.items() if kind in FAULTS}
+
+
+def draw_faults(profile: str, seed: int, site: Site, span_s: tuple[float, float] = SPAN_S) -> tuple[Injection, ...]:
+    """The faults of one seed, by time; always the same for the same profile, seed, site and span."""
+    kinds = kinds_for(profile, site)
     if not kinds:
         return ()
     chance = random.Random(f"faults:{profile}:{site.name}:{seed}")
     drawn = []
     for _ in range(chance.randint(*COUNT)):
         kind = chance.choice(list(kinds))
-        at_s = round(chance.uniform(*SPAN_S), 6)
+        at_s = round(chance.uniform(*span_s), 6)
         when: dict[str, Value] = {} if kind in _WITHOUT_TIME else {"at_s": at_s}
         drawn.append((at_s, Injection(kind, {**when, **kinds[kind](chance, site)})))
     return tuple(injection for _, injection in sorted(drawn, key=lambda one: one[0]))
@@ -133,7 +143,7 @@ def draw_at_rate(
 
     ``arrivals_s`` is when each car comes, in order, s after power-up. Always the same for the same arguments.
     """
-    kinds = PROFILES[profile]
+    kinds = kinds_for(profile, site)
     if not kinds:
         return ()
     chance = random.Random(f"faults:{profile}:{site.name}:{seed}:{an_hour:g}")

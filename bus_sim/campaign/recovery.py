@@ -11,7 +11,7 @@ from typing import Final
 from bus_sim.can.faults import Fault, FaultInjector, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.table import KINDS
-from bus_sim.run import Simulation
+from bus_sim.run import BusRun
 from onboard.controller.shell import Controller
 from onboard.core.codes import MachineState
 from onboard.core.frame import Frame
@@ -55,9 +55,9 @@ def healed_us(faults: Iterable[AnyFault]) -> int:
 
 
 class Recovery:
-    """Measures one run; to be made before ``Simulation.start``. ``longest_us`` and ``counts`` are by measure."""
+    """Measures one run; to be made before ``BusRun.start``. ``longest_us`` and ``counts`` are by measure."""
 
-    def __init__(self, simulation: Simulation, faults: Iterable[AnyFault]) -> None:
+    def __init__(self, simulation: BusRun, faults: Iterable[AnyFault]) -> None:
         self.longest_us: dict[Measure, int] = {}
         self.counts: dict[Measure, int] = {}
         faults = tuple(faults)

@@ -1,19 +1,24 @@
 """Trials by their numbers: the seeds of a profile, or the points of the reference scene; failures are kept."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from bus_sim.campaign.car_park import ORIGIN_US
 from bus_sim.campaign.engine import on_cores
-from bus_sim.campaign.points import reference
+from bus_sim.campaign.points import SCENE_LIMIT_S, reference
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults
+from bus_sim.campaign.report import FAILURES, Report, Verdict
 from bus_sim.campaign.shrink import shrink
-from bus_sim.campaign.trial import FAILURES, ORIGIN_US, Report, Verdict, play
+from bus_sim.campaign.systems import SYSTEMS, patience_s, span_s, with_orders
+from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import AnyFault
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.sites import find_site
+from bus_sim.systems.orders import Orders
 from onboard.core.site import Site
 
 
@@ -23,7 +28,8 @@ class Plan:
 
     site: str
     profile: str
-    limit_s: float = 7_200.0
+    #: None: by the site's orders.
+    limit_s: float | None = 7_200.0
     arrivals: Arrivals = field(default_factory=Arrivals)
     out: Path | None = None
     #: The longest wait without faults, s, where it is known: of the reference scene, for single faults.
@@ -32,6 +38,8 @@ class Plan:
     faults_an_hour: float | None = None
     #: Whether each seed is played without its faults first: a run can be called delayed only then.
     has_baseline: bool = True
+    #: What each seed brings to a site that is no car park.
+    orders: Orders | None = None
 
 
 class Point(NamedTuple):
@@ -54,7 +62,7 @@ class Result:
 def run_seed(plan: Plan, seed: int) -> Result:
     """Play one seed: first without its faults, to know how long one usually waits, then with them."""
     site = find_site(plan.site)
-    bare = Scenario(plan.site, seed, plan.limit_s, plan.arrivals)
+    bare = Scenario(plan.site, seed, _limit_s(plan, site, seed), plan.arrivals, orders=plan.orders)
     scenario = bare.with_faults(_faults(plan, bare, site))
     usual = play(site, bare) if plan.has_baseline or not scenario.faults else None
     if usual is not None and not scenario.faults:
@@ -67,8 +75,17 @@ def run_seed(plan: Plan, seed: int) -> Result:
     return Result(seed, report, least, _keep(plan, site, seed, least, report))
 
 
+def _limit_s(plan: Plan, site: Site, seed: int) -> float:
+    return plan.limit_s or math.ceil(patience_s(with_orders(site, plan.orders, seed)))
+
+
 def _faults(plan: Plan, bare: Scenario, site: Site) -> tuple[AnyFault, ...]:
     """At a rate they strike until the last car is fetched, or has come where nobody fetches it."""
+    if site.system in SYSTEMS:
+        span = span_s(with_orders(site, bare.orders, bare.seed))
+        if plan.faults_an_hour is None:
+            return draw_faults(plan.profile, bare.seed, site, span)
+        return draw_at_rate(plan.profile, bare.seed, site, plan.faults_an_hour, span[1])
     if plan.faults_an_hour is None:
         return draw_faults(plan.profile, bare.seed, site)
     stays = bare.arrivals.demand(bare.seed).stays
@@ -81,7 +98,7 @@ def _faults(plan: Plan, bare: Scenario, site: Site) -> tuple[AnyFault, ...]:
 def run_point(plan: Plan, point: Point) -> Result:
     """Play the reference scene with one single fault; there is nothing to shrink."""
     site = find_site(plan.site)
-    scenario = reference(plan.site, plan.limit_s).with_faults([point.fault])
+    scenario = reference(plan.site, plan.limit_s or SCENE_LIMIT_S).with_faults([point.fault])
     report = play(site, scenario, usual_wait_s=plan.usual_wait_s)
     if report.verdict not in FAILURES:
         return Result(point.number, report)

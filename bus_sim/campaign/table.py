@@ -3,8 +3,8 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from bus_sim.campaign.report import Report, Verdict, kinds_of
 from bus_sim.campaign.runner import Plan, Result
-from bus_sim.campaign.trial import Verdict, kinds_of
 
 #: In the order of the table's columns.
 COLUMNS = (
@@ -40,6 +40,11 @@ def lines(results: Sequence[Result]) -> list[str]:
     return text + _customers(results) + _recovery(results) + _failures(results)
 
 
+def who(reports: Sequence[Report]) -> str:
+    """Whom the reports count: customers, or what a system calls its orders."""
+    return reports[0].who if reports else Report.who
+
+
 def _customers(results: Sequence[Result]) -> list[str]:
     reports = [result.report for result in results]
     served, told = sum(one.served for one in reports), sum(one.told for one in reports)
@@ -47,9 +52,12 @@ def _customers(results: Sequence[Result]) -> list[str]:
     everybody = served + told + waiting
     share = full / everybody if everybody else 0.0
     hours = sum(one.simulated_s for one in reports) / 3600
+    refused = (
+        f"; refused because the park was full: {full} ({100 * share:.1f} %)" if who(reports) == "customers" else ""
+    )
     return [
-        f"{len(reports)} runs, {hours:.1f} simulated hours, {everybody} customers: served {served}, told why {told}, "
-        f"left waiting {waiting}; refused because the park was full: {full} ({100 * share:.1f} %)"
+        f"{len(reports)} runs, {hours:.1f} simulated hours, {everybody} {who(reports)}: served {served}, "
+        f"told why {told}, left waiting {waiting}{refused}"
     ]
 
 

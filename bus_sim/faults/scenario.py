@@ -7,11 +7,15 @@
     seed = 7
     limit_s = 7200          # the run ends then at the latest
 
-    [demand]                # cars at intervals of a normal law, and fetched so
+    [demand]                # a car park: cars at intervals of a normal law, and fetched so
     cars = 6
     mean_s = 120
     sigma_s = 60
     min_stay_s = 200
+
+    [orders]                # any other site: orders that the seed draws; without it the site's own
+    count = 12
+    apart_s = 20
 
     [[fault]]
     kind = "crash"
@@ -28,8 +32,11 @@ from bus_sim.demand import Demand, DemandError
 from bus_sim.faults.arm import check_targets
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.sites import SiteNotFoundError, find_site
+from bus_sim.systems.orders import Orders
+from bus_sim.systems.session import check_faults
 from onboard.config.problems import ConfigError, Problems, nearest, quoted
 from onboard.core.site import Site
+from onboard.kinds.car_park.site import CarPark
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,8 @@ class Scenario:
     limit_s: float = 7_200.0
     arrivals: Arrivals = field(default_factory=Arrivals)
     faults: tuple[AnyFault, ...] = ()
+    #: What the seed draws for a site that is no car park; None: nothing, as for a car park.
+    orders: Orders | None = None
 
     def with_faults(self, faults: Iterable[AnyFault]) -> "Scenario":
         """The same with other faults."""
@@ -63,22 +72,26 @@ class Scenario:
     def to_toml(self, comment: str = "") -> str:
         """The text that ``load_scenario`` reads."""
         lines = [f"# {line}" for line in comment.splitlines()]
-        lines += [
-            "[scenario]",
-            f"site = {quoted(self.site)}",
-            f"seed = {self.seed}",
-            f"limit_s = {self.limit_s:.15g}",
-            "",
-        ]
-        arrivals = self.arrivals
-        lines += ["[demand]", f"cars = {arrivals.cars}", f"mean_s = {arrivals.mean_s:.15g}"]
-        lines += [f"sigma_s = {arrivals.sigma_s:.15g}", f"min_stay_s = {arrivals.min_stay_s:.15g}"]
+        lines += ["[scenario]", f"site = {quoted(self.site)}", f"seed = {self.seed}"]
+        lines += [f"limit_s = {self.limit_s:.15g}", "", *self._who_comes()]
         for fault in self.faults:
             kind, _, settings = str(fault).partition(":")
             lines += ["", "[[fault]]", f"kind = {quoted(kind)}"]
             pairs = [part.split("=", 1) for part in settings.split(",") if part]
             lines += [f"{key} = {value if _is_number(value) else quoted(value)}" for key, value in pairs]
         return "\n".join(lines) + "\n"
+
+    def _who_comes(self) -> list[str]:
+        arrivals, orders = self.arrivals, self.orders
+        if orders is not None:
+            return ["[orders]", f"count = {orders.count}", f"apart_s = {orders.apart_s:.15g}"]
+        return [
+            "[demand]",
+            f"cars = {arrivals.cars}",
+            f"mean_s = {arrivals.mean_s:.15g}",
+            f"sigma_s = {arrivals.sigma_s:.15g}",
+            f"min_stay_s = {arrivals.min_stay_s:.15g}",
+        ]
 
 
 def _is_number(text: str) -> bool:
@@ -92,6 +105,7 @@ def _is_number(text: str) -> bool:
 _SECTIONS = {
     "scenario": {"site": str, "seed": int, "limit_s": float},
     "demand": {"cars": int, "mean_s": float, "sigma_s": float, "min_stay_s": float},
+    "orders": {"count": int, "apart_s": float},
 }
 _WORDS = {str: "a text in quotes", int: "a whole number from 0", float: "a number above 0"}
 
@@ -127,17 +141,18 @@ class _Reader:
                 self._problems.add(
                     self._line(f"[{key}"), key, None, "is no part of a scenario", nearest(key, [*_SECTIONS, "fault"])
                 )
-        head, demand = self._section("scenario"), self._section("demand")
+        head, demand, orders = self._section("scenario"), self._section("demand"), self._section("orders")
         faults = self._faults()
         site = self._site(head.pop("site", None))
-        scenario = Scenario("", arrivals=Arrivals(**demand), faults=tuple(faults), **head)  # type: ignore[arg-type]  # _section checked each value's type
+        wanted = self._orders(site, orders)
+        scenario = Scenario("", arrivals=Arrivals(**demand), faults=tuple(faults), orders=wanted, **head)  # type: ignore[arg-type]  # _section checked each value's type
         try:
             scenario.arrivals.demand(scenario.seed)
         except DemandError as error:
             self._problems.add(self._line("[demand"), "demand", None, str(error), "correct it")
         if site is not None:
             try:
-                check_targets(faults, site)
+                (check_targets if site.system == CarPark.system else check_faults)(tuple(faults), site)
             except ValueError as error:
                 self._problems.add(self._line("[[fault"), "fault", None, str(error), "name one of the site's machines")
         self._problems.raise_if_any()
@@ -145,6 +160,22 @@ class _Reader:
         found = self._table["scenario"]
         assert isinstance(found, dict)
         return replace(scenario, site=found["site"]), site
+
+    def _orders(self, site: Site | None, section: dict[str, object]) -> Orders | None:
+        """Cars come to car parks, orders to all other sites: the wrong section is noted, and one without a count."""
+        if site is None:
+            return None
+        is_park = site.system == CarPark.system
+        right, wrong = ("demand", "orders") if is_park else ("orders", "demand")
+        if wrong in self._table:
+            what, remedy = f"is nothing for a {site.system}", f"write [{right}], or leave it out"
+            self._problems.add(self._line(f"[{wrong}"), wrong, None, what, remedy)
+        given = self._table.get("orders")
+        if is_park or given is None:
+            return None
+        if isinstance(given, dict) and "count" not in given:
+            self._problems.add(self._line("[orders"), "orders.count", None, "is missing", "write count = 12, or 0")
+        return Orders(**{"count": 0, "apart_s": 1.0, **section})  # type: ignore[arg-type]  # _section checked each value's type
 
     def _section(self, name: str) -> dict[str, object]:
         section = self._table.get(name, {})

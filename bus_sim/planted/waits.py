@@ -8,7 +8,13 @@ from typing import Any
 from bus_sim.planted.bug import PlantedBug
 from bus_sim.planted.tools import in_behaviour, replace
 from bus_sim.run import Simulation
-from onboard.core.codes import KindCode, Reason, TokenKind
+from onboard.core.codes import KindCode, ManualMode, Reason, TokenKind
+from onboard.core.effects import Effect
+from onboard.core.messages import ManualOrder
+from onboard.wire.codec import fleet_codec
+
+#: The node-ID of a person's tool (251 to 255).
+_PERSON = 254
 
 
 def _never_to_robots(simulation: Simulation) -> None:
@@ -36,7 +42,41 @@ def _lift_never_comes(simulation: Simulation) -> None:
     in_behaviour(simulation, KindCode.LIFT, plant)
 
 
+def _takes_itself_for_held(simulation: Simulation) -> None:
+    """As if the journal had an order that nobody gave."""
+
+    def plant(robot: Any) -> None:
+        robot.holding.manual.mode = ManualMode.HELD
+
+    in_behaviour(simulation, KindCode.ROBOT, plant)
+
+
+def _deaf_to_the_end_of_a_hold(simulation: Simulation) -> None:
+    """A person holds a robot for ten seconds; it takes no order to go on."""
+
+    def plant(robot: Any) -> None:
+        def make(old: Callable[[ManualOrder], list[Effect]]) -> Callable[[ManualOrder], list[Effect]]:
+            return lambda order: [] if order.manual_mode is ManualMode.AUTOMATIC else old(order)
+
+        replace(robot.holding, "ordered", make)
+
+    in_behaviour(simulation, KindCode.ROBOT, plant)
+    robots = [node for node, one in simulation.site.machines.items() if one.kind is KindCode.ROBOT]
+    bus, codec = simulation.fleet.attach("person", _PERSON), fleet_codec()
+
+    def say(number: int, mode: ManualMode) -> None:
+        for frame in codec.encode(ManualOrder(_PERSON, robots[0], number, mode)):
+            bus.send(frame)
+
+    simulation.loop.call_at(20.0, say, 1, ManualMode.HELD)
+    simulation.loop.call_at(30.0, say, 2, ManualMode.AUTOMATIC)
+
+
 BUGS = (
     PlantedBug("segments-kept", "nobody-starves", "a steward never grants", _never_to_robots),
     PlantedBug("lift-never-comes", "nobody-starves", "lifts promise rides and stay where they are", _lift_never_comes),
+    PlantedBug("held-by-nobody", "let-go-again", "robots take themselves for held", _takes_itself_for_held),
+    PlantedBug(
+        "deaf-to-going-on", "let-go-again", "a held robot does not hear that it may go on", _deaf_to_the_end_of_a_hold
+    ),
 )

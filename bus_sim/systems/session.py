@@ -4,7 +4,7 @@ import asyncio
 import json
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, Self, cast
 
@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from bus_sim.can.medium import Medium
 from bus_sim.demand import DemandError
 from bus_sim.faults.arm import arm, check_targets, frame_faults
 from bus_sim.faults.injection import AnyFault, Injection
@@ -96,7 +97,7 @@ def play(
 
     Raises ``DemandError``, before anything has run, for a fault that this site cannot have.
     """
-    _check_faults(options.faults, site)
+    check_faults(options.faults, site)
     loop = VirtualTimeLoop(pace=options.speed)
     try:
         asyncio.set_event_loop(loop)
@@ -106,8 +107,11 @@ def play(
         loop.close()
 
 
-def _check_faults(faults: tuple[AnyFault, ...], site: Site) -> None:
-    """Faults of buses and of controllers are the same everywhere; those of doors, cars and customers are not."""
+def check_faults(faults: tuple[AnyFault, ...], site: Site) -> None:
+    """Faults of buses and of controllers are the same everywhere; those of doors, cars and customers are not.
+
+    Raises ``DemandError`` for one of those, and for a machine that is not there.
+    """
     for fault in faults:
         if isinstance(fault, Injection) and fault.kind not in FAULTS:
             known = ", ".join(sorted(FAULTS))
@@ -118,6 +122,29 @@ def _check_faults(faults: tuple[AnyFault, ...], site: Site) -> None:
         check_targets(faults, site)
     except ValueError as error:
         raise DemandError(f"--fault: {error}") from error
+
+
+def links_of(site: Site, devices: dict[int, Medium]) -> dict[int, BusDeviceLink]:
+    """The plant's end of each machine's device bus, by node-ID."""
+    system = system_of(site)
+    codec = codecs(system.name, system.messages).device
+    return {
+        node: BusDeviceLink(medium.attach("plant", node), codec, Decoder(codec), node)
+        for node, medium in devices.items()
+    }
+
+
+def build(site: Site, options: RunOptions, loop: VirtualTimeLoop, make_plant: PlantMaker) -> tuple[BusRun, SystemPlant]:
+    """All parts of a run, connected but not switched on."""
+    fleet, devices = buses_of(site, options, loop)
+    plant = make_plant(site, LoopTimers(loop), links_of(site, devices), options.seed)
+    return BusRun(site, options, loop, fleet, devices, plant), plant
+
+
+def arm_all(run: BusRun, faults: Iterable[AnyFault]) -> None:
+    """Set up all faults but those of single frames, of the kinds in ``FAULTS``; before ``BusRun.start``."""
+    # Faults of the bus and of controllers ask of a run what every run has; those of cars and doors name no such thing.
+    arm(cast("Simulation", run), faults)
 
 
 async def _play(
@@ -136,19 +163,10 @@ async def _play(
         trace_devices=options.devices,
         faults=frame_faults(options.faults, site),
     )
-    fleet, devices = buses_of(site, run_options, loop)
-    system = system_of(site)
-    contract = codecs(system.name, system.messages)
-    links = {
-        node: BusDeviceLink(medium.attach("plant", node), contract.device, Decoder(contract.device), node)
-        for node, medium in devices.items()
-    }
-    plant = make_plant(site, LoopTimers(loop), links, options.seed)
-    run = BusRun(site, run_options, loop, fleet, devices, plant)
+    run, plant = build(site, run_options, loop, make_plant)
     messages: list[tuple[int, Message]] = []
     run.observers.append(lambda message, time_us: messages.append((time_us, message)))
-    # Faults of the bus and of controllers ask of a run what every run has; those of cars and doors name no such thing.
-    arm(cast("Simulation", run), options.faults)
+    arm_all(run, options.faults)
     if prepare is not None:
         prepare(run)
     run.start()

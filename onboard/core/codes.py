@@ -160,6 +160,14 @@ class OperatorAction(IntEnum):
     URGENT_TICKET = 3
 
 
+class ManualMode(IntEnum):
+    """How far a person, or whoever orders for one, has a hand in a machine that moves (row M38)."""
+
+    AUTOMATIC = 0
+    HELD = 1
+    STEP = 2
+
+
 class DriveMode(IntEnum):
     """State of an axis drive."""
 

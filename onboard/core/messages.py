@@ -23,6 +23,7 @@ from onboard.core.codes import (
     LegAction,
     LightColour,
     MachineState,
+    ManualMode,
     Operation,
     OperatorAction,
     Reason,
@@ -283,6 +284,24 @@ class Clear(Message):
     track: int
     index: int
     reason: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class ManualOrder(Message):
+    """A person holds ``machine``, has it do one elementary action, or lets it go; said again until it answers."""
+
+    machine: int
+    number: int
+    manual_mode: ManualMode
+
+
+@dataclass(frozen=True, slots=True)
+class ManualState(Message):
+    """A machine's answer to the order of this ``number``; ``at_rest``: held, it stands and does nothing any more."""
+
+    number: int
+    manual_mode: ManualMode
+    at_rest: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -90,6 +90,9 @@ class Mirror:
         """Note a sign of life; True where the sender is new or was restarted, so that its statements are wanted."""
         known = self.peers.get(beat.sender)
         starts = beat.state is MachineState.STARTING and known is not None and known.state is not MachineState.STARTING
+        if starts and known is not None and known.boot == beat.boot and self._has_just_come(known, now_us):
+            # No board starts so soon again: its first word has come twice.
+            return False
         fresh = known is None or known.boot != beat.boot or starts
         if fresh:
             self._drop_itinerary(beat.sender)
@@ -99,6 +102,9 @@ class Mirror:
             beat.kind, beat.state, beat.boot, beat.mirror_digest, now_us, beat.contract, beat.site_digest, since_us
         )
         return fresh
+
+    def _has_just_come(self, peer: Peer, now_us: int) -> bool:
+        return now_us - peer.since_us < self.site.timing.heartbeat_us // 2
 
     def on_itinerary(self, itinerary: Itinerary, now_us: int) -> bool:
         """Take up a firm itinerary by version; True where it was news. Tentative ones are hints and not kept here."""

@@ -1,4 +1,4 @@
-"""Instant actions of VDA 5050 (2.1, section 6.8): what is done at once, and what a machine without a master refuses."""
+"""Instant actions of VDA 5050 (2.1, section 6.8): their states, as a machine's `state` tells them."""
 
 from collections import OrderedDict
 from dataclasses import dataclass, field
@@ -7,9 +7,6 @@ from onboard.gateway.dialect import Dialect, Json
 
 #: States of instant actions that are told, the newest so many.
 KEPT = 16
-#: Why an action is not carried out. A machine stops where its own plan and rights say so, and by its emergency circuit.
-_NO_PAUSE = "not supported: a machine is stopped by its own safety circuit, not from afar"
-REFUSED = {"startPause": _NO_PAUSE, "stopPause": _NO_PAUSE}
 
 
 @dataclass
@@ -22,11 +19,17 @@ class InstantActions:
         """Whether it came before: then it is not done again."""
         return action["actionId"] in self.states
 
+    def begin(self, action: Json) -> None:
+        """It runs: what it asks for is under way."""
+        self._tell(action, {"actionStatus": "RUNNING"})
+
     def close(self, dialect: Dialect, action: Json, failure: str) -> None:
         """Finished, or failed for a reason."""
         key = "actionResult" if dialect.is_third else "resultDescription"
-        told: Json = {"actionId": action["actionId"], "actionType": action["actionType"]}
-        told |= {"actionStatus": "FAILED" if failure else "FINISHED"} | ({key: failure} if failure else {})
-        self.states[action["actionId"]] = told
+        self._tell(action, {"actionStatus": "FAILED" if failure else "FINISHED"} | ({key: failure} if failure else {}))
+
+    def _tell(self, action: Json, status: Json) -> None:
+        name = action["actionId"]
+        self.states[name] = {"actionId": name, "actionType": action["actionType"]} | status
         while len(self.states) > KEPT:
             self.states.popitem(last=False)

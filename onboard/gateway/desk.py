@@ -3,14 +3,15 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from onboard.core.messages import CallForProposals, CarAt, Message, TaskReport
+from onboard.core.messages import CallForProposals, CarAt, ManualState, Message, TaskReport
 from onboard.core.site import Site
-from onboard.gateway.actions import REFUSED, InstantActions
+from onboard.gateway.actions import InstantActions
 from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.factsheet import MOST_ID
 from onboard.gateway.inbox import Inbox, Incoming
 from onboard.gateway.order import Life, Order
 from onboard.gateway.orders import Orders, Outcome, name_of
+from onboard.gateway.pauses import MODES, Closed, Pauses
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import level
@@ -18,10 +19,15 @@ from onboard.gateway.state import Subject
 from onboard.gateway.wishes import wishes_of
 from onboard.ports.broker import Publication
 
-#: Publications that wait to be judged; of more the newest is refused unread and counted.
+#: Publications that wait to be judged; of more the newest is counted and stays with the broker until the next session.
 MOST_WAITING = 64
 #: Errors of refused orders that a machine's state tells, the newest so many.
 MOST_ERRORS = 4
+#: What a refusal is called in a machine's state (VDA 5050 2.1, section 6.6.4); all others are an `orderError`.
+_ERRORS = {
+    "MALFORMED": "validationError",
+    **dict.fromkeys(("OLD_UPDATE", "NOT_CONTINUED", "ORDER_OVER", "NO_ORDER"), "orderUpdateError"),
+}
 _HEARD = (CallForProposals, CarAt, TaskReport)
 
 
@@ -46,29 +52,45 @@ class OrderDesk:
         seed = (settings.epoch_us + now_us) // 1_000_000
         self.orders = Orders(site, wishes, settings.node_id, reports.others, now_us=now_us, seed=seed)
         reports.keep = self.orders.entries
-        self._waiting: deque[Publication] = deque()
+        self.pauses = Pauses(settings.node_id, seed)
+        self._no_pause = wishes.no_pause
+        #: Actions that take a robot's order back, until it says so.
+        self._cancelling: dict[int, list[Json]] = {}
+        self._waiting: deque[tuple[Publication, Callable[[], None]]] = deque()
         self._actions = {machine.name: InstantActions() for machine in site.machines.values()}
         self._errors: dict[int, deque[Json]] = {}
 
-    def on_publication(self, publication: Publication) -> None:
-        """One publication on a topic subscribed to. Never blocks."""
+    def on_publication(self, publication: Publication, taken: Callable[[], None]) -> None:
+        """One publication on a topic subscribed to; ``taken`` is called once what comes of it is on disk."""
         if len(self._waiting) >= MOST_WAITING:
             self.overflows += 1
             return
-        self._waiting.append(publication)
+        self._waiting.append((publication, taken))
 
     def next_wake(self) -> int | None:
         """When something is due, us; None for never. What waits is due at once."""
-        return 0 if self._waiting else self.orders.next_wake()
+        if self._waiting:
+            return 0
+        times = (self.orders.next_wake(), *self.pauses.due())
+        return min((time for time in times if time is not None), default=None)
 
     async def work(self, now_us: int) -> None:
         """Judge what waits and say what is due."""
         while self._waiting:
-            await self._judge(self._waiting.popleft(), now_us)
+            publication, taken = self._waiting.popleft()
+            await self._judge(publication, now_us)
+            # Only now: had the power failed before, the broker would bring it again.
+            taken()
         await self._perform(self.orders.wake(now_us), now_us)
+        said, closed = self.pauses.wake(now_us)
+        for message in said:
+            self._send(message)
+        self._close(closed, now_us)
 
     async def feed(self, message: Message, now_us: int) -> None:
         """Take up one message of the fleet bus."""
+        if isinstance(message, ManualState):
+            self._close(self.pauses.feed(message), now_us)
         if isinstance(message, _HEARD) and self.orders.open:
             await self._perform(self.orders.feed(message), now_us)
 
@@ -96,21 +118,40 @@ class OrderDesk:
         for action in incoming.told["actions"]:
             if known.is_known(action):
                 continue
-            failure = await self._act_once(node, action["actionType"], now_us)
+            kind = action["actionType"]
+            if kind in MODES and not self._no_pause:
+                known.begin(action)
+                self._close(self.pauses.ask(node, action, now_us), now_us)
+                continue
+            if kind == "cancelOrder":
+                known.begin(action)
+                await self._cancel(node, action, now_us)
+                continue
+            failure = await self._act_once(node, kind, now_us)
             known.close(self._publisher.settings.dialect, action, failure)
         self._tell_machine(node, now_us)
         self._post(self._publisher.tell_now(node, now_us))
+
+    async def _cancel(self, node: int, action: Json, now_us: int) -> None:
+        outcome = self.orders.cancel(node)
+        if outcome is None:
+            self._close([(node, action, "there is no order")], now_us)
+            return
+        self._cancelling.setdefault(node, []).append(action)
+        await self._perform(outcome, now_us)
+
+    def _close(self, closed: list[Closed], now_us: int) -> None:
+        """Instant actions that took their time are over."""
+        for node, action, failure in closed:
+            self._actions[self._site.machines[node].name].close(self._publisher.settings.dialect, action, failure)
+            self._tell_machine(node, now_us)
 
     async def _act_once(self, node: int, kind: str, now_us: int) -> str:
         """Why it failed; empty where it was done."""
         if kind == "factsheetRequest":
             self._post(self._publisher.tell_factsheet(node, now_us))
-        elif kind == "cancelOrder":
-            outcome, failure = self.orders.cancel(node)
-            await self._perform(outcome, now_us)
-            return failure
         elif kind != "stateRequest":
-            return REFUSED.get(kind, "not supported")
+            return self._no_pause if kind in MODES else "not supported"
         return ""
 
     # --- out -----------------------------------------------------------------------------------------------------
@@ -127,6 +168,10 @@ class OrderDesk:
                     continue
             if order.life is not Life.ACCEPTED or not order.was_said:
                 self._tell(order, now_us)
+            if order.life.is_over:
+                failure = "" if order.reason == "CANCELLED" else f"the order was {order.life.value} before"
+                over = self._cancelling.pop(order.wish.node, []) if order.wish.what == "visit" else []
+                self._close([(order.wish.node, action, failure) for action in over], now_us)
         for message in outcome.say:
             self._send(message)
         for order in outcome.told:
@@ -165,7 +210,7 @@ class OrderDesk:
             references.append(
                 {"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))[:MOST_ID]}
             )
-            kind = "validationError" if incoming.reason == "MALFORMED" else "orderError"
+            kind = _ERRORS.get(incoming.reason, "orderError")
             error = {"errorType": kind, "errorLevel": "WARNING", "errorReferences": references}
             error |= {"errorDescription": f"{incoming.reason}: {incoming.path}: {incoming.why}"}
             self._errors.setdefault(node, deque(maxlen=MOST_ERRORS)).append(error)
@@ -180,6 +225,9 @@ class OrderDesk:
         actions = self._actions[self._site.machines[node].name]
         name = order.name.partition("/")[2] if order is not None else None
         self._publisher.subjects[node] = Subject(
-            order_id=name, errors=tuple(errors or ()), actions=tuple(actions.states.values())
+            order_id=name,
+            update_id=order.update if order is not None else None,
+            errors=tuple(errors or ()),
+            actions=tuple(actions.states.values()),
         )
         self._publisher.wants(node, now_us)

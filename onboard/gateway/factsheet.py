@@ -11,6 +11,7 @@ from onboard.gateway.dialect import Dialect, Json
 from onboard.gateway.settings import GatewaySettings
 from onboard.kinds.car_park.site import CarPark
 from onboard.kinds.graph.site import FactoryGraph
+from onboard.kinds.mapd.site import Mapd
 
 #: Largest payload taken, bytes; see onboard/gateway/inbox.
 MOST_BYTES = 65_536
@@ -96,9 +97,14 @@ def _loads(site: Site) -> Json:
 
 
 def _actions(dialect: Dialect, site: Site) -> list[Json]:
-    """Instant actions that are carried out, and what machines do by themselves; see onboard/gateway/actions."""
+    """Instant actions that are carried out, and what machines do by themselves."""
     found = [_action(dialect, "stateRequest", "a state is told at once")]
     found.append(_action(dialect, "factsheetRequest", "the factsheet is told again"))
+    if not isinstance(site, Mapd):
+        found.append(_action(dialect, "startPause", "held: comes to rest where its rights end, and stands"))
+        found.append(_action(dialect, "stopPause", "goes on with the same task"))
+    if isinstance(site, FactoryGraph):
+        found.append(_action(dialect, "cancelOrder", "ends its edge and does nothing more for the order"))
     return found
 
 

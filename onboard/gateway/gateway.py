@@ -192,9 +192,9 @@ class Gateway:
             on_order=self._on_order,
         )
 
-    def _on_order(self, publication: Publication) -> None:
+    def _on_order(self, publication: Publication, taken: Callable[[], None]) -> None:
         if self.desk is not None:
-            self.desk.on_publication(publication)
+            self.desk.on_publication(publication, taken)
             self._news.set()
 
     def _set_clock(self) -> None:

@@ -4,6 +4,7 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from onboard.gateway.reports import Reports
 from onboard.ports.broker import Broker, BrokerError, Publication, Session
@@ -45,7 +46,7 @@ class Link:
         *,
         reports: Reports | None = None,
         subscriptions: tuple[str, ...] = (),
-        on_order: Callable[[Publication], None] | None = None,
+        on_order: Callable[[Publication, Callable[[], None]], None] | None = None,
     ) -> None:
         self.counts = LinkCounts()
         self.is_connected = False
@@ -151,9 +152,9 @@ class Link:
         self.counts.published += 1
 
     async def _listen(self, session: Session) -> None:
-        async for publication in session.incoming():
+        async for delivery in session.incoming():
             if self._on_order is not None:
-                self._on_order(publication)
+                self._on_order(delivery, partial(session.taken, delivery))
 
 
 async def _until(event: asyncio.Event, seconds: float) -> None:

@@ -2,7 +2,16 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import ANY_STATION, MOBILE_KINDS, CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.core.codes import (
+    ANY_STATION,
+    MOBILE_KINDS,
+    CallResult,
+    KindCode,
+    MachineState,
+    ManualMode,
+    Reason,
+    TaskPhase,
+)
 from onboard.core.messages import (
     Award,
     Blocked,
@@ -11,6 +20,7 @@ from onboard.core.messages import (
     EmergencyStop,
     Heartbeat,
     Itinerary,
+    ManualState,
     Message,
     Reference,
     TaskReport,
@@ -55,6 +65,9 @@ class Body:
     load: Reference | None = None
     wait: Waiting | None = None
     wait_us: int = 0
+    is_held: bool = False
+    #: By its own word: held, and come to rest.
+    is_paused: bool = False
 
 
 @dataclass
@@ -90,18 +103,11 @@ class Machines:
             self.moved.add(message.sender)
             if self.where(message.sender).driving:
                 body.wait = None
+        if body is not None:
+            self._on_word(body, message, now_us)
         match message:
-            case Heartbeat() if body is not None:
-                self._on_heartbeat(body, message)
-            case TaskReport() if body is not None:
-                self._on_report(body, message)
             case CarAt():
                 self._on_car(message)
-            case Waiting() if body is not None:
-                body.wait, body.wait_us = message, now_us
-                self.changed.add(message.sender)
-            case Itinerary() if body is not None and body.task is not None:
-                body.task.updates += 1
             case Award() if message.result is CallResult.WITHDRAWN:
                 self._on_withdrawal(message)
 
@@ -112,6 +118,25 @@ class Machines:
     def silent_us(self, node_id: int) -> int:
         """When a machine that is not heard again counts as silent, us."""
         return (self.bodies[node_id].heard_us or 0) + SILENT_BEATS * self.site.timing.heartbeat_us + 1
+
+    def _on_word(self, body: Body, message: Message, now_us: int) -> None:
+        """What a mobile machine says of itself."""
+        match message:
+            case Heartbeat():
+                self._on_heartbeat(body, message)
+            case TaskReport():
+                self._on_report(body, message)
+            case Waiting():
+                body.wait, body.wait_us = message, now_us
+                self.changed.add(message.sender)
+            case ManualState():
+                was_held, body.is_held = body.is_held, message.manual_mode is not ManualMode.AUTOMATIC
+                # It stood in the way because it was held; what it is now, its next heartbeat says.
+                body.state = body.state if body.is_held or not was_held else None
+                body.is_paused = body.is_held and message.at_rest
+                self.changed.add(message.sender)
+            case Itinerary() if body.task is not None:
+                body.task.updates += 1
 
     def _on_site(self, message: Message) -> None:
         """What concerns all machines."""

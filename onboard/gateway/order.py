@@ -32,6 +32,9 @@ RANK = {life: rank for rank, life in enumerate(Life)}
 class Wish:
     """What an order asks of the bus: a compartment to fetch ``car`` or to park, or a robot to visit ``stops``.
 
+    ``base`` is the last node that a VDA 5050 order releases and its sequence number, where an update goes on;
+    ``is_open`` tells that it has a horizon, so that an update is to come (VDA 5050 2.1, section 6.6.4).
+
     ``node`` is the compartment or robot; ``number`` names a visit list on the bus (16 bits); ``urgent`` overtakes.
     """
 
@@ -41,6 +44,8 @@ class Wish:
     stops: tuple[int, ...] = ()
     number: int = 0
     urgent: bool = False
+    base: tuple[str, int] = ("", 0)
+    is_open: bool = False
 
 
 @dataclass(slots=True)
@@ -62,7 +67,10 @@ class Order:
     owner: int = 0
     was_said: bool = False
     due_us: int | None = None
-    actions: tuple[tuple[str, str], ...] = ()
+    #: Stops of updates, list by list, that the robot gets once it has done those of ``wish``.
+    ahead: tuple[tuple[int, ...], ...] = ()
+    #: It was taken back while the robot had it: the robot is told until it says so.
+    is_cancelled: bool = False
 
     def entry(self) -> Entry:
         """The whole order, for the journal; the newest record of a name counts."""
@@ -72,7 +80,12 @@ class Order:
             "name": self.name,
             "what": wish.what,
             "node": wish.node,
-            "stops": " ".join(str(stop) for stop in wish.stops),
+            "stops": _words(wish.stops),
+            "ahead": ",".join(_words(stops) for stops in self.ahead),
+            "base": wish.base[0],
+            "sequence": wish.base[1],
+            "open": int(wish.is_open),
+            "cancelled": int(self.is_cancelled),
             "number": wish.number,
             "urgent": int(wish.urgent),
             "content": self.content,
@@ -93,14 +106,16 @@ class Order:
 
 def read_order(entry: Entry) -> Order:
     """Inverse of ``Order.entry``."""
-    stops = tuple(int(one) for one in str(entry["stops"]).split())
+    ahead = str(entry.get("ahead", ""))
     wish = Wish(
         str(entry["what"]),
         int(entry["node"]),
         _reference(entry, "car"),
-        stops,
+        _numbers(entry["stops"]),
         int(entry["number"]),
         bool(entry["urgent"]),
+        (str(entry.get("base", "")), int(entry.get("sequence", 0))),
+        bool(entry.get("open", 0)),
     )
     before = int(entry["before_us"]) if "before_us" in entry else None
     return Order(
@@ -115,6 +130,8 @@ def read_order(entry: Entry) -> Order:
         _reference(entry, "task"),
         int(entry["owner"]),
         bool(entry["said"]),
+        ahead=tuple(_numbers(stops) for stops in ahead.split(",")) if ahead else (),
+        is_cancelled=bool(entry.get("cancelled", 0)),
     )
 
 
@@ -126,6 +143,14 @@ def same_content(*parts: object) -> int:
 def with_number(wish: Wish, number: int) -> Wish:
     """The same wish under a number on the bus."""
     return replace(wish, number=number)
+
+
+def _words(stops: tuple[int, ...]) -> str:
+    return " ".join(str(stop) for stop in stops)
+
+
+def _numbers(words: str | int) -> tuple[int, ...]:
+    return tuple(int(one) for one in str(words).split())
 
 
 def _reference(entry: Entry, key: str) -> Reference | None:

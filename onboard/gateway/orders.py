@@ -7,24 +7,26 @@ machines negotiate as ever.
 
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import Message, Reference, TaskReport
-from onboard.core.serial import successor
+from onboard.core.serial import is_newer, successor
 from onboard.core.site import Site
 from onboard.gateway.inbox import Incoming
 from onboard.gateway.order import RANK, Life, Order, Wish, read_order, same_content, with_number
 from onboard.gateway.schema import TRANSPORT
-from onboard.gateway.wishes import LISTEN_US, RefusedError, Wishes, actions_of, is_robot
+from onboard.gateway.wishes import LISTEN_US, RefusedError, Wishes, is_robot
 from onboard.ports.journal import Entry
 
 #: Orders that are over are remembered, the newest so many, so that their names are known when they come again.
 KEPT = 2_000
 #: Open orders at most; one more is refused.
 MOST_OPEN = 200
+#: Lists of stops of one order that wait for the one in hand; one update more is refused.
+MOST_AHEAD = 16
 _PHASES = {
     TaskPhase.AWARDED: Life.AWARDED,
     TaskPhase.STARTED: Life.MOVING,
@@ -60,16 +62,20 @@ class Orders:
         self._number = seed & 0xFFFF
         self._asked = False
         self._ready_us = now_us + LISTEN_US
+        numbers: list[int] = []
         for entry in entries:
             if entry.get("record") == "order":
                 order = read_order(entry)
                 self.book.pop(order.name, None)
                 self.book[order.name] = order
-                self._number = order.wish.number or self._number
+                numbers += [order.wish.number] if order.wish.number else []
+        for place, number in enumerate(numbers):
+            # The newest by serial arithmetic, for an older order may have been written about last.
+            self._number = number if not place or is_newer(number, self._number, 16) else self._number
         for order in self.open:
             # A key is not pressed again: what it led to is heard, or was.
             heard = order.wish.what == "park" and order.life is not Life.ACCEPTED
-            order.due_us = None if heard else self._ready_us
+            order.due_us = None if heard or _waits(order) else self._ready_us
 
     @property
     def open(self) -> list[Order]:
@@ -104,23 +110,53 @@ class Orders:
         content = same_content(incoming.kind, _essence(told))
         known = self.book.get(name)
         if known is not None:
-            if (known.content, known.update) != (content, update):
-                why = "another order has this name; updates are not supported"
-                raise RefusedError("NAME_TAKEN", why, _NAME[incoming.kind])
+            if known.update != update:
+                self._update(known, told, content, outcome)
+                return
+            if known.content != content:
+                raise RefusedError("NAME_TAKEN", "another order has this name", _NAME[incoming.kind])
             outcome.told.append(known)
             return
+        if update and incoming.kind != TRANSPORT:
+            raise RefusedError("NO_ORDER", "an update of an order that is not known", "$.orderUpdateId")
         if len(self.open) >= MOST_OPEN:
             raise RefusedError("TOO_MANY", f"{MOST_OPEN} orders are open")
         before_us = _moment_us(told.get("before"))
         if before_us is not None and before_us <= wall_us:
             raise RefusedError("TOO_LATE", "is past", "$.before")
         order = Order(name, self._wish(incoming), content, before_us, update)
-        if incoming.kind != TRANSPORT:
-            order.actions = actions_of(told)
         order.due_us = max(now_us, self._ready_us)
         self.book[name] = order
         outcome.changed.append(order)
         self._forget()
+
+    def _update(self, order: Order, told: dict[str, Any], content: int, outcome: Outcome) -> None:
+        """More of an order by name: what its update releases is done behind what was released (section 6.6.4)."""
+        if told["orderUpdateId"] < order.update:
+            raise RefusedError("OLD_UPDATE", f"update {order.update} was taken before", "$.orderUpdateId")
+        if order.life.is_over or order.is_cancelled:
+            raise RefusedError("ORDER_OVER", "the order is over; give a new one", "$.orderId")
+        wish = self._wishes.visit(order.wish.node, told, order.wish.base)
+        if len(order.ahead) >= MOST_AHEAD:
+            raise RefusedError("TOO_MANY", f"{MOST_AHEAD} updates wait", "$.orderUpdateId")
+        order.update, order.content = told["orderUpdateId"], content
+        order.ahead += (wish.stops,) if wish.stops else ()
+        order.wish = replace(order.wish, base=wish.base, is_open=wish.is_open)
+        if _waits(order):
+            self._next(order)
+        outcome.changed.append(order)
+
+    def _next(self, order: Order) -> None:
+        """The robot has done what it was given: it gets the next list, waits for an update, or the order is done."""
+        if order.ahead and not order.is_cancelled:
+            self._number = successor(self._number, 16)
+            order.wish = replace(order.wish, stops=order.ahead[0], number=self._number)
+            order.ahead = order.ahead[1:]
+            order.life, order.was_said, order.due_us = Life.CALLED, False, 0
+        elif order.wish.is_open and not order.is_cancelled:
+            order.wish, order.due_us = replace(order.wish, stops=()), None
+        else:
+            self._end(order, Life.DONE, "", "")
 
     def _wish(self, incoming: Incoming) -> Wish:
         if incoming.kind == TRANSPORT:
@@ -135,14 +171,15 @@ class Orders:
         self._number = successor(self._number, 16)
         return with_number(wish, self._number)
 
-    def cancel(self, node: int) -> tuple[Outcome, str]:
-        """End a robot's order by name; why not, where it cannot be: the robot has it."""
+    def cancel(self, node: int) -> Outcome | None:
+        """End a robot's order by name; None where it has none. A robot that has it is told until it says so."""
         order = self.of_robot(node)
         if order is None or order.life.is_over:
-            return Outcome(), "there is no order"
-        if order.was_said:
-            return Outcome(), "a robot that has been given its order finishes it"
-        return Outcome(changed=[self._end(order, Life.REFUSED, "CANCELLED", "before it was given")]), ""
+            return None
+        if order.was_said and not _waits(order):
+            order.is_cancelled, order.due_us = True, 0
+            return Outcome(changed=[order])
+        return Outcome(changed=[self._end(order, Life.REFUSED, "CANCELLED", "before it was given")])
 
     # --- the bus and the clock -----------------------------------------------------------------------------------
 
@@ -165,12 +202,17 @@ class Orders:
         by_robot = is_robot(self._site, report.sender)
         if life is None or (not by_robot and life is not Life.REFUSED):
             return
-        if life.is_over:
+        if life is Life.DONE and order.wish.what == "visit":
+            order.owner = report.sender
+            if not _waits(order):
+                self._next(order)
+                outcome.changed.append(order)
+        elif life.is_over:
             reason = report.reason.name if life is Life.REFUSED else ""
             order.owner = report.sender if by_robot else order.owner
             outcome.changed.append(self._end(order, life, reason, ""))
         elif life is Life.CALLED or RANK[life] > RANK[order.life]:
-            order.task, order.life, order.due_us = report.task, life, None
+            order.task, order.life, order.due_us = report.task, life, 0 if order.is_cancelled else None
             order.owner = report.sender if life is not Life.CALLED else 0
             outcome.changed.append(order)
 
@@ -218,6 +260,11 @@ class Orders:
         over = [name for name, order in self.book.items() if order.life.is_over]
         for name in over[: max(0, len(over) - KEPT)]:
             del self.book[name]
+
+
+def _waits(order: Order) -> bool:
+    """Whether a robot has done all that was released of its order, and waits for more."""
+    return order.wish.what == "visit" and not order.wish.stops
 
 
 _NAME = {TRANSPORT: "$.id", "order": "$.orderId"}

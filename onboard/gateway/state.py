@@ -23,7 +23,7 @@ class Subject:
     """What a message tells of, beside the machine: the order's name as its giver knows it, and refused orders."""
 
     order_id: str | None = None
-    paused: bool = False
+    update_id: int | None = None
     errors: tuple[Json, ...] = ()
     actions: tuple[Json, ...] = ()
 
@@ -48,19 +48,20 @@ def state(
     nodes, edges = _way(where, sequence)
     told: Json = {
         "orderId": _order_id(task, subject),
-        "orderUpdateId": max(0, task.updates - 1) if task is not None else 0,
+        "orderUpdateId": _update_id(task, subject),
         "lastNodeId": where.node,
         "lastNodeSequenceId": sequence,
         "nodeStates": nodes,
         "edgeStates": edges,
-        "driving": where.driving,
-        "paused": subject.paused,
+        "driving": where.driving and not body.is_paused,
+        "paused": body.is_paused,
         "distanceSinceLastNode": where.away_m,
         "loads": [_load(body.load)] if body.load is not None else [],
         "errors": [*_errors(machines, body, now_us), *subject.errors],
         "information": _information(machines, body, now_us),
         "operatingMode": dialect.operating_mode(
-            starting=body.state is MachineState.STARTING, in_service=body.state is MachineState.OBSTACLE
+            starting=body.state is MachineState.STARTING,
+            in_service=body.state is MachineState.OBSTACLE and not body.is_held,
         ),
         **dialect.power(),
         **dialect.safety(stopped=machines.emergency is not None),
@@ -82,6 +83,12 @@ def _order_id(task: TaskInHand | None, subject: Subject) -> str:
     if subject.order_id is not None:
         return subject.order_id
     return reference_text(task.task) if task is not None else ""
+
+
+def _update_id(task: TaskInHand | None, subject: Subject) -> int:
+    if subject.update_id is not None:
+        return subject.update_id
+    return max(0, task.updates - 1) if task is not None else 0
 
 
 def _way(where: Whereabouts, sequence: int) -> tuple[list[Json], list[Json]]:
@@ -132,7 +139,7 @@ def _errors(machines: Machines, body: Body, now_us: int) -> list[Json]:
         found.append(_error("machineSilent", "FATAL", "no sign of life on the bus"))
     elif body.state is MachineState.STOPPED:
         found.append(_error("machineStopped", "FATAL", "the controller has stopped; a person must start it"))
-    elif body.state is MachineState.OBSTACLE:
+    elif body.state is MachineState.OBSTACLE and not body.is_held:
         found.append(_error("machineObstacle", "WARNING", "takes no part: another contract or site"))
     for segment, message in machines.blocked.items():
         references = [{"referenceKey": "nodeId", "referenceValue": str(segment)}]

@@ -16,6 +16,7 @@ from onboard.gateway.order import Order, Wish
 from onboard.kinds.car_park.site import CarPark
 from onboard.kinds.graph.messages import VisitList, five
 from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph
+from onboard.kinds.mapd.site import Mapd
 from onboard.trace.view import SiteView
 
 #: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
@@ -45,7 +46,9 @@ class Said:
 
 
 class Wishes(Protocol):
-    """One system's way."""
+    """One system's way. ``no_pause`` tells why its machines cannot be held; empty where they can."""
+
+    no_pause: str
 
     def ask_all(self, sender: int) -> tuple[Message, ...]:
         """What is asked of all machines at the start."""
@@ -53,8 +56,8 @@ class Wishes(Protocol):
     def transport(self, told: dict[str, Any]) -> Wish:
         """A transport's wish. Raises ``RefusedError``."""
 
-    def visit(self, node: int, told: dict[str, Any]) -> Wish:
-        """A VDA 5050 order's wish to a robot. Raises ``RefusedError``."""
+    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
+        """A VDA 5050 order's wish to a robot; an update's from ``since`` on. Raises ``RefusedError``."""
 
     def say(self, order: Order, sender: int) -> Said:
         """Say an order, for the first time or again. Raises ``RefusedError``."""
@@ -78,16 +81,20 @@ class NoWishes:
 
     def __init__(self, site: Site) -> None:
         self._site = site
+        in_step = isinstance(site, Mapd)
+        self.no_pause = (
+            "not supported: these robots move in step, and one that is held would hold all" if in_step else ""
+        )
 
     def ask_all(self, sender: int) -> tuple[Message, ...]:
-        """Nothing is asked."""
-        return ()
+        """What they vouch for, and who is held."""
+        return (SyncRequest(sender, 0),)
 
     def transport(self, told: dict[str, Any]) -> Wish:
         """None is taken."""
         raise RefusedError("UNSUPPORTED", f"a {self._site.system} takes no transports from outside its desks")
 
-    def visit(self, node: int, told: dict[str, Any]) -> Wish:
+    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
         """None is taken."""
         raise RefusedError("UNSUPPORTED", f"machines of a {self._site.system} take no orders by name")
 
@@ -111,10 +118,6 @@ class ParkWishes(NoWishes):
         super().__init__(site)
         self._view, self._place = view, place
         self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
-
-    def ask_all(self, sender: int) -> tuple[Message, ...]:
-        """Where the cars are."""
-        return (SyncRequest(sender, 0),)
 
     def transport(self, told: dict[str, Any]) -> Wish:
         """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""
@@ -182,36 +185,44 @@ class GraphWishes(NoWishes):
         """Only an order desk calls for the nearest robot (onboard/kinds/graph/desk.py)."""
         raise RefusedError("UNSUPPORTED", "give a VDA 5050 order to a robot; transports come in at a desk")
 
-    def visit(self, node: int, told: dict[str, Any]) -> Wish:
-        """The nodes with an action and the last one are stops; between them the robot goes its own way."""
+    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
+        """The nodes with an action and the last one are stops; between them the robot goes its own way.
+
+        Nodes that are not released yet are its horizon: nothing is done for them before an update releases them.
+        """
         nodes = told["nodes"]
         for place, one in enumerate(nodes):
-            path = f"$.nodes[{place}]"
-            if not one["nodeId"].isdecimal() or int(one["nodeId"]) not in self._graph.graph.neighbours:
-                raise RefusedError("UNKNOWN_PLACE", "no node of this graph", f"{path}.nodeId")
-            if not one["released"]:
-                raise RefusedError("UNSUPPORTED", "a horizon is not planned for; release all nodes", f"{path}.released")
-            for number, action in enumerate(one["actions"]):
-                if action["actionType"] not in ("pick", "drop"):
-                    where = f"{path}.actions[{number}].actionType"
-                    raise RefusedError("UNSUPPORTED", "of actions only pick and drop are known", where)
+            self._check(one, f"$.nodes[{place}]")
         numbers = [step["sequenceId"] for step in nodes]
         if not nodes or numbers != list(range(numbers[0], numbers[0] + 2 * len(nodes), 2)):
             raise RefusedError("MALFORMED", "nodes must be there, their numbers two apart", "$.nodes")
-        stops = tuple(int(one["nodeId"]) for one in nodes if one["actions"] or one is nodes[-1])
+        base = [one for one in nodes if one["released"]]
+        if base != nodes[: len(base)] or not base:
+            raise RefusedError("MALFORMED", "the first nodes must be released, and behind a horizon none", "$.nodes")
+        if since is not None and (base[0]["nodeId"], base[0]["sequenceId"]) != since:
+            why = f"must go on from node {since[0]}, sequenceId {since[1]}, the last one that was released"
+            raise RefusedError("NOT_CONTINUED", why, "$.nodes[0]")
+        new = base if since is None else base[1:]
+        stops = tuple(int(one["nodeId"]) for one in new if one["actions"] or one is new[-1])
         if len(stops) > MAX_STOPS:
             raise RefusedError("TOO_LONG", f"at most {MAX_STOPS} stops fit into one order", "$.nodes")
-        return Wish("visit", node, stops=stops)
+        end = (base[-1]["nodeId"], base[-1]["sequenceId"])
+        return Wish("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
+
+    def _check(self, node: dict[str, Any], path: str) -> None:
+        if not node["nodeId"].isdecimal() or int(node["nodeId"]) not in self._graph.graph.neighbours:
+            raise RefusedError("UNKNOWN_PLACE", "no node of this graph", f"{path}.nodeId")
+        for number, action in enumerate(node["actions"]):
+            if action["actionType"] not in ("pick", "drop"):
+                where = f"{path}.actions[{number}].actionType"
+                raise RefusedError("UNSUPPORTED", "of actions only pick and drop are known", where)
 
     def say(self, order: Order, sender: int) -> Said:
-        """The list of nodes, until the robot answers."""
+        """The list of nodes until the robot answers; without any node, that the order is taken back."""
         wish = order.wish
-        return Said((VisitList(sender, wish.number, wish.node, *five(wish.stops)),), VISIT_AGAIN_US)
-
-
-def actions_of(told: dict[str, Any]) -> tuple[tuple[str, str], ...]:
-    """Identifier and type of every node action of a VDA 5050 order."""
-    return tuple((one["actionId"], one["actionType"]) for node in told["nodes"] for one in node["actions"])
+        stops = () if order.is_cancelled else wish.stops
+        assert stops or order.is_cancelled, "an empty list takes an order back"
+        return Said((VisitList(sender, wish.number, wish.node, *five(stops)),), VISIT_AGAIN_US)
 
 
 def is_robot(site: Site, node: int) -> bool:

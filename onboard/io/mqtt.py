@@ -15,7 +15,7 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 import aiomqtt
 
 from onboard.io.broker_address import BrokerAddress
-from onboard.ports.broker import BrokerError, Publication
+from onboard.ports.broker import BrokerError, Delivery, Publication
 
 #: Without a sign of life a connection is given up after one and a half times this (MQTT 3.1.1, 3.1.2.10), s. Ours.
 KEEPALIVE_S = 10
@@ -54,6 +54,8 @@ class MqttBroker:
         self, client: str, will: Publication | None, subscriptions: tuple[str, ...]
     ) -> AsyncIterator["MqttSession"]:
         session = MqttSession(self._client(client, will, keep=bool(subscriptions)))
+        # By default paho says that it has a message before anybody has read it; a crash then loses it.
+        session.client._client.manual_ack_set(True)  # noqa: SLF001  # aiomqtt 2.5 has no option for it
         _hear_out(session.client)
         try:
             async with session.client:
@@ -111,13 +113,17 @@ class MqttSession:
         except (aiomqtt.MqttError, OSError) as error:
             raise BrokerError(str(error)) from error
 
-    async def incoming(self) -> AsyncIterator[Publication]:
+    async def incoming(self) -> AsyncIterator[Delivery]:
         """As in the port."""
         try:
             async for message in self.client.messages:
-                yield Publication(str(message.topic), message.payload, message.qos, bool(message.retain))
+                yield Delivery(str(message.topic), message.payload, message.qos, bool(message.retain), message.mid)
         except (aiomqtt.MqttError, OSError) as error:
             raise BrokerError(str(error)) from error
+
+    def taken(self, delivery: Delivery) -> None:
+        """As in the port."""
+        self.client._client.ack(delivery.number, delivery.qos)  # noqa: SLF001  # aiomqtt 2.5 hands no such thing on
 
 
 def _let_go(client: aiomqtt.Client) -> None:

@@ -20,14 +20,27 @@ class Publication:
     retain: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Delivery(Publication):
+    """A publication as it arrived; ``number`` is its name in the session that brought it."""
+
+    number: int = 0
+
+
 class Session(Protocol):
     """One connection under one client identifier."""
 
     async def publish(self, publication: Publication) -> None:
         """Hand one publication over; with QoS 1 return once the broker has acknowledged it. Raises ``BrokerError``."""
 
-    def incoming(self) -> AsyncIterator[Publication]:
-        """What arrives on the topics subscribed to, until the connection ends. Raises ``BrokerError`` then."""
+    def incoming(self) -> AsyncIterator[Delivery]:
+        """What arrives on the topics subscribed to, until the connection ends. Raises ``BrokerError`` then.
+
+        With QoS 1 the broker keeps each until it is ``taken``, and brings it again in the next session.
+        """
+
+    def taken(self, delivery: Delivery) -> None:
+        """What came of it is on disk here: the broker may forget it. Never raises, and says nothing once it is over."""
 
 
 class Broker(Protocol):

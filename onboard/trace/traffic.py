@@ -119,6 +119,8 @@ _OPERATION = (
     Row("CallParent", (), _rides, _window, "with each ride's call"),
     Row("Award", _COMPARTMENT, _two, _window, "one for each call, said again once"),
     Row("Award", (), lambda n: 2 * _rides(n), _window, "one for each ride, said again once"),
+    Row("ManualOrder", (), _one, _second, "a person holds one machine at a time; said again until it answers"),
+    Row("ManualState", (), _two, _second, "it answers, and comes to rest"),
     Row("Bid", _ROBOT, lambda n: n.compartments, _window, "one for each desk's call"),
     Row("Bid", (), _rides, _window, "one for each ride called for"),
     Row("ItineraryHead", _ROBOT, _two, _window, "tentative with a bid, firm with its award, and a delay", _window),

@@ -2,53 +2,25 @@
 
 import pytest
 
-from bus_sim.campaign.profiles import draw_faults
-from bus_sim.faults.injection import Injection
 from bus_sim.systems.cell.plant import make_plant
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play
 from onboard.core.messages import Bid, CallForProposals, Message, Reference
 from onboard.kinds.cell.messages import ArmPhase, ArmProgress, GoalPath, PartAt
 from onboard.trace.check.cell import RULES
-from onboard.trace.check.checks import Checks, Verdict
 from tests.cell.playing import cell, wish
+from tests.faults.systems import judged, withstands
 
 SITE = cell(wish((10, 10), (40, 30)), wish((40, 30), (30, 5), at_s=20, within_s=600))
-#: Faults are drawn for a day; here they strike while the two goals are carried.
-BEGIN_S, SHARE = 14.0, 0.1
-
-
-def _faults(seed: int) -> tuple[Injection, ...]:
-    found = []
-    for fault in draw_faults(("bus", "crash")[seed % 2], seed, SITE):
-        given = dict(fault.given)
-        at_s = given["at_s"]
-        assert not isinstance(at_s, str)
-        given["at_s"] = round(BEGIN_S + (at_s - 20) * SHARE, 6)
-        found.append(Injection(fault.kind, given))
-    return tuple(found)
 
 
 @pytest.mark.parametrize("seed", range(16))
 def test_the_cell_under_faults(seed: int) -> None:
-    faults = _faults(seed)
-    played = play(SITE, SystemOptions(seed=seed, limit_s=1200, faults=faults), make_plant)
-    assert played.plant.violations == []
-    assert played.halted == []
-    assert played.is_over, [str(fault) for fault in faults]
-    verdict = _verdict(played.messages, disturbed=True)
-    assert verdict.is_good, verdict.lines()
-
-
-def _verdict(messages: list[tuple[int, Message]], *, disturbed: bool = False) -> Verdict:
-    checks = Checks(SITE, disturbed=disturbed, rules=RULES)
-    for time_us, message in messages:
-        checks.feed_message(time_us, message)
-    return checks.finish()
+    withstands(SITE, seed, (14.0, 102.0), 1200)
 
 
 def test_no_checker_finds_anything_where_nothing_is_disturbed() -> None:
-    verdict = _verdict(play(SITE, SystemOptions(limit_s=1200), make_plant).messages)
+    verdict = judged(SITE, play(SITE, SystemOptions(limit_s=1200), make_plant).messages)
     assert verdict.is_good, verdict.lines()
     assert all(verdict.seen[rule.name] for rule in RULES)
 
@@ -67,7 +39,7 @@ PART = Reference(9, 1)
     ],
 )
 def test_each_checker_finds_what_it_is_for(rule: str, said: list[Message]) -> None:
-    verdict = _verdict([(1_000_000 * number, one) for number, one in enumerate(said, 1)])
+    verdict = judged(SITE, [(1_000_000 * number, one) for number, one in enumerate(said, 1)])
     assert verdict.counts[rule] == 1
 
 
@@ -79,5 +51,5 @@ def test_a_predecessor_that_bids_is_found() -> None:
     )
     at = next(number for number, (_, one) in enumerate(messages) if one is call)
     forged = (messages[at][0], Bid(path.node1, call.sender, call.call, 1, 0))
-    verdict = _verdict([*messages[: at + 1], forged])
+    verdict = judged(SITE, [*messages[: at + 1], forged])
     assert verdict.counts["predecessors"] == 1 and path_us

@@ -45,15 +45,18 @@ def test_a_node_without_the_journal_of_a_life_that_others_knew_falls_silent(
 def test_peers_tell_a_restarted_node_which_life_they_knew() -> None:
     machine = holon(1)
 
-    def beat(boot: int, state: MachineState) -> list[SyncRequest]:
+    def beat(boot: int, state: MachineState, now_us: int = 10) -> list[SyncRequest]:
         word = Heartbeat(ROBOT, CONTRACT_VERSION, SITE.digest, 0, boot, KindCode.ROBOT, state)
-        said = machine.receive(word, 10)
+        said = machine.receive(word, now_us)
         return [e.message for e in said if hasattr(e, "message") and isinstance(e.message, SyncRequest)]
 
     assert beat(4, MachineState.STARTING) == [SyncRequest(STEWARD, ROBOT, 0)]
     assert beat(4, MachineState.IDLE) == []
-    assert beat(4, MachineState.STARTING) == [SyncRequest(STEWARD, ROBOT, 4)], "it started again under the same counter"
-    assert beat(5, MachineState.IDLE) == [SyncRequest(STEWARD, ROBOT, 4)]
+    twice = beat(4, MachineState.STARTING, 5_000)
+    assert all(said.boot_before == 0 for said in twice), "its first word has come twice"
+    again = SyncRequest(STEWARD, ROBOT, 4)
+    assert beat(4, MachineState.STARTING, 1_500_000) == [again], "it started again under the same counter"
+    assert beat(5, MachineState.IDLE, 1_500_010) == [again]
 
 
 def test_a_steward_whose_journal_is_gone_grants_nothing() -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign.points import Counts, Single, count, points, reference
+from bus_sim.campaign.report import Verdict
 from bus_sim.campaign.runner import Plan, Point, run_point
-from bus_sim.campaign.trial import Verdict
 from bus_sim.can.faults import Fault
 from bus_sim.cli import main
 from bus_sim.faults.injection import AnyFault, Injection, parse_injection

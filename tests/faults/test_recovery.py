@@ -3,7 +3,8 @@
 import pytest
 
 from bus_sim.campaign.recovery import Measure, healed_us
-from bus_sim.campaign.trial import Report, Verdict, play
+from bus_sim.campaign.report import Report, Verdict
+from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.planted.registry import BUGS
@@ -65,7 +66,7 @@ def test_a_trial_hears_what_the_checkers_find(monkeypatch: pytest.MonkeyPatch) -
     def plant(simulation: Simulation, _: object) -> None:
         BUGS["custody-first"].plant(simulation)
 
-    monkeypatch.setattr("bus_sim.campaign.trial.arm", plant)
+    monkeypatch.setattr("bus_sim.campaign.car_park.arm", plant)
     report = trial(cars=2)
     assert report.verdict is Verdict.VIOLATION
     assert "one-custodian" in report.violations[0]

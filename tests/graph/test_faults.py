@@ -5,51 +5,20 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.campaign.profiles import draw_faults
 from bus_sim.cli import main as bus_sim
-from bus_sim.faults.injection import Injection
-from bus_sim.systems.graph.plant import make_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import play
 from onboard.cli import main as onboard
 from onboard.core.messages import Message
 from onboard.kinds.graph.messages import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, RobotMode, TurnSignal
-from onboard.trace.check.checks import Checks, Verdict
 from onboard.trace.check.graph import RULES
+from tests.faults.systems import judged, withstands
 from tests.graph.sites import busy_orders, hall, made
 
 SITE = made(hall(), (0, 4, 8), busy_orders(hall(), 5, 7))
-#: Faults are drawn for a day; here they strike while the orders are carried out.
-BEGIN_S, SHARE = 12.0, 0.1
-
-
-def _faults(seed: int) -> tuple[Injection, ...]:
-    found = []
-    for fault in draw_faults(("bus", "crash")[seed % 2], seed, SITE):
-        given = dict(fault.given)
-        at_s = given["at_s"]
-        assert not isinstance(at_s, str)
-        given["at_s"] = round(BEGIN_S + (at_s - 20) * SHARE, 6)
-        found.append(Injection(fault.kind, given))
-    return tuple(found)
 
 
 @pytest.mark.parametrize("seed", range(16))
 def test_the_graph_under_faults(seed: int) -> None:
-    faults = _faults(seed)
-    played = play(SITE, SystemOptions(seed=seed, limit_s=900, faults=faults), make_plant)
-    assert played.plant.violations == [], [str(fault) for fault in faults]
-    assert played.halted == []
-    assert played.is_over, [str(fault) for fault in faults]
-    verdict = _verdict(played.messages, disturbed=True)
-    assert verdict.is_good, verdict.lines()
-
-
-def _verdict(messages: list[tuple[int, Message]], *, disturbed: bool = False) -> Verdict:
-    checks = Checks(SITE, disturbed=disturbed, rules=RULES)
-    for time_us, message in messages:
-        checks.feed_message(time_us, message)
-    return checks.finish()
+    withstands(SITE, seed, (12.0, 100.0), 900)
 
 
 def _at(robot: int, behind: int, node: int) -> RobotAt:
@@ -71,7 +40,7 @@ def _at(robot: int, behind: int, node: int) -> RobotAt:
     ],
 )
 def test_each_checker_finds_what_it_is_for(rule: str, said: list[Message]) -> None:
-    verdict = _verdict([(1_000_000 * number, one) for number, one in enumerate(said, 1)])
+    verdict = judged(SITE, [(1_000_000 * number, one) for number, one in enumerate(said, 1)])
     assert verdict.counts[rule] == 1, verdict.lines()
 
 

@@ -1,12 +1,7 @@
 """Pick-up and delivery under faults drawn by seed: every task is served, and neither plant nor rules find anything."""
 
-from pathlib import Path
-
 import pytest
 
-import bus_sim
-from bus_sim.campaign.profiles import draw_faults
-from bus_sim.faults.injection import Injection
 from bus_sim.importers.command import import_files
 from bus_sim.importers.draft import site_text
 from bus_sim.importers.mapf import Wanted
@@ -22,40 +17,15 @@ from onboard.kinds.mapd.messages import (
     TransportBid,
     TransportCall,
 )
-from onboard.kinds.mapd.site import Mapd
-from onboard.trace.check.checks import Checks, Verdict
-from onboard.trace.check.mapd import RULES
-from tests.mapd.sites import drawn, made, played
+from tests.faults.systems import PLANTS, judged, withstands
+from tests.mapd.sites import drawn, made
 
 SITE = made(6, drawn(16, 1))
-#: Faults are drawn for a day; here they strike while robots are under way, from 4 s to 30 s.
-BEGIN_S, SHARE = 4.0, 0.028
-
-
-PLANTS = Path(bus_sim.__file__).parent / "data" / "plants"
-
-
-def _faults(seed: int, site: Mapd = SITE) -> tuple[Injection, ...]:
-    found = []
-    for fault in draw_faults(("bus", "crash")[seed % 2], seed, site):
-        given = dict(fault.given)
-        at_s = given["at_s"]
-        assert not isinstance(at_s, str)
-        given["at_s"] = round(BEGIN_S + (at_s - 20) * SHARE, 6)
-        found.append(Injection(fault.kind, given))
-    return tuple(found)
 
 
 @pytest.mark.parametrize("seed", range(16))
 def test_pick_up_and_delivery_under_faults(seed: int) -> None:
-    faults = _faults(seed)
-    run, plant = played(SITE, seed=seed, limit_s=300, faults=faults)
-    assert plant.violations == [], [str(fault) for fault in faults]
-    assert run.halted == []
-    assert run.is_over, [str(fault) for fault in faults]
-    assert len(plant.served) == len(SITE.tasks)
-    verdict = _verdict(run.messages, disturbed=True)
-    assert verdict.is_good, verdict.lines()
+    assert withstands(SITE, seed, (4.0, 28.64), 300).served == len(SITE.tasks)
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -63,19 +33,7 @@ def test_pick_up_and_delivery_under_faults(seed: int) -> None:
 def test_an_imported_plant_under_faults(plant_file: str, seed: int) -> None:
     draft = import_files([PLANTS / plant_file], Wanted(tasks=3, seed=7))
     site = parse_site(site_text(draft), plant_file)
-    assert isinstance(site, Mapd)
-    run, plant = played(site, seed=seed, limit_s=900, faults=_faults(seed, site))
-    assert run.is_good
-    assert len(plant.served) == 3
-    verdict = _verdict(run.messages, site, disturbed=True)
-    assert verdict.is_good, verdict.lines()
-
-
-def _verdict(messages: list[tuple[int, Message]], site: Mapd = SITE, *, disturbed: bool = False) -> Verdict:
-    checks = Checks(site, disturbed=disturbed, rules=RULES)
-    for time_us, message in messages:
-        checks.feed_message(time_us, message)
-    return checks.finish()
+    assert withstands(site, seed, (4.0, 28.64), 900).served == 3
 
 
 def _at(
@@ -119,5 +77,5 @@ _CALL = TransportCall(1, 3, 12, 15)
     ],
 )
 def test_each_checker_finds_what_it_is_for(rule: str, said: list[Message]) -> None:
-    verdict = _verdict([(1_000_000 * number, one) for number, one in enumerate(said, 1)])
+    verdict = judged(SITE, [(1_000_000 * number, one) for number, one in enumerate(said, 1)])
     assert verdict.counts[rule] == 1, verdict.lines()

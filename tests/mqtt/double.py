@@ -8,7 +8,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 
-from onboard.ports.broker import BrokerError, Publication
+from onboard.ports.broker import BrokerError, Delivery, Publication
 
 
 def fits(pattern: str, topic: str) -> bool:
@@ -85,10 +85,10 @@ class DoubleBroker:
         for client in self._clients.values():
             if any(fits(pattern, publication.topic) for pattern in client.subscriptions):
                 told = Publication(publication.topic, publication.payload, publication.qos, False)
-                if client.session is not None:
-                    client.session.arrived.put_nowait(told)
-                elif told.qos:
+                if told.qos:
                     client.waiting.append(told)
+                if client.session is not None:
+                    client.session.bring(told)
 
     @asynccontextmanager
     async def session(
@@ -100,15 +100,14 @@ class DoubleBroker:
         if kept.session is not None:
             # The same name again: the older session is thrown out (MQTT 3.1.1, section 3.1.4).
             self.cut(client)
-        session = kept.session = DoubleSession(self, will)
+        session = kept.session = DoubleSession(self, will, kept.waiting)
         new = set(subscriptions) - set(kept.subscriptions)
         kept.subscriptions = subscriptions
         for topic, publication in self.retained.items():
             if any(fits(pattern, topic) for pattern in new):
-                session.arrived.put_nowait(publication)
+                session.bring(publication)
         for publication in kept.waiting:
-            session.arrived.put_nowait(publication)
-        kept.waiting.clear()
+            session.bring(publication)
         try:
             yield session
         finally:
@@ -129,10 +128,12 @@ class DoubleBroker:
 class DoubleSession:
     """``ports.Session``."""
 
-    def __init__(self, broker: DoubleBroker, will: Publication | None) -> None:
+    def __init__(self, broker: DoubleBroker, will: Publication | None, waiting: list[Publication]) -> None:
+        """``waiting`` is what the client has not taken, with QoS 1."""
         self.will = will
-        self.arrived: asyncio.Queue[Publication] = asyncio.Queue()
-        self._broker = broker
+        self._arrived: asyncio.Queue[Delivery] = asyncio.Queue()
+        self._brought: list[Publication] = []
+        self._broker, self._waiting = broker, waiting
         self._lost = asyncio.Event()
 
     def lose(self) -> None:
@@ -151,10 +152,22 @@ class DoubleSession:
             self.lose()
             raise BrokerError("connection lost")
 
-    async def incoming(self) -> AsyncIterator[Publication]:
+    def bring(self, told: Publication) -> None:
+        """One publication comes in."""
+        self._brought.append(told)
+        number = len(self._brought) - 1
+        self._arrived.put_nowait(Delivery(told.topic, told.payload, told.qos, told.retain, number))
+
+    def taken(self, delivery: Delivery) -> None:
+        """As in the port."""
+        if not self._lost.is_set():
+            told = self._brought[delivery.number]
+            self._waiting[:] = [one for one in self._waiting if one is not told]
+
+    async def incoming(self) -> AsyncIterator[Delivery]:
         """As in the port."""
         while True:
-            next_one, lost = asyncio.ensure_future(self.arrived.get()), asyncio.ensure_future(self._lost.wait())
+            next_one, lost = asyncio.ensure_future(self._arrived.get()), asyncio.ensure_future(self._lost.wait())
             try:
                 await asyncio.wait((next_one, lost), return_when=asyncio.FIRST_COMPLETED)
                 if not next_one.done():

@@ -2,7 +2,8 @@
 
 import asyncio
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from bus_sim.can.node import SimulatedBus
@@ -13,12 +14,31 @@ from onboard.gateway.gateway import Gateway
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewaySettings
 from onboard.ports.broker import Publication
+from onboard.ports.journal import Entry
 from tests.mqtt.double import DoubleBroker
 from tests.mqtt.logs import EPOCH_US
 from tests.mqtt.played import MemoryJournal
 from tests.system.scene import Scene, play, stays
 
 NODE = 251
+
+
+class FatalJournal(MemoryJournal):
+    """The power fails while the first order is written: before it is on the disk, or right after."""
+
+    def __init__(self, *, written: bool) -> None:
+        super().__init__()
+        self.written, self.is_over = written, False
+        self.die: Callable[[], None] = lambda: None
+
+    async def append(self, entry: Entry) -> None:
+        fatal = entry.get("record") == "order" and not self.is_over
+        if self.written or not fatal:
+            await super().append(entry)
+        if fatal:
+            self.is_over = True
+            self.die()
+            await asyncio.sleep(1)
 
 
 class Ordered:
@@ -47,6 +67,8 @@ class Ordered:
             run.loop.call_at(at_s, self.broker.take, Publication(topic, body, 1))
         for at_s in self._deaths_s:
             run.loop.call_at(at_s, self._die, run)
+        if isinstance(self.journal, FatalJournal):
+            self.journal.die = partial(self._die, run)
 
     def _start(self, run: BusRun) -> None:
         bus = self._bus = run.fleet.attach(f"gateway {len(self.gateways)}", NODE)

@@ -90,6 +90,7 @@ async def arrives(session: Session, count: int) -> list[Publication]:
     found: list[Publication] = []
     async with asyncio.timeout(20):
         async for one in session.incoming():
+            session.taken(one)
             found.append(one)
             if len(found) == count:
                 break
@@ -134,6 +135,19 @@ async def test_with_qos_1_nothing_is_lost_for_a_reader_that_is_away(case: Case) 
             await writer.publish(said(f"{number}", "orders", qos=1))
     async with case.broker.session("reader", None, ("orders",)) as reader:
         assert [one.payload for one in await arrives(reader, 3)] == [b"0", b"1", b"2"]
+
+
+async def test_with_qos_1_what_was_not_taken_comes_again_and_what_was_taken_does_not(case: Case) -> None:
+    async with case.broker.session("writer", None, ()) as writer:
+        async with case.broker.session("reader", None, ("orders",)) as reader:
+            await writer.publish(said("first", "orders", qos=1))
+            await writer.publish(said("second", "orders", qos=1))
+            await arrives(reader, 1)
+            unread = reader.incoming()
+            assert (await anext(unread)).payload == b"second"
+        async with case.broker.session("reader", None, ("orders",)) as reader:
+            await writer.publish(said("third", "orders", qos=1))
+            assert [one.payload for one in await arrives(reader, 2)] == [b"second", b"third"]
 
 
 async def test_a_broker_that_dies_breaks_sessions_and_can_be_met_again(case: Case) -> None:

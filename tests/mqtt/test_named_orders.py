@@ -13,10 +13,10 @@ from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import Played, play
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import TaskReport
-from onboard.kinds.graph.messages import RobotAt, VisitList
+from onboard.kinds.graph.messages import RobotAt, RobotMode, VisitList
 from tests.graph.sites import hall, made
 from tests.mqtt.logs import VERSIONS, validator
-from tests.mqtt.ordered import NODE, Ordered, park_and_order
+from tests.mqtt.ordered import NODE, FatalJournal, Ordered, park_and_order
 from tests.sites import one_floor
 
 #: The run lasts until the desk's own order at 150 s is done; the gateway ends before.
@@ -107,6 +107,17 @@ def test_an_order_is_driven_once_though_the_gateway_dies(deaths_s: tuple[float, 
     assert phases.count("done") == 1 and "refused" not in phases
 
 
+@pytest.mark.parametrize("written", [False, True])
+def test_an_order_that_the_broker_has_handed_over_is_not_lost_where_the_gateway_dies(written: bool) -> None:
+    """Given once; the power fails between its delivery and `accepted`."""
+    journal = FatalJournal(written=written)
+    played, ordered = run([(20, topic(), order("a", (0, ""), (4, "pick"), (3, "drop")))], journal=journal)
+    assert journal.is_over and played.is_good and ends(played) == [(21, TaskPhase.DONE)]
+    phases = [one["phase"] for one in ordered.told("made", "R1/a")]
+    assert phases.count("done") == 1 and "refused" not in phases
+    assert len({one.order for _, one in played.messages if isinstance(one, VisitList) and one.sender == NODE}) == 1
+
+
 REFUSED: list[tuple[dict[str, Any], str, str]] = [
     ({"serialNumber": "R9"}, "MALFORMED", "$.serialNumber"),
     ({"manufacturer": "other"}, "MALFORMED", "$.manufacturer"),
@@ -117,7 +128,8 @@ REFUSED: list[tuple[dict[str, Any], str, str]] = [
     (order("x", (77, "")), "UNKNOWN_PLACE", "$.nodes[0].nodeId"),
     (order("x", (1, "dance")), "UNSUPPORTED", "$.nodes[0].actions[0].actionType"),
     (order("x", *((node, "pick") for node in (1, 2, 5, 4, 3, 0))), "TOO_LONG", "$.nodes"),
-    ({"nodes": [{**order("x", (1, ""))["nodes"][0], "released": False}]}, "UNSUPPORTED", "$.nodes[0].released"),
+    ({"nodes": [{**order("x", (1, ""))["nodes"][0], "released": False}]}, "MALFORMED", "$.nodes"),
+    ({"orderUpdateId": 3}, "NO_ORDER", "$.orderUpdateId"),
 ]
 
 
@@ -130,17 +142,143 @@ def test_orders_that_cannot_be_driven_are_refused_on_the_robot_s_own_state() -> 
     errors = [error for one in ordered.states("R1") for error in one["errors"]]
     described = {error["errorDescription"].split(": ")[0] for error in errors}
     assert described == {reason for _, reason, _ in REFUSED}
-    assert {error["errorType"] for error in errors} == {"validationError", "orderError"}
+    assert {error["errorType"] for error in errors} == {"validationError", "orderError", "orderUpdateError"}
     assert all(validator("2.1", "state").is_valid(one) for one in ordered.states("R1"))
 
 
-def test_a_robot_has_one_order_by_name_at_a_time_and_updates_are_refused() -> None:
+def test_a_robot_has_one_order_by_name_at_a_time() -> None:
     first, second = order("first", (8, "")), order("second", (3, ""))
-    update = first | {"orderUpdateId": 1}
-    played, ordered = run([(20, topic(), first), (24, topic(), second), (26, topic(), update), (90, topic(), second)])
+    played, ordered = run([(20, topic(), first), (24, topic(), second), (90, topic(), second)])
     assert ends(played) == [(21, TaskPhase.DONE)] and ordered.lives("made", "R1/first")[-1] == "done"
-    assert [one["reason"] for one in ordered.told("made") if "reason" in one] == ["BUSY", "NAME_TAKEN"]
+    assert [one["reason"] for one in ordered.told("made") if "reason" in one] == ["BUSY"]
     assert ordered.lives("made", "R1/second")[-1] == "done"
+
+
+def update(number: int, start: int, *nodes: tuple[int, str], horizon: int = 0) -> dict[str, Any]:
+    """Update ``number`` of order "a", whose first node has the sequence number ``start``; the last are not released."""
+    told = order("a", *nodes) | {"orderUpdateId": number}
+    for place, one in enumerate(told["nodes"]):
+        one |= {"sequenceId": start + 2 * place, "released": place < len(nodes) - horizon}
+    for place, one in enumerate(told["edges"]):
+        one |= {"sequenceId": start + 2 * place + 1, "released": place < len(nodes) - 1 - horizon}
+    return told
+
+
+def loadings(played: Played) -> list[int]:
+    """Nodes at which R1 loaded, in turn."""
+    told = [one for _, one in played.messages if isinstance(one, RobotAt) and one.sender == 21]
+    nodes = [one.node for one in told if one.robot_mode is RobotMode.LOADING]
+    return [node for place, node in enumerate(nodes) if place == 0 or nodes[place - 1] != node]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_an_order_is_driven_as_far_as_it_is_released_and_on_as_updates_release_more(version: str) -> None:
+    """To 1 with a horizon; while it waits there, on to 2 and 5; on its way there, on to 4, which is the end."""
+    number = VERSIONS[version]
+    orders = [
+        update(0, 0, (0, ""), (1, "pick"), (2, ""), horizon=1),
+        update(1, 2, (1, "pick"), (2, "drop"), (5, ""), (4, ""), horizon=1),
+        update(2, 6, (5, ""), (4, "")),
+    ]
+    orders = [one | {"version": number} for one in orders]
+    if version == "3.0":
+        for one in orders:
+            for edge in one["edges"]:
+                del edge["startNodeId"], edge["endNodeId"]
+    name = topic(version=version)
+    times = (20.0, 60.0, 64.0)
+    played, ordered = run(list(zip(times, (name,) * 3, orders, strict=True)), version=version)
+    assert played.is_good and loadings(played) == [1, 2, 5, 4]
+    lists = {one.order: (one.stop1, one.stop2) for _, one in played.messages if isinstance(one, VisitList)}
+    assert sorted(stops for stops in lists.values() if stops != (7, 255)) == [(1, 255), (2, 5), (4, 255)]
+    assert [one["phase"] for one in ordered.told("made", "R1/a")].count("done") == 1
+    states = [one for one in ordered.states("R1") if one["orderId"] == "a"]
+    assert list(dict.fromkeys(one["orderUpdateId"] for one in states)) == [0, 1, 2]
+    assert not any(one["errors"] for one in states)
+    assert all(validator(version, "state").is_valid(one) for one in states)
+
+
+@pytest.mark.parametrize("deaths_s", [(40.0,), (62.0, 70.0)])
+def test_updates_outlive_the_gateway(deaths_s: tuple[float, ...]) -> None:
+    orders = [
+        update(0, 0, (0, ""), (1, "pick"), (2, ""), horizon=1),
+        update(1, 2, (1, "pick"), (2, "drop")),
+        update(2, 4, (2, "drop"), (5, "")),
+    ]
+    times = (20.0, 60.0, 61.0)
+    played, ordered = run(list(zip(times, (topic(),) * 3, orders, strict=True)), deaths_s=deaths_s)
+    assert played.is_good and loadings(played) == [1, 2, 5]
+    assert ordered.lives("made", "R1/a")[-1] == "done"
+
+
+BAD_UPDATES: list[tuple[dict[str, Any], str, str]] = [
+    (update(1, 2, (8, ""), (7, "")), "OLD_UPDATE", "$.orderUpdateId"),
+    (update(2, 2, (8, ""), (5, "")), "NAME_TAKEN", "$.orderId"),
+    (update(3, 2, (7, ""), (4, "")), "NOT_CONTINUED", "$.nodes[0]"),
+    (update(3, 4, (8, ""), (7, "")), "NOT_CONTINUED", "$.nodes[0]"),
+    (update(3, 2, (8, ""), (7, ""), (77, "")), "UNKNOWN_PLACE", "$.nodes[2].nodeId"),
+]
+
+
+def test_updates_that_do_not_fit_are_refused_and_the_order_stays_as_it_was() -> None:
+    """As VDA 5050 2.1, section 6.6.4, has it: older, another of one number, not from the last node, too late."""
+    first, second = update(0, 0, (0, ""), (8, ""), horizon=0), update(2, 2, (8, ""), horizon=0)
+    told: list[tuple[float, str, Any]] = [(20.0, topic(), first), (21.0, topic(), second), (22.0, topic(), second)]
+    told += [(23.0 + place, topic(), one) for place, (one, *_) in enumerate(BAD_UPDATES)]
+    played, ordered = run([*told, (120.0, topic(), update(3, 2, (8, ""), (7, "")))])
+    assert played.is_good and ends(played) == [(21, TaskPhase.DONE)] and loadings(played) == [8]
+    refused = [(one["reason"], one["path"]) for one in ordered.told("made") if "path" in one]
+    assert refused == [*((reason, path) for _, reason, path in BAD_UPDATES), ("ORDER_OVER", "$.orderId")]
+    kinds = {
+        error["errorDescription"].split(":")[0]: error["errorType"]
+        for one in ordered.states("R1")
+        for error in one["errors"]
+    }
+    assert {kinds[reason] for reason in ("OLD_UPDATE", "NOT_CONTINUED", "ORDER_OVER")} == {"orderUpdateError"}
+
+
+@pytest.mark.parametrize("deaths_s", [(), (30.2,)])
+def test_an_order_that_a_robot_has_is_taken_back_and_it_takes_the_next(
+    deaths_s: tuple[float, ...],
+) -> None:
+    """It ends its edge; also where the gateway dies right after it has said so. What was not done is not done later."""
+    cancel = [(30.0, topic("instantActions"), action("cancelOrder", "c"))]
+    orders = [(20.0, topic(), order("a", (0, ""), (8, "drop"))), *cancel, (60.0, topic(), order("b", (3, "drop")))]
+    played, ordered = run(orders, deaths_s=deaths_s)
+    assert played.is_good and loadings(played) == [3]
+    assert ends(played) == [(21, TaskPhase.REFUSED), (21, TaskPhase.DONE)]
+    (over,) = [one for one in ordered.told("made", "R1/a") if one["phase"] == "refused"]
+    assert over["reason"] == "CANCELLED"
+    stood = [one for t, one in played.messages if isinstance(one, RobotAt) and one.sender == 21 and 45e6 < t < 60e6]
+    assert not any(one.on_edge for one in stood)
+    if not deaths_s:
+        told = [one for state in ordered.states("R1") for one in state["actionStates"] if one["actionId"] == "c"]
+        assert list(dict.fromkeys(one["actionStatus"] for one in told)) == ["RUNNING", "FINISHED"]
+
+
+def test_an_order_that_waits_for_its_update_is_cancelled_at_once_and_one_that_is_done_cannot_be() -> None:
+    orders = [
+        (20.0, topic(), update(0, 0, (0, ""), (1, "pick"), (2, ""), horizon=1)),
+        (60.0, topic("instantActions"), action("cancelOrder", "c")),
+        (62.0, topic("instantActions"), action("cancelOrder", "d")),
+    ]
+    played, ordered = run(orders)
+    assert ends(played) == [(21, TaskPhase.DONE)] and ordered.told("made", "R1/a")[-1]["reason"] == "CANCELLED"
+    told = {one["actionId"]: one for one in list(ordered.states("R1"))[-1]["actionStates"] if "description" not in one}
+    assert (told["c"]["actionStatus"], told["d"]["actionStatus"]) == ("FINISHED", "FAILED")
+    assert told["d"]["resultDescription"] == "there is no order"
+
+
+def test_numbers_of_lists_are_not_used_again_after_a_restart() -> None:
+    """R1's order was given first and is over last: what was written last is not the newest number."""
+    orders = [
+        (20.0, topic(), order("a", (8, "drop"))),
+        (22.0, topic(serial="R2"), order("b", (8, ""), serial="R2")),
+        (100.0, topic(serial="R2"), order("c", (5, "drop"), serial="R2")),
+    ]
+    played, _ = run(orders, deaths_s=(90.0,))
+    lists = {(one.order, one.robot) for _, one in played.messages if isinstance(one, VisitList) and one.sender == NODE}
+    assert len(lists) == len({number for number, _ in lists}) == 3
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -158,8 +296,8 @@ def test_instant_actions_are_done_or_refused_with_a_reason_and_once_each(version
         "stateRequest": "FINISHED",
         "factsheetRequest": "FINISHED",
         "cancelOrder": "FAILED",
-        "startPause": "FAILED",
-        "stopPause": "FAILED",
+        "startPause": "FINISHED",
+        "stopPause": "FINISHED",
         "fly": "FAILED",
     }
     assert all(one.get(why) for one in last.values() if one["actionStatus"] == "FAILED")

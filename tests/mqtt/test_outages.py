@@ -79,6 +79,7 @@ async def reported(broker: MqttBroker, count: int) -> list[str]:
     found: list[str] = []
     async with asyncio.timeout(DEADLINE_S), broker.session("reader", None, (REPORT,)) as session:
         async for one in session.incoming():
+            session.taken(one)
             found.append(json.loads(one.payload)["id"].split("-", 3)[3])
             if len(set(found)) == count:
                 return found

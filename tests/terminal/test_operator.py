@@ -8,8 +8,9 @@ import pytest
 from bus_sim.run import RunOptions
 from bus_sim.systems.terminal.run import Outcome, TerminalRun, play
 from onboard.config.problems import ConfigError
-from onboard.core.messages import Bid, CallForProposals, Message
-from onboard.kinds.terminal.messages import ManualMode, ManualState, StepReport, StepResult
+from onboard.core.codes import ManualMode
+from onboard.core.messages import Bid, CallForProposals, ManualState, Message
+from onboard.kinds.terminal.messages import StepReport, StepResult
 from tests.terminal.seeds import short
 
 Said = list[tuple[int, Message]]

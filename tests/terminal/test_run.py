@@ -30,7 +30,8 @@ from onboard.kinds.terminal.vehicle import Vehicle, terminal
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import check_records
 from onboard.trace.check.systems import checks_for
-from tests.terminal.seeds import play_seed, short
+from tests.faults.systems import withstands
+from tests.terminal.seeds import short
 
 M = TypeVar("M", bound=Message)
 SITE = terminal(find_site("terminal"))
@@ -226,6 +227,4 @@ def test_the_command_runs_the_terminal_and_says_how_it_went(
 
 @pytest.mark.parametrize("seed", range(16))
 def test_under_faults_all_is_delivered_and_nothing_breaks(seed: int) -> None:
-    """Frames lost, late and broken on the fleet bus, and one controller whose power is cut."""
-    found = play_seed(seed)
-    assert found.is_good, (found.violations, found.halted, len(found.deliveries), found.ordered)
+    withstands(short(), seed, (16.0, 80.0), 900)

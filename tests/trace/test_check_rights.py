@@ -2,8 +2,8 @@
 
 import pytest
 
-from onboard.core.codes import DriveMode, TokenKind
-from onboard.core.messages import DriveOrder, DriveState, Message, PlatformState, TokenHeld
+from onboard.core.codes import DriveMode, KindCode, MachineState, TokenKind
+from onboard.core.messages import DriveOrder, DriveState, Heartbeat, Message, PlatformState, TokenHeld
 from onboard.core.site import Segment
 from tests.trace.checking import (
     ER1,
@@ -82,12 +82,25 @@ def test_a_body_moves_in_what_it_holds_with_its_braking_distance() -> None:
 
 @pytest.mark.parametrize(
     "where",
-    [at(MR1, 1, 11), at(MR1, 1, 12, -600), at(MR1, 1, 12, 0, -1000)],
+    [at(MR1, 1, 11, 0, -10), at(MR1, 1, 12, -600, -10), at(MR1, 1, 12, 0, -1000)],
     ids=["in another's slot", "half in it", "too fast to stop before it"],
 )
 def test_a_body_outside_its_authority_is_found_once(where: Message) -> None:
     tape = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, where, where)
     assert tape.broken() == {"inside-authority": 1}
+
+
+def beat(node: int) -> Heartbeat:
+    return Heartbeat(node, 1, 1, 0, 1, KindCode.ROBOT, MachineState.IDLE)
+
+
+def test_who_is_pushed_by_hand_has_time_to_ask_and_no_more() -> None:
+    pushed = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, at(MR1, 1, 11))
+    assert pushed.say(2.01, grant(Segment(1, 11), 1, MR2, MR1)).say(9, beat(MR1)).broken() == {}
+    stays = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, at(MR1, 1, 11))
+    assert stays.say(6, beat(MR1)).say(8, beat(MR1)).broken() == {"inside-authority": 1}
+    drives = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, at(MR1, 1, 11)).say(3, at(MR1, 1, 11, 0, -10))
+    assert drives.broken() == {"inside-authority": 1}
 
 
 def test_a_slot_given_back_too_early_is_found() -> None:

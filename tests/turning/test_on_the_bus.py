@@ -5,8 +5,6 @@ from dataclasses import replace
 
 import pytest
 
-from bus_sim.campaign.profiles import draw_faults
-from bus_sim.faults.injection import Injection
 from bus_sim.run import BusRun
 from bus_sim.sites import find_site
 from bus_sim.systems.registry import SystemOptions
@@ -16,15 +14,15 @@ from bus_sim.systems.turning.plant import TurningPlant, make_plant
 from bus_sim.systems.turning.show import board
 from onboard.core.codes import Criterion, KindCode, Operation
 from onboard.core.holon import Holon
-from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.core.messages import Bid, CallForProposals, Message, Reference, TaskReport
 from onboard.kinds.turning.generation import LatheGeneration
 from onboard.kinds.turning.lathe import Job, LatheState
 from onboard.kinds.turning.machine import LatheMachine
 from onboard.kinds.turning.messages import BillBar, BillCutting, JobResult, LathePhase, LatheProgress, TurningOrder
 from onboard.kinds.turning.process import generate
 from onboard.kinds.turning.site import Turning, Wanted
-from onboard.trace.check.checks import Checks, Verdict
 from onboard.trace.check.turning import RULES
+from tests.faults.systems import judged, withstands
 
 
 def _site(*orders: Wanted) -> Turning:
@@ -44,13 +42,6 @@ def _plant(played: Played) -> TurningPlant:
 
 def _sound(played: Played) -> None:
     assert played.plant.violations == [] and played.halted == [] and played.is_over
-
-
-def _verdict(site: Turning, messages: list[tuple[int, Message]], *, disturbed: bool = False) -> Verdict:
-    checks = Checks(site, disturbed=disturbed, rules=RULES)
-    for time_us, message in messages:
-        checks.feed_message(time_us, message)
-    return checks.finish()
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +84,7 @@ def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipp
 
 
 def test_p26_the_five_terms_are_on_the_bus_and_sum_to_the_bid(shipped: Played) -> None:
-    verdict = _verdict(_site(), shipped.messages)
+    verdict = judged(_site(), shipped.messages)
     assert verdict.is_good, verdict.lines()
     assert all(verdict.seen[rule.name] for rule in RULES)
     bids = [one for _, one in shipped.messages if isinstance(one, Bid)]
@@ -163,24 +154,12 @@ def test_each_checker_finds_what_it_is_for() -> None:
 
     broken["bills-add-up"].insert(1, BillWaiting(1, 9, 1, 10, 10))
     for name, messages in broken.items():
-        verdict = _verdict(site, [(1_000_000 * number, one) for number, one in enumerate(messages, 1)])
+        verdict = judged(site, [(1_000_000 * number, one) for number, one in enumerate(messages, 1)])
         assert verdict.counts[name] == 1, name
 
 
 @pytest.mark.parametrize("seed", range(16))
 def test_the_turning_cell_under_faults(seed: int) -> None:
     site = _site(Wanted(0, Job(1, 2, 14, 2)), Wanted(5_000, Job(2, 1, 45, 1)), Wanted(20_000, Job(1, 1, 16, 2)))
-    faults = []
-    for fault in draw_faults(("bus", "crash")[seed % 2], seed, site):
-        at_s = fault.given["at_s"]
-        assert not isinstance(at_s, str)
-        # Half of them strike while calls are open, half over the whole of the work.
-        share = 0.03 if seed % 4 < 2 else 0.8
-        faults.append(Injection(fault.kind, {**fault.given, "at_s": round(10 + (at_s - 20) * share, 6)}))
-    played = _play(site, seed=seed, faults=tuple(faults))
-    assert played.plant.violations == [] and played.halted == []
-    assert played.is_over, [str(fault) for fault in faults]
-    assert all(entry.result is JobResult.DONE for entry in _plant(played).entries)
-    verdict = _verdict(site, played.messages, disturbed=True)
-    assert verdict.is_good, verdict.lines()
-    assert any(isinstance(one, Award) for _, one in played.messages)
+    # Half of them strike while calls are open, half over the whole of the work.
+    withstands(site, seed, (10.0, 36.4) if seed % 4 < 2 else (10.0, 714.0), 20_000)

@@ -1,15 +1,16 @@
 """The plant of a terminal: drives and handlers of vehicles, the desks' keyboards and cameras, on their device buses."""
 
-import asyncio
 import random
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 
 from bus_sim.plant.link import BusDeviceLink
-from bus_sim.plant.timers import LoopTimers
+from bus_sim.plant.timers import Timers
+from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.world import VehicleBody, World
+from onboard.core.codes import ManualMode
 from onboard.core.messages import Message
-from onboard.kinds.registry import system_of
+from onboard.core.site import Site
 from onboard.kinds.terminal.messages import (
     Action,
     HandlerMode,
@@ -17,7 +18,6 @@ from onboard.kinds.terminal.messages import (
     HandlerState,
     LaneSensor,
     ManualKey,
-    ManualMode,
     MissionKey,
     MoveMode,
     MoveOrder,
@@ -26,9 +26,7 @@ from onboard.kinds.terminal.messages import (
 )
 from onboard.kinds.terminal.missions import types_of
 from onboard.kinds.terminal.site import Blockage, EntityKind, Mission, Press, Terminal
-from onboard.ports.bus import Bus
-from onboard.wire.codec import codecs
-from onboard.wire.decoder import Decoder
+from onboard.kinds.terminal.vehicle import terminal
 
 #: What a person presses, by the words of a site file.
 PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMode.AUTOMATIC}
@@ -175,28 +173,25 @@ class VehicleDevices:
 
 
 class TerminalPlant:
-    """Everything that is not a controller. ``buses`` has one connection to each machine's device bus, by node-ID."""
+    """Everything that is not a controller. ``links`` is the end of each machine's device bus, by node-ID."""
 
     def __init__(
         self,
         site: Terminal,
-        loop: asyncio.AbstractEventLoop,
-        buses: Mapping[int, Bus],
+        timers: Timers,
+        links: dict[int, BusDeviceLink],
         seed: int,
         *,
         noise: float = NOISE,
     ) -> None:
         self.site, self.noise = site, noise
-        self.timers = LoopTimers(loop)
+        self.timers = timers
         self.world = World(site)
-        self.links: dict[int, BusDeviceLink] = {}
-        self.vehicles: dict[int, VehicleDevices] = {}
-        system = system_of(site)
-        codec = codecs(system.name, system.messages).device
-        for node in site.machines:
-            self.links[node] = BusDeviceLink(buses[node], codec, Decoder(codec), node)
-            if node in self.world.bodies:
-                self.vehicles[node] = VehicleDevices(self, self.world.bodies[node], self.links[node], seed)
+        self.violations = self.world.violations
+        self.links = links
+        self.vehicles = {
+            node: VehicleDevices(self, body, links[node], seed) for node, body in self.world.bodies.items()
+        }
 
     def start(self) -> None:
         """Power on, and the operator's day begins."""
@@ -210,6 +205,11 @@ class TerminalPlant:
         for number, press in enumerate(self.site.presses, start=1):
             self.timers.call_at(press.at_us, _call(self._press, number, press))
         self._look()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether every box that was ordered was put down where it was wanted."""
+        return len(deliveries(self.site, self.world.handled)) >= ordered(self.site)
 
     def now_us(self) -> int:
         """Loop time."""
@@ -262,6 +262,11 @@ class TerminalPlant:
             link.send(key(Verb.END, 0, 0, 0))
         else:
             link.send(key(Verb.LOAD, types_of(self.site).index(mission.type), mission.count, mission.source))
+
+
+def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> TerminalPlant:
+    """The plant of a terminal; the seed draws how much slower than planned everything really is."""
+    return TerminalPlant(terminal(site), timers, links, seed)
 
 
 def _call(function: Callable[..., None], *arguments: object) -> Callable[[], None]:

@@ -4,16 +4,18 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from bus_sim.plant.timers import LoopTimers
 from bus_sim.run import BusRun, RunOptions, buses_of, run_until
+from bus_sim.systems.session import links_of
+from bus_sim.systems.terminal.deliveries import Delivery, deliveries, ordered
 from bus_sim.systems.terminal.plant import NOISE, TerminalPlant
-from bus_sim.systems.terminal.world import Handling
 from bus_sim.systems.watched import watched
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.messages import CarAt, Message
 from onboard.core.mirror import Mirror
 from onboard.kinds.terminal.desk import Desk
 from onboard.kinds.terminal.mirror import TerminalMirror
-from onboard.kinds.terminal.site import Mission, Terminal
+from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.vehicle import Vehicle
 
 #: Looks whether it is over, us.
@@ -39,17 +41,6 @@ class TerminalRun(BusRun):
         if isinstance(message, CarAt):
             self.spectator.fleet.on_car(message)
         self.spectator.hear(message, time_us)
-
-
-@dataclass(frozen=True)
-class Delivery:
-    """One box of a mission: times in us since it was ordered."""
-
-    mission: int
-    box: int
-    waited_us: int
-    finished_us: int
-    late_us: int
 
 
 @dataclass(frozen=True)
@@ -80,32 +71,8 @@ class Outcome:
 def build(site: Terminal, options: RunOptions, loop: VirtualTimeLoop, *, noise: float = NOISE) -> TerminalRun:
     """All parts of a run, connected but not switched on."""
     fleet, devices = buses_of(site, options, loop)
-    buses = {node: medium.attach("plant", node) for node, medium in devices.items()}
-    plant = TerminalPlant(site, loop, buses, options.seed, noise=noise)
+    plant = TerminalPlant(site, LoopTimers(loop), links_of(site, devices), options.seed, noise=noise)
     return TerminalRun(site, options, loop, fleet, devices, plant)
-
-
-def deliveries(site: Terminal, handled: list[Handling]) -> list[Delivery]:
-    """Which mission each putting down served: the first that wants this box at this station and lacks it."""
-    lacking = {number: max(mission.count, len(mission.boxes)) for number, mission in enumerate(site.missions, 1)}
-    up: dict[int, int] = {}
-    found = []
-    for one in handled:
-        if one.is_up:
-            up[one.box] = one.time_us
-            continue
-        for number, mission in enumerate(site.missions, 1):
-            if lacking[number] and mission.target == one.station and _wants(site, mission, one.box):
-                lacking[number] -= 1
-                late_us = max(0, one.time_us - mission.before_us) if mission.before_us else 0
-                waited_us = up[one.box] - mission.at_us
-                found.append(Delivery(number, one.box, waited_us, one.time_us - mission.at_us, late_us))
-                break
-    return found
-
-
-def _wants(site: Terminal, mission: Mission, box: int) -> bool:
-    return box in mission.boxes or (not mission.boxes and site.boxes[box - 1].type == mission.type)
 
 
 def outcome(run: TerminalRun) -> Outcome:
@@ -113,14 +80,13 @@ def outcome(run: TerminalRun) -> Outcome:
     site = run.plant.site
     vehicles = [one.holon.behaviour for one in run.controllers.values() if isinstance(one.holon.behaviour, Vehicle)]
     desks = [one.holon.behaviour for one in run.controllers.values() if isinstance(one.holon.behaviour, Desk)]
-    ordered = sum(max(mission.count, len(mission.boxes)) for mission in site.missions)
     halted = tuple(
         f"{one.holon.machine.name}: {one.holon.halted}" for one in run.controllers.values() if one.holon.halted
     )
     statistics = run.fleet.statistics()
     return Outcome(
         tuple(deliveries(site, run.plant.world.handled)),
-        ordered,
+        ordered(site),
         max((one.time_us for one in run.plant.world.handled), default=0),
         sum(vehicle.planner.touched for vehicle in vehicles),
         len(site.blockages),
@@ -132,10 +98,9 @@ def outcome(run: TerminalRun) -> Outcome:
     )
 
 
-def is_over(run: TerminalRun) -> bool:
+def is_ended(plant: TerminalPlant) -> bool:
     """All missions are done, or something must never have happened."""
-    ordered = sum(max(mission.count, len(mission.boxes)) for mission in run.plant.site.missions)
-    return bool(run.plant.world.violations) or len(deliveries(run.plant.site, run.plant.world.handled)) >= ordered
+    return bool(plant.violations) or plant.is_over
 
 
 def play(
@@ -178,7 +143,7 @@ async def _play(
     picture = (lambda: show(run)) if show is not None else None
     async with watched(run, web) as viewer:
         await run_until(
-            run, lambda: viewer.is_gone or (is_over(run) and not viewer.is_there), limit_us, STEP_US, picture
+            run, lambda: viewer.is_gone or (is_ended(run.plant) and not viewer.is_there), limit_us, STEP_US, picture
         )
     found = outcome(run)
     run.close()

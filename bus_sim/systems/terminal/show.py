@@ -3,6 +3,7 @@
 import json
 import sys
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,10 +11,9 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from bus_sim.demand import DemandError
-from bus_sim.faults.arm import check_targets, frame_faults
-from bus_sim.faults.injection import AnyFault, Injection
+from bus_sim.faults.arm import frame_faults
 from bus_sim.run import RunOptions
+from bus_sim.systems.session import arm_all, check_faults
 from bus_sim.systems.terminal.run import LIMIT_US, Outcome, TerminalRun, play
 from bus_sim.systems.terminal.table import picture, plan_table
 from bus_sim.systems.watched import FOREVER_US
@@ -95,7 +95,7 @@ def _longest(found: Outcome, what: str) -> float:
 def run_terminal(site: Site, options: "SystemOptions") -> int:
     """Run a terminal to the end of its missions. 0, or 1 where something broke or was left undone."""
     place = terminal(site)
-    _check_faults(options.faults, place)
+    check_faults(options.faults, place)
     shown = not options.quiet
     if shown:
         trace = options.trace if options.trace is not None else "none"
@@ -112,28 +112,17 @@ def run_terminal(site: Site, options: "SystemOptions") -> int:
     )
     unlimited_us = LIMIT_US if options.web is None else FOREVER_US
     limit_us = unlimited_us if options.limit_s is None else round(options.limit_s * 1e6)
-    show = Show(place, options.quiet)
+    show, armed = Show(place, options.quiet), partial(arm_all, faults=options.faults)
     if on_terminal:
         with Live(console=Console(), refresh_per_second=10) as show.live:
-            found = play(place, run_options, limit_us=limit_us, show=show, web=options.web)
+            found = play(place, run_options, limit_us=limit_us, prepare=armed, show=show, web=options.web)
     else:
-        found = play(place, run_options, limit_us=limit_us, show=show, web=options.web)
+        found = play(place, run_options, limit_us=limit_us, prepare=armed, show=show, web=options.web)
     if shown:
         print("\n".join(summary_lines(place, found)))
     if options.json is not None:
         write_json(options.json, found)
     return 0 if found.is_good else 1
-
-
-def _check_faults(faults: tuple[AnyFault, ...], site: Terminal) -> None:
-    """Faults of single frames only. Raises ``DemandError`` for another one, or for a machine that is not there."""
-    for fault in faults:
-        if isinstance(fault, Injection) and not frame_faults([fault], site):
-            raise DemandError(f"--fault {fault}: no fault of frames; on a terminal write lossy, burst, bit_errors ...")
-    try:
-        check_targets(faults, site)
-    except ValueError as error:
-        raise DemandError(str(error)) from error
 
 
 def write_json(path: Path, found: Outcome) -> None:

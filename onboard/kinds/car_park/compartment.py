@@ -28,14 +28,11 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Actuate, Effect, Record, Report, Send
+from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import (
     BayState,
     DeskEvent,
-    DeskOrder,
-    DoorOrder,
     DoorState,
-    LightOrder,
     Message,
     OperatorOrder,
     Reference,
@@ -56,6 +53,7 @@ from onboard.kinds.car_park.bay_memory import (
     ticket_record,
 )
 from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
+from onboard.kinds.car_park.outputs import BayOutputs
 from onboard.kinds.car_park.site import car_park
 from onboard.kinds.car_park.stewardship import Stewardship
 
@@ -88,16 +86,15 @@ class Compartment:
     tickets: deque[Reference] = field(default_factory=deque)
     stewardship: Stewardship = field(init=False)
     memory: BayMemory = field(init=False)
+    outputs: BayOutputs = field(init=False)
     _number: int = 0
-    _sequence: int = 0
     _desk_sequence: int | None = None
     _key_pressed: bool = False
     _robot_waits: bool = False
-    _ordered: dict[DoorName, DoorAction] = field(default_factory=dict)
-    _light_ordered: LightColour | None = None
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
+        self.outputs = BayOutputs(self.fleet.node_id)
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
@@ -144,9 +141,11 @@ class Compartment:
         """Doors, bay and desk."""
         if isinstance(message, DoorState):
             self.doors = message
-        elif isinstance(message, BayState):
+            return self.outputs.again(message, now_us)
+        if isinstance(message, BayState):
             self.bay = message
-        elif isinstance(message, DeskEvent) and message.sequence != self._desk_sequence:
+            return self.outputs.again(message, now_us)
+        if isinstance(message, DeskEvent) and message.sequence != self._desk_sequence:
             self._desk_sequence = message.sequence
             return self._at_desk(message.event, message.car)
         return []
@@ -289,21 +288,17 @@ class Compartment:
     def _take_ticket(self, car: Reference, *, urgent: bool = False) -> list[Effect]:
         record = self.fleet.mirror.cars.get(car)
         if record is None or record.station == OUTSIDE:
-            return [self._desk(DeskText.UNKNOWN_TICKET, car)]
+            return [self.outputs.show(DeskText.UNKNOWN_TICKET, car)]
         in_hand = self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE
         new = not in_hand and bay_task.queue_ticket(self.tickets, car, urgent=urgent)
-        return [*([ticket_record(car, urgent=urgent)] if new else []), self._desk(DeskText.PLEASE_WAIT, car)]
-
-    def _desk(self, text: DeskText, car: Reference) -> Effect:
-        self._sequence = successor(self._sequence, 8)
-        return Actuate(DeskOrder(self.fleet.node_id, self._sequence, text, car))
+        return [*([ticket_record(car, urgent=urgent)] if new else []), self.outputs.show(DeskText.PLEASE_WAIT, car)]
 
     # --- the phases --------------------------------------------------------------------------------------------
 
     def _when_starting(self, now_us: int) -> list[Effect]:
         if self.memory.job is not None:
             return self._take_up_job(now_us)
-        effects = self._door(DoorName.OUTPUT, DoorAction.CLOSE)
+        effects = self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return effects
         return effects + self._to_free()
@@ -333,7 +328,7 @@ class Compartment:
         self._robot_waits = False
         self._key_pressed = False
         self._go(BayPhase.FREE)
-        return over + self._door(DoorName.INPUT, DoorAction.OPEN)
+        return over + self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
 
     def _when_free(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.doors is not None
@@ -344,9 +339,9 @@ class Compartment:
             return self._admit(now_us)
         if self.tickets and not self.bay.load_kg and not self.bay.person_inside and self._is_stored(self.tickets[0]):
             self._go(BayPhase.RESERVING)
-            return [self._light(LightColour.RED), *self._door(DoorName.INPUT, DoorAction.CLOSE)]
-        if self._light_ordered is not LightColour.GREEN and not self.bay.load_kg:
-            return [self._light(LightColour.GREEN)]
+            return [self.outputs.light_up(LightColour.RED), *self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)]
+        if self.outputs.light is not LightColour.GREEN and not self.bay.load_kg:
+            return [self.outputs.light_up(LightColour.GREEN)]
         return []
 
     def _is_stored(self, car: Reference) -> bool:
@@ -364,9 +359,9 @@ class Compartment:
         if not bay.load_kg:
             return []
         if not bay_task.fits(bay, limits):
-            return [self._desk(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
+            return [self.outputs.show(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
         if not self.fleet.mirror.free_places():
-            return [self._desk(DeskText.FULL, Reference(0, 0))]
+            return [self.outputs.show(DeskText.FULL, Reference(0, 0))]
         car = next_reference(self._number, self.fleet)
         self._number = car.number
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
@@ -375,10 +370,10 @@ class Compartment:
         effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
         effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
-        effects.append(self._desk(DeskText.TAKE_TICKET, car))
+        effects.append(self.outputs.show(DeskText.TAKE_TICKET, car))
         effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
         self._go(BayPhase.LOCKING)
-        return [*effects, self._light(LightColour.RED)]
+        return [*effects, self.outputs.light_up(LightColour.RED)]
 
     def _when_locking(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
@@ -389,15 +384,15 @@ class Compartment:
             # Who presses again has no ticket: the power failed before it was printed.
             asked, self._key_pressed = self._key_pressed, False
             is_new = self.job.operation is Operation.PARK
-            return [self._desk(DeskText.TAKE_TICKET, self.job.car)] if asked and is_new else []
-        return self._door(DoorName.INPUT, DoorAction.CLOSE)
+            return [self.outputs.show(DeskText.TAKE_TICKET, self.job.car)] if asked and is_new else []
+        return self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)
 
     def _when_reserving(self, now_us: int) -> list[Effect]:
         """Light red, input closing for a car that is to come out; a car that still came in goes first."""
         assert self.bay is not None
         if self.bay.load_kg or self.bay.person_inside:
             self._go(BayPhase.FREE)
-            return self._door(DoorName.INPUT, DoorAction.OPEN)
+            return self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         car = self.tickets.popleft()
@@ -423,7 +418,7 @@ class Compartment:
         if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         self._go(BayPhase.OPENING)
-        return self._door(DoorName.OUTPUT, DoorAction.OPEN)
+        return self.outputs.door(DoorName.OUTPUT, DoorAction.OPEN)
 
     def _when_opening(self, now_us: int) -> list[Effect]:
         if self._is(DoorName.OUTPUT, DoorPosition.OPEN):
@@ -436,7 +431,7 @@ class Compartment:
         if not self.job.was_granted or not self.fleet.tokens.holds(station_token(self.station)):
             return []
         self._go(BayPhase.CLOSING)
-        return self._door(DoorName.OUTPUT, DoorAction.CLOSE)
+        return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
 
     def _when_closing(self, now_us: int) -> list[Effect]:
         assert self.job is not None
@@ -445,7 +440,10 @@ class Compartment:
         if self.job.operation is Operation.PARK:
             return self._to_free()
         self._go(BayPhase.HANDOVER)
-        return [*self._door(DoorName.INPUT, DoorAction.OPEN), self._desk(DeskText.CAR_READY, self.job.car)]
+        return [
+            *self.outputs.door(DoorName.INPUT, DoorAction.OPEN),
+            self.outputs.show(DeskText.CAR_READY, self.job.car),
+        ]
 
     def _when_handover(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
@@ -454,7 +452,7 @@ class Compartment:
             return []
         car = self.job.car
         effects = custody.state(self.fleet, car, OUTSIDE, self.job.wheelbase_mm)
-        effects.append(self._desk(DeskText.WELCOME, Reference(0, 0)))
+        effects.append(self.outputs.show(DeskText.WELCOME, Reference(0, 0)))
         return effects + self._to_free()
 
     # --- inner works -------------------------------------------------------------------------------------------
@@ -467,29 +465,16 @@ class Compartment:
         effects: list[Effect] = [
             Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
             *custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm),
-            self._desk(bay_task.refusal_text(self.fleet.mirror), job.car),
+            self.outputs.show(bay_task.refusal_text(self.fleet.mirror), job.car),
         ]
         return effects + self._to_free()
 
     def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
         return list(self.fleet.negotiation.open(job.terms(source, sink), now_us))
 
-    def _door(self, door: DoorName, action: DoorAction) -> list[Effect]:
-        """Order a door once; the plant's interlock refuses what must not be, and the phase then waits."""
-        if self._ordered.get(door) is action:
-            return []
-        self._ordered[door] = action
-        self._sequence = successor(self._sequence, 8)
-        order = Actuate(DoorOrder(self.fleet.node_id, self._sequence, door, action))
-        return [Record({"record": "door", "door": int(door), "action": int(action)}), order]
-
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None
         return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
-
-    def _light(self, colour: LightColour) -> Effect:
-        self._light_ordered = colour
-        return Actuate(LightOrder(self.fleet.node_id, colour))
 
     def _go(self, phase: BayPhase) -> None:
         self.phase = phase

@@ -87,6 +87,8 @@ class CarParkGeneration:
     mirror: Mirror
     program: Program
     tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
+    #: A person has a hand in (row M38): no new tasks.
+    is_held: bool = False
 
     # --- the Estimator -----------------------------------------------------------------------------------------
 
@@ -99,7 +101,7 @@ class CarParkGeneration:
         """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
         if call.criterion is not Criterion.FINISH_TIME or call.operation not in (Operation.PARK, Operation.RETRIEVE):
             return None
-        if self.program.standing is None or len(self.program.remaining) + 4 > MAX_STEPS:
+        if self.is_held or self.program.standing is None or len(self.program.remaining) + 4 > MAX_STEPS:
             return None
         limits = car_park(self.site).cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.

@@ -83,8 +83,11 @@ class GoingAround:
         return effects
 
     def watch_drive(self, now_us: int) -> list[Effect]:
-        """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks."""
-        if self.carriage.stall.is_stuck(now_us) is self.is_stuck:
+        """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks.
+
+        So does a shuttle that does not take up its order.
+        """
+        if (self.carriage.stall.is_stuck(now_us) or self.shuttle.stall.is_stuck(now_us)) is self.is_stuck:
             return []
         self.is_stuck = not self.is_stuck
         if not self.is_stuck:

@@ -5,7 +5,7 @@ the station; a compartment grants its bay only with the output door open. The jo
 to the actuator.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey, car_token, station_token
@@ -14,6 +14,8 @@ from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
 from onboard.core.effects import Actuate, Effect, Record
 from onboard.core.messages import ShuttleOrder, ShuttleState
 from onboard.core.serial import successor
+from onboard.core.stall import Stall
+from onboard.core.unheard import Unheard
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.program import Handling, Work
 
@@ -58,7 +60,10 @@ class ShuttleWork:
     sequence: int = 0
     sensed: ShuttleState | None = None
     fault: bool = False
+    stall: Stall = field(default_factory=Stall)
     _resuming: bool = False
+    _ordered: ShuttleOrder | None = None
+    _unheard: Unheard = field(default_factory=Unheard)
 
     def begin(self, work: Work) -> list[Effect]:
         """Start one handling in front of its station."""
@@ -75,13 +80,18 @@ class ShuttleWork:
         """Whether the shuttle may be outside the carrier: then the carrier must not move (row P32)."""
         return self.phase in (Phase.REACH, Phase.CLAMP, Phase.RETRACT)
 
-    def sense(self, state: ShuttleState) -> None:
-        """Take up the shuttle's state."""
+    def sense(self, state: ShuttleState, now_us: int) -> list[Effect]:
+        """Take up the shuttle's state; one that goes on without the last order has missed it, and hears it again."""
         if self.sensed is None:
             # The shuttle does nothing on an order that it has had: go on from its number after a restart.
             self.sequence = state.sequence
         self.sensed = state
         self.fault = state.mode is ShuttleMode.FAULT
+        order = self._ordered
+        if order is None or not self.is_out or state.sequence == order.sequence:
+            self.stall.rests()
+            return []
+        return [Actuate(order)] if self._unheard.is_due("shuttle", now_us, heard=False) else []
 
     def advance(self, now_us: int) -> list[Effect]:
         """Take the next step of the table where its condition is met."""
@@ -133,11 +143,13 @@ class ShuttleWork:
             return self._finish(self.work, now_us)
         self.sequence = successor(self.sequence, 8)
         entry = {"record": "step", "phase": self.phase.value, "handling": self.work.handling.value}
+        side, wheelbase_mm = self.work.station.side, self.work.wheelbase_mm
+        self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
+        self._unheard.ordered("shuttle")
+        self.stall.ordered(now_us)
         return [
             Record({**entry, "station": self.work.station.number, "car": self.work.car.number}),
-            Actuate(
-                ShuttleOrder(self.fleet.node_id, self.sequence, order, self.work.station.side, self.work.wheelbase_mm)
-            ),
+            Actuate(self._ordered),
         ]
 
     def _finish(self, work: Work, now_us: int) -> list[Effect]:

@@ -5,14 +5,15 @@ ride begun and ended. The mirror, bids and plans are not in the journal; the way
 say that the carrier stands (design, section 5).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Criterion, KindCode, LegAction, Operation
-from onboard.core.effects import Record
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import CallResult, Criterion, KindCode, LegAction, Operation, Reason, TaskPhase
+from onboard.core.effects import Effect, Record, Send
 from onboard.core.lift_uses import ride_us
 from onboard.core.lifts import platform_on, sill
-from onboard.core.messages import CallForProposals, CarAt, Reference
+from onboard.core.messages import Award, CallForProposals, CarAt, Reference, TaskReport
 from onboard.core.site import Segment, Site, Station
 from onboard.kinds.car_park.bay_memory import cars_at
 from onboard.kinds.car_park.generation import CarParkGeneration
@@ -125,6 +126,17 @@ class Recovery:
         work = self.works[0]
         end_us = now_us + generation.handling_us(work.station)
         return (Step(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)
+
+    def forfeit_unknown(
+        self, fleet: Fleet, award: Award, known: Iterable[Work], done: Collection[Reference]
+    ) -> list[Effect]:
+        """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
+        mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED
+        if not mine or not self.is_restart or fleet.negotiation.knows(award.sender, award.call):
+            return []
+        if any(work.call.task == award.task for work in known) or award.task in done:
+            return []
+        return [Send(TaskReport(fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
 
     def forget(self, task: Reference) -> None:
         """A task is another's, or was given back."""

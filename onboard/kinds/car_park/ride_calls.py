@@ -3,7 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
+from onboard.core.behaviour import Fleet
 from onboard.core.codes import Criterion, KindCode, LegAction, Operation
+from onboard.core.effects import Effect
 from onboard.core.lifts import sill
 from onboard.core.messages import CallForProposals, Reference
 from onboard.core.negotiation import Answer, CallTerms
@@ -44,6 +46,16 @@ def calls_after_winning(
             number += 1
             wanted.append(replace(terms, parent=parent, depth=call.depth + 1, part=number))
     return wanted
+
+
+def call_lifts(
+    fleet: Fleet, call: CallForProposals, steps: Iterable[Step], now_us: int, confirmed: tuple[Answer, ...] = ()
+) -> list[Effect]:
+    """Each ride is a call, made after winning (step 15) where no lift has promised it before (row P39)."""
+    effects: list[Effect] = []
+    for terms in calls_after_winning(fleet.site, call, steps, confirmed):
+        effects += fleet.negotiation.open(terms, now_us)
+    return effects
 
 
 def answer_for(terms: CallTerms, answers: Iterable[Answer]) -> Answer | None:

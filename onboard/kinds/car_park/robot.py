@@ -24,6 +24,7 @@ from onboard.core.messages import (
     CallForProposals,
     DriveState,
     Itinerary,
+    ManualOrder,
     Message,
     Reference,
     ShuttleState,
@@ -41,9 +42,10 @@ from onboard.kinds.car_park.generation import CarParkGeneration, Solution, weigh
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.going_around import GoingAround
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
+from onboard.kinds.car_park.holding import Holding
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
 from onboard.kinds.car_park.recovery import Recovery, award_record, ends_at, floor_record, handled_record, ride_record
-from onboard.kinds.car_park.ride_calls import calls_after_winning
+from onboard.kinds.car_park.ride_calls import call_lifts
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.site import RideCalls, car_park
 from onboard.kinds.car_park.travel import Carriage
@@ -85,6 +87,7 @@ class Robot:
     giving_way: GivingWay = field(init=False)
     recovery: Recovery = field(init=False)
     going_around: GoingAround = field(init=False)
+    holding: Holding = field(init=False)
     _recover_at_us: int | None = None
     #: The last tasks that were done: a late word about one of them is no news.
     _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
@@ -101,6 +104,7 @@ class Robot:
         custody.replay(self.fleet, self.recovery.cars.values())
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
+        self.holding = Holding(self.fleet, self.generation, self.carriage, self.shuttle)
         if self.recovery.floor is not None:
             self.carriage.track = self.recovery.floor
 
@@ -114,6 +118,8 @@ class Robot:
         """Heartbeat state."""
         if self._fault is not Reason.NONE or self.going_around.is_stuck:
             return MachineState.STOPPED
+        if self.holding.is_at_rest:
+            return MachineState.OBSTACLE
         if self.program.standing is None or self._recover_at_us is not None:
             return MachineState.STARTING
         if self.program.step is None:
@@ -138,39 +144,36 @@ class Robot:
                 effects += self._find_place(now_us)
             return effects
         if isinstance(message, ShuttleState):
-            self.shuttle.sense(message)
+            effects = self.shuttle.sense(message, now_us)
             if self.shuttle.fault and self._fault is Reason.NONE:
-                return self._fail(Reason.ACTUATOR_FAULT, now_us)
+                effects += self._fail(Reason.ACTUATOR_FAULT, now_us)
+            return effects
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Another machine's plan may mean that mine has to come later, or to take another way."""
         self.going_around.hear(message)
         if isinstance(message, Award):
-            return self._forfeit_unknown(message) + self._yield_task(message, now_us)
+            forfeited = self.recovery.forfeit_unknown(self.fleet, message, self._works(), self._done)
+            return forfeited + self._yield_task(message, now_us)
+        if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
+            return self.holding.ordered(message)
+        lost = self.holding.loses(message)
+        if lost is not None and lost in self.going_around.untouched():
+            return self._lose(lost, now_us)
         if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or self.program.standing is None:
             return []
-        if self.fleet.mirror.itineraries.get(message.sender) is not message:
+        # Nobody counts on the plan of a robot that is held: it is made anew once it is let go.
+        if self.holding.is_at_rest or self.fleet.mirror.itineraries.get(message.sender) is not message:
             return []
         answer = self.giving_way.heed(message.sender, now_us)
         if answer is Answer.ANEW:
             return self._reroute(message.sender, now_us)
         return self._publish(now_us) if answer is Answer.LATER else []
 
-    def _forfeit_unknown(self, award: Award) -> list[Effect]:
-        """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
-        mine = award.winner == self.fleet.node_id and award.result is CallResult.AWARDED
-        if not mine or not self.recovery.is_restart or self.fleet.negotiation.knows(award.sender, award.call):
-            return []
-        known = [*self.program.works(), *self.recovery.works]
-        if any(work.call.task == award.task for work in known) or award.task in self._done:
-            return []
-        return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
-
     def _yield_task(self, award: Award, now_us: int) -> list[Effect]:
         """A task of mine is another's by a newer version, or its call is void: I was lost for its initiator."""
-        for work in [*self.program.works(), *self.recovery.works]:
-            call = work.call
+        for call in [work.call for work in self._works()]:
             if (call.task, call.sender) != (award.task, award.sender):
                 continue
             newer = is_newer(award.task_version, self.recovery.versions.get(call.task, 1), 16)
@@ -197,7 +200,7 @@ class Robot:
         self.program.replace(rest, self.program.stamp)
         effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
         effects += self._publish(now_us)
-        return effects + (self._call_lifts(works[0].call, tuple(steps), now_us) if works else [])
+        return effects + (call_lifts(self.fleet, works[0].call, tuple(steps), now_us) if works else [])
 
     def _reroute(self, sender: int, now_us: int) -> list[Effect]:
         """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
@@ -212,7 +215,7 @@ class Robot:
         self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp)
         effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
         effects += self._publish(now_us)
-        return effects + (self._call_lifts(calls[0], steps, now_us) if calls else [])
+        return effects + (call_lifts(self.fleet, calls[0], steps, now_us) if calls else [])
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Pre-assignment keeps a tentative solution, being outbid drops it, an award makes it firm (row P47)."""
@@ -229,8 +232,9 @@ class Robot:
                 (solution,) = proposal.program
                 version = 1 if award is None else award.task_version
                 self.recovery.versions[call.task] = version
-                if self._fault is not Reason.NONE:
-                    return self.going_around.forfeit(call.task, self._fault, now_us)
+                why = Reason.OPERATOR if self.holding.is_held and self._fault is Reason.NONE else self._fault
+                if why is not Reason.NONE:
+                    return self.going_around.forfeit(call.task, why, now_us)
                 again = call.task in self.going_around.untouched()
                 dropped = self.going_around.drop([call.task], now_us) if again else []
                 return dropped + self._take_on(call, solution, parts, version, now_us)
@@ -238,9 +242,13 @@ class Robot:
                 return [self._tell_again(call.task)]
         return []
 
+    def _works(self) -> list[Work]:
+        """What is in hand, and what a restart has left to do."""
+        return [*self.program.works(), *self.recovery.works]
+
     def _tell_again(self, task: Reference) -> Effect:
         """What became of a task whose award is said again."""
-        handlings = [work.handling for work in (*self.program.works(), *self.recovery.works) if work.call.task == task]
+        handlings = [work.handling for work in self._works() if work.call.task == task]
         if Handling.TAKE in handlings or Handling.LEAVE in handlings:
             return self._report(task, TaskPhase.AWARDED if Handling.TAKE in handlings else TaskPhase.LOADED, 0)
         if task in self._done:
@@ -255,6 +263,8 @@ class Robot:
         """Carry on with the step in hand."""
         if self._fault is not Reason.NONE:
             return self.going_around.say_again(now_us)
+        if self.holding.stops(self._begun):
+            return self.going_around.say_again(now_us) + self.holding.come_to_rest(now_us)
         if self.program.standing is None:
             # On its way to a mark after a restart, or nowhere known.
             return self.carriage.advance(now_us) if self.carriage.goal is not None else []
@@ -264,6 +274,8 @@ class Robot:
         effects += self.going_around.advance(now_us) if self._recover_at_us is None else []
         # A step can end without a word on any bus, and the next is to begin in the same moment.
         for _ in range(MAX_STEPS):
+            if self.holding.stops(self._begun):
+                return effects + self.holding.come_to_rest(now_us)
             step = self.program.step
             if step is None:
                 return effects + self.carriage.advance(now_us)
@@ -284,6 +296,8 @@ class Robot:
         """
         if self._fault is not Reason.NONE:
             return self.going_around.next_word()
+        if self.holding.stops(self._begun):
+            return min((one for one in (self.carriage.next_wake(), self.going_around.next_word()) if one), default=None)
         times = [self.carriage.next_wake(), self._recover_at_us]
         if self._recover_at_us is None and self.program.standing is not None:
             times.append(self.going_around.next_wake())
@@ -301,7 +315,8 @@ class Robot:
             effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.current)]
         # An initiator that was restarted learns that its task is in hand.
         effects += self._taken_on(self.program.works())
-        return effects + custody.statements(self.fleet) + self.fleet.tokens.statements()
+        effects += custody.statements(self.fleet) + self.holding.manual.statement()
+        return effects + self.fleet.tokens.statements()
 
     def _taken_on(self, works: list[Work]) -> list[Effect]:
         to_take = [work for work in works if work.handling is Handling.TAKE]
@@ -317,8 +332,8 @@ class Robot:
         here = self.carriage.standing_at
         if here is not None and here == self.carriage.nearest:
             return self._admit(here, now_us)
-        held = self.carriage.occupied()
-        if self.carriage.goal is None and all(self.fleet.tokens.holds(segment_token(slot)) for slot in held):
+        may_move = self.carriage.goal is None and not self.holding.is_held
+        if may_move and all(self.fleet.tokens.holds(segment_token(slot)) for slot in self.carriage.occupied()):
             self.carriage.go(self.carriage.nearest)
         return []
 
@@ -361,7 +376,7 @@ class Robot:
         self.program.replace([*steps, *more], stamp)
         effects: list[Effect] = [Report("goes on after a restart: " + "; ".join(str(step) for step in (*steps, *more)))]
         effects += self._publish(now_us)
-        return effects + (self._call_lifts(calls[0], more, now_us) if calls else [])
+        return effects + (call_lifts(self.fleet, calls[0], more, now_us) if calls else [])
 
     def _resume(self, step: Step) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""
@@ -386,16 +401,7 @@ class Robot:
         ]
         effects += self._publish(now_us)
         effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
-        return effects + self._call_lifts(call, solution.steps, now_us, parts)
-
-    def _call_lifts(
-        self, call: CallForProposals, steps: tuple[Step, ...], now_us: int, parts: tuple[LiftAnswer, ...] = ()
-    ) -> list[Effect]:
-        """Each ride is a call, made after winning (step 15) where no lift has promised it before (row P39)."""
-        effects: list[Effect] = []
-        for terms in calls_after_winning(self.fleet.site, call, steps, parts):
-            effects += self.fleet.negotiation.open(terms, now_us)
-        return effects
+        return effects + call_lifts(self.fleet, call, solution.steps, now_us, parts)
 
     def _begin(self, step: Step, now_us: int) -> list[Effect]:
         if step.action is LegAction.TRAVEL:

@@ -16,6 +16,7 @@ from onboard.core.authority import MotionState, TokenKey, authorised, segment_to
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.lifts import gate
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.refuges import refuges
 from onboard.core.serial import successor
@@ -370,8 +371,15 @@ class Carriage:
         return Actuate(order)
 
     def _give_back(self, now_us: int) -> list[Effect]:
-        """Return segments that the body has left and does not need again before its goal."""
-        needed = {*self.occupied(), *self.whole.slots}
+        """Return segments that the body has left and does not need again before its goal.
+
+        Aboard a lift the gate stays: returned, it lets the platform move, and that only a ride may ask for. Else a
+        controller that starts again aboard would take the floor of its journal for the one where it is.
+        """
+        here = self.occupied()
+        tracks = self.fleet.site.tracks
+        gates = [gate(slot.track) for slot in here if tracks[slot.track].kind is TrackKind.LIFT]
+        needed = {*here, *gates, *self.whole.slots}
         if self.goal is not None and not self.arrived:
             needed.update(slot for slots in self.axis.rights(self._ahead()) for slot in slots)
         effects: list[Effect] = []

@@ -9,15 +9,17 @@ from onboard.core.messages import Reference
 
 @dataclass(frozen=True, slots=True)
 class Errand:
-    """One task: ``stops`` are the nodes still to be visited; empty once it is done."""
+    """One task: ``stops`` are the nodes still to be visited; empty once it is done, or was taken back."""
 
     task: Reference
     stops: tuple[int, ...]
+    is_cancelled: bool = False
 
 
 def errand_record(errand: Errand) -> Record:
     """How far a task is; the newest entry counts."""
     entry: dict[str, str | int] = {"record": "errand", "origin": errand.task.origin, "number": errand.task.number}
+    entry |= {"cancelled": 1} if errand.is_cancelled else {}
     return Record(entry | {"stops": " ".join(str(stop) for stop in errand.stops)})
 
 
@@ -27,5 +29,6 @@ def errands(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, Erran
     for entry in entries:
         if entry.get("record") == "errand":
             task = Reference(int(entry["origin"]), int(entry["number"]))
-            found[task] = Errand(task, tuple(int(stop) for stop in str(entry["stops"]).split()))
+            stops = tuple(int(stop) for stop in str(entry["stops"]).split())
+            found[task] = Errand(task, stops, "cancelled" in entry)
     return found

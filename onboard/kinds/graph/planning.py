@@ -63,6 +63,8 @@ class RobotPlanning:
     errands: dict[Reference, Errand] = field(default_factory=dict)
     promised: dict[CallKey, Errand] = field(default_factory=dict)
     others: dict[int, RobotAt] = field(default_factory=dict)
+    #: A person has a hand in (row M38): no new tasks.
+    is_held: bool = False
 
     # --- ways --------------------------------------------------------------------------------------------------
 
@@ -112,7 +114,7 @@ class RobotPlanning:
         wanted = (call.from_station, call.to_station)
         if call.operation is not Operation.TRANSPORT or call.criterion is not Criterion.FINISH_TIME:
             return None
-        if any(node not in graph.neighbours for node in wanted) or call.task in self.errands:
+        if self.is_held or any(node not in graph.neighbours for node in wanted) or call.task in self.errands:
             return None
         before = [one for one in self.promised.values() if one.task != call.task]
         stops = [stop for one in (*self.errands.values(), *before) for stop in one.stops]

@@ -10,7 +10,8 @@ from onboard.core.authority import MotionState, TokenKey, authorised
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import Award, CallForProposals, Heartbeat, Message, Reference, TaskReport
+from onboard.core.manual import Manual
+from onboard.core.messages import Award, CallForProposals, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor
@@ -81,11 +82,14 @@ class GraphRobot:
     body: BodyState | None = None
     mode: RobotMode = RobotMode.FREE
     over: set[Reference] = field(default_factory=set)
+    #: Of these, what was taken back by who gave it.
+    cancelled: set[Reference] = field(default_factory=set)
     #: Whether a host of node agents tells another site: then my map is wrong or old, and I stay where I am (row G27).
     has_other_map: bool = False
     #: Waits at nodes that ended in STOP, for the indicators.
     stops_told: int = 0
     sent_elsewhere: int = 0
+    manual: Manual = field(init=False)
     _grant: _Grant | None = None
     _answer: NodeVerdict | None = None
     _signal: tuple[int, int] | None = None
@@ -99,11 +103,16 @@ class GraphRobot:
     _sequence: int = 0
 
     def __post_init__(self) -> None:
+        self.manual = Manual(self.fleet.node_id)
+        self.manual.replay(self.fleet.entries)
+        self.planning.is_held = not self.manual.is_automatic
         for task, errand in errands(self.fleet.entries).items():
             if errand.stops:
                 self.planning.errands[task] = errand
             else:
                 self.over.add(task)
+            if errand.is_cancelled:
+                self.cancelled.add(task)
 
     @property
     def site(self) -> FactoryGraph:
@@ -117,7 +126,7 @@ class GraphRobot:
         """Heartbeat state."""
         if self.body is None:
             return MachineState.STARTING
-        if self.has_other_map:
+        if self.has_other_map or self.manual.at_rest:
             return MachineState.OBSTACLE
         if self._answer is NodeVerdict.STOP:
             return MachineState.WAITING
@@ -159,9 +168,14 @@ class GraphRobot:
             case RobotAt():
                 self.planning.others[message.sender] = message
             case VisitList() if message.robot == self.fleet.node_id:
-                return self._take_on(Reference(message.sender, message.order), stops_of(message))
+                task, stops = Reference(message.sender, message.order), stops_of(message)
+                return self._take_on(task, stops) if stops else self._take_back(task)
             case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
                 return self._on_award(message)
+            case ManualOrder() if message.machine == self.fleet.node_id:
+                effects = self.manual.ordered(message)
+                self.planning.is_held = not self.manual.is_automatic
+                return effects
             case CallForProposals() if message.task in self.planning.errands or message.task in self.over:
                 return [self._report(message.task)]
         return []
@@ -191,7 +205,8 @@ class GraphRobot:
         effects = self._load(now_us)
         effects += self._redeem(now_us) + self._ask(now_us)
         effects += self._drive(now_us) + self._give_back(now_us)
-        return effects + self._tell(now_us)
+        at_rest = self.body.body_place is BodyPlace.IN_NODE and self._grant is None and self._loaded_at_us is None
+        return effects + self.manual.rests(at_rest) + self._tell(now_us)
 
     def next_wake(self) -> int | None:
         """When a signal, an order or a word is due, or loading over."""
@@ -204,7 +219,7 @@ class GraphRobot:
         self._told = None
         reports: list[Effect] = [self._report(task) for task in (*self.planning.errands, *sorted(self.over)[-8:])]
         where = self._tell(now_us) if self.body is not None else []
-        return reports + where + self.fleet.tokens.statements()
+        return reports + where + self.manual.statement() + self.fleet.tokens.statements()
 
     # --- tasks -------------------------------------------------------------------------------------------------
 
@@ -219,6 +234,16 @@ class GraphRobot:
         self.planning.errands[task] = errand
         return [errand_record(errand), self._report(task)]
 
+    def _take_back(self, task: Reference) -> list[Effect]:
+        """Who gave an order by name wants it no more: it ends its edge, and does nothing more for it."""
+        if task not in self.over:
+            self.planning.errands.pop(task, None)
+            self.over.add(task)
+            self.cancelled.add(task)
+            self._loaded_at_us = None
+            return [errand_record(Errand(task, (), is_cancelled=True)), self._report(task)]
+        return [self._report(task)]
+
     def _on_award(self, award: Award) -> list[Effect]:
         """Said again: my word was lost. For a bid that I have forgotten: it is given back."""
         if award.task in self.planning.errands or award.task in self.over:
@@ -229,6 +254,8 @@ class GraphRobot:
 
     def _report(self, task: Reference) -> Send:
         phase = TaskPhase.AWARDED if task in self.planning.errands else TaskPhase.DONE
+        if task in self.cancelled:
+            return Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.CANCELLED))
         return Send(TaskReport(self.fleet.node_id, task, phase, 0, Reason.NONE))
 
     @property
@@ -237,14 +264,17 @@ class GraphRobot:
 
     @property
     def _goal(self) -> int | None:
-        errand = self._errand
+        """Where it goes; held, only into the node ahead, as if it were free."""
+        errand = self._errand if self.manual.is_automatic else None
         return errand.stops[0] if errand is not None else None
 
     def _load(self, now_us: int) -> list[Effect]:
         """Load where the next stop is, for the site's time; then go on, or be free (row G13)."""
         assert self.body is not None
         errand = self._errand
-        if errand is None or self.body.body_place is not BodyPlace.IN_NODE or self.body.node != errand.stops[0]:
+        begins = self.manual.is_automatic or self._loaded_at_us is not None
+        at_stop = self.body.body_place is BodyPlace.IN_NODE and errand is not None and self.body.node == errand.stops[0]
+        if errand is None or not at_stop or not begins:
             self._loaded_at_us = None
             self.mode = RobotMode.FREE if errand is None else RobotMode.DRIVING
             return []

@@ -46,6 +46,12 @@ class Body:
         return self.handler_order is not None
 
     @property
+    def is_at_rest(self) -> bool:
+        """Whether it stands, with nothing ordered that is not over."""
+        stands = self.move is not None and self.move.mode is not MoveMode.MOVING
+        return stands and not self.is_moving and not self.is_handling
+
+    @property
     def stands_ready(self) -> bool:
         """Whether the slot is crossed and nothing is ordered: the next may be entered."""
         return self.move is not None and not self.is_moving and self.move.at_end and self.move.mode is MoveMode.STANDING

@@ -8,9 +8,28 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet, NoEstimator
-from onboard.core.codes import CallResult, Criterion, KindCode, MachineState, Operation, Reason, TaskPhase, TokenKind
+from onboard.core.codes import (
+    CallResult,
+    Criterion,
+    KindCode,
+    MachineState,
+    ManualMode,
+    Operation,
+    Reason,
+    TaskPhase,
+    TokenKind,
+)
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.messages import CallForProposals, CarAt, Heartbeat, Message, Reference, TaskReport
+from onboard.core.messages import (
+    CallForProposals,
+    CarAt,
+    Heartbeat,
+    ManualOrder,
+    ManualState,
+    Message,
+    Reference,
+    TaskReport,
+)
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import to_bus_ms
@@ -19,9 +38,6 @@ from onboard.kinds.terminal.messages import (
     LaneSensor,
     LaneState,
     ManualKey,
-    ManualMode,
-    ManualOrder,
-    ManualState,
     MissionKey,
     PlanHead,
     TaskTerms,

@@ -6,6 +6,7 @@ Times on the wire are bus time in ms modulo 2**32; a plan's step ends so many ms
 from dataclasses import dataclass
 from enum import IntEnum
 
+from onboard.core.codes import ManualMode
 from onboard.core.messages import Message, Reference
 
 
@@ -51,14 +52,6 @@ class Verb(IntEnum):
     LOAD = 0
     TRANSHIP = 1
     END = 2
-
-
-class ManualMode(IntEnum):
-    """How far a person has a hand in a vehicle (row M38)."""
-
-    AUTOMATIC = 0
-    HELD = 1
-    STEP = 2
 
 
 # --- fleet bus -----------------------------------------------------------------------------------------------------
@@ -143,23 +136,6 @@ class Assignment(Message):
     target: int
 
 
-@dataclass(frozen=True, slots=True)
-class ManualOrder(Message):
-    """A person at a desk holds ``vehicle``, has it do one elementary action, or lets it go; said again until heard."""
-
-    vehicle: int
-    number: int
-    manual_mode: ManualMode
-
-
-@dataclass(frozen=True, slots=True)
-class ManualState(Message):
-    """The vehicle's answer to the order of this ``number``."""
-
-    number: int
-    manual_mode: ManualMode
-
-
 # --- device buses --------------------------------------------------------------------------------------------------
 
 
@@ -241,6 +217,5 @@ class ManualKey(Message):
 
 MESSAGES = (
     PlanHead, PlanStep, PlanTask, StepReport, LaneState, TaskTerms, Assignment,
-    MoveOrder, MoveState, HandlerOrder, HandlerState, LaneSensor, MissionKey,
-    ManualOrder, ManualState, ManualKey,
+    MoveOrder, MoveState, HandlerOrder, HandlerState, LaneSensor, MissionKey, ManualKey,
 )  # fmt: skip

@@ -11,7 +11,7 @@ from onboard.core.authority import MotionState, TokenKey, authorised, car_token,
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import CallForProposals, CarAt, Heartbeat, Message, Reference, TaskReport
+from onboard.core.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Segment, Site
@@ -24,7 +24,6 @@ from onboard.kinds.terminal.messages import (
     Assignment,
     HandlerMode,
     HandlerState,
-    ManualOrder,
     MoveMode,
     MoveState,
     StepResult,
@@ -140,8 +139,8 @@ class Vehicle:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Everybody's plans, reports, boxes and lanes; a central planner's order is as good as an award."""
         self.mirror.hear(message, now_us)
-        if isinstance(message, ManualOrder) and message.vehicle == self.fleet.node_id:
-            effects = self.manual.ordered(message, self.owned)
+        if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
+            effects = self.manual.step_by_hand(message, self.owned)
             self.generation.is_held = not self.manual.is_automatic
             return effects
         if isinstance(message, Assignment) and message.vehicle == self.fleet.node_id:
@@ -166,7 +165,7 @@ class Vehicle:
             return []
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             self._retry_at_us, self._may_retry = None, True
-        effects = self.body.repeat(now_us) + self._give_back(now_us)
+        effects = self.body.repeat(now_us) + self._give_back(now_us) + self.manual.rests(self.body.is_at_rest)
         effects += self.planner.in_turn(now_us)
         owned = self.owned
         if effects:
@@ -187,9 +186,7 @@ class Vehicle:
         handler = self.body.handler
         if handler is not None and handler.box and self.fleet.tokens.holds(self._box_token(handler.box)):
             effects.append(Send(self._box_at(handler.box, ANY_STATION)))
-        if not self.manual.is_automatic:
-            effects.append(self.manual.told())
-        return effects + self.fleet.tokens.statements()
+        return effects + self.manual.statement() + self.fleet.tokens.statements()
 
     # --- motion -----------------------------------------------------------------------------------------------
 

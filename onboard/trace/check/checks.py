@@ -14,6 +14,7 @@ from onboard.trace.check.cars import CarsConserved, OneCustodian
 from onboard.trace.check.customers import CustomersServed, FullMeansFull, TasksServed
 from onboard.trace.check.doors import Doors
 from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.holds import LetGoAgain
 from onboard.trace.check.lifts import LiftByGate, LiftCrush, PlatformThere
 from onboard.trace.check.liveness import NobodyStarves, SomethingHappens
 from onboard.trace.check.motion import InsideAuthority, OneBody
@@ -46,6 +47,7 @@ RULES: tuple[type[Rule], ...] = (
     FullMeansFull,
     SomethingHappens,
     NobodyStarves,
+    LetGoAgain,
 )
 
 #: Findings that are kept word for word; all are counted.

@@ -6,6 +6,7 @@ from onboard.kinds.graph.messages import NO_NODE, EdgeNotice, EdgeState, NodeAns
 from onboard.kinds.graph.site import FactoryGraph
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.holds import LetGoAgain
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
@@ -143,4 +144,5 @@ RULES: tuple[type[Rule], ...] = (
     NoTurningBack,
     AgentsOfNodes,
     GrantsAreTold,
+    LetGoAgain,
 )

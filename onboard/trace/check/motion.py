@@ -21,11 +21,15 @@ from onboard.trace.check.geometry import (
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 
+#: Who was pushed by hand has so long to get the rights to where it is, us: requests are repeated every second. Ours.
+PUSHED_US = 5_000_000
+
 
 class InsideAuthority(Rule):
     """A robot's body, its braking distance and the way of each drive order lie in slots that it holds.
 
-    A slot whose holder the log does not tell is counted as not judged. A breach is told when it begins.
+    A slot whose holder the log does not tell is counted as not judged. A breach is told when it begins. A body that
+    stood and now stands elsewhere was pushed by a person: no controller could have asked before, it must ask at once.
     """
 
     name = "inside-authority"
@@ -37,6 +41,7 @@ class InsideAuthority(Rule):
         super().__init__(picture, report)
         self._told: set[tuple[int, Segment]] = set()
         self._sensed_mm: dict[int, int] = {}
+        self._pushed: dict[int, tuple[Event[Progress], Body, int]] = {}
 
     def handlers(self) -> Handlers:
         """Where bodies are, and with device buses where drives are sent."""
@@ -47,11 +52,29 @@ class InsideAuthority(Rule):
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
         deceleration = self.picture.site.carrier.acceleration_mm_s2
+        was_pushed = self._was_pushed(body)
+        self._pushed.pop(body.node, None)
+        if was_pushed:
+            self._pushed[body.node] = event, body, event.time_us + PUSHED_US
+            return
         braking_mm = body.speed_mm_s * abs(body.speed_mm_s) / (2 * deceleration)
         here = occupied(self.picture.site, body)
         ahead = [slot for slot in swept(self.picture.site, body, body.position_mm + braking_mm) if slot not in here]
         self._judge(event, body, here, "is in")
         self._judge(event, body, ahead, "cannot stop before")
+
+    def _was_pushed(self, body: Body) -> bool:
+        before = self.picture.bodies.get(body.node)
+        if before is None or before.track != body.track or before.speed_mm_s or body.speed_mm_s:
+            return False
+        return body.node in self._pushed or abs(before.position_mm - body.position_mm) > TOLERANCE_MM
+
+    def tick(self, now_us: int) -> None:
+        """Who was pushed has had its time."""
+        for node, (event, body, due_us) in list(self._pushed.items()):
+            if now_us >= due_us:
+                del self._pushed[node]
+                self._judge(event, body, occupied(self.picture.site, body), "was pushed, and stays in", now_us)
 
     def _on_state(self, event: Event[DriveState]) -> None:
         self._sensed_mm[event.message.sender] = event.message.position_mm
@@ -74,12 +97,19 @@ class InsideAuthority(Rule):
             slots = spur_slots(site, spur, -math.inf) if spur is not None else [Segment(body.track, body.index)]
         self._judge(event, body, slots, "is sent through")
 
-    def _judge(self, event: Event[Progress] | Event[DriveOrder], body: Body, slots: list[Segment], how: str) -> None:
-        tokens = self.picture.tokens
+    def _judge(
+        self,
+        event: Event[Progress] | Event[DriveOrder],
+        body: Body,
+        slots: list[Segment],
+        how: str,
+        now_us: int | None = None,
+    ) -> None:
+        tokens, at_us = self.picture.tokens, event.time_us if now_us is None else now_us
         for slot in slots:
             holder = tokens.holder(token_of(slot))
             self.picture.unjudged += holder is None
-            if tokens.may_use(token_of(slot), body.node, event.time_us):
+            if tokens.may_use(token_of(slot), body.node, at_us):
                 self._told.discard((body.node, slot))
             elif (body.node, slot) not in self._told:
                 self._told.add((body.node, slot))

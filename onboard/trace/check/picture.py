@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from onboard.core.codes import KindCode, MachineState
-from onboard.core.messages import BusTime, Heartbeat, Message, Progress, TokenGrant, TokenHeld
+from onboard.core.codes import KindCode, MachineState, ManualMode
+from onboard.core.messages import BusTime, Heartbeat, ManualState, Message, Progress, TokenGrant, TokenHeld
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import Event
@@ -38,6 +38,8 @@ class Picture:
         self.unjudged = 0
         #: Until then machines were broken on purpose, us of the log: no rule of liveness counts time before it.
         self.excused_us = 0
+        #: Machines that a person holds: while there are any, and until they go on, no such time counts either.
+        self.held: set[int] = set()
         #: Bus time has jumped: until then (us of the log) machines wait for a second word, and decide no call.
         self.clock_settles_us = 0
         self._site = site
@@ -55,7 +57,12 @@ class Picture:
         return self._site is not None
 
     def waited_us(self, since_us: int, now_us: int) -> int:
-        """How long something has been due, for rules of liveness: from ``since_us``, or from the end of all faults."""
+        """How long something has been due, for rules of liveness: from ``since_us``, or from the end of all faults.
+
+        Nothing is due while somebody is held, for others may have to wait for it.
+        """
+        if self.held:
+            return 0
         return now_us - max(since_us, self.excused_us)
 
     def kind(self, node: int) -> KindCode | None:
@@ -99,9 +106,18 @@ class Picture:
                 body = body_of(self._site, progress, time_us)
                 if body is not None:
                     self.bodies[progress.sender] = body
+            case ManualState() as state:
+                self._on_manual(state, time_us)
             case Heartbeat() as beat:
                 if not self.boots:
                     # The first sign of life of a whole site in its first life: all tokens are where the site file says.
                     self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
                 self.boots[beat.sender] = beat.boot
                 self.heard_us[beat.sender] = time_us
+
+    def _on_manual(self, state: ManualState, time_us: int) -> None:
+        if state.manual_mode is not ManualMode.AUTOMATIC:
+            self.held.add(state.sender)
+        elif state.sender in self.held:
+            self.held.discard(state.sender)
+            self.excused_us = max(self.excused_us, time_us)

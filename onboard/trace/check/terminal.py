@@ -17,6 +17,7 @@ from onboard.kinds.terminal.messages import (
 from onboard.kinds.terminal.site import Entity, EntityKind, Terminal
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.holds import LetGoAgain
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Handlers, Rule
@@ -219,4 +220,5 @@ TERMINAL_RULES: tuple[type[Rule], ...] = (
     BoxInOnePlace,
     NobodyOvertakes,
     PlansInOrder,
+    LetGoAgain,
 )

@@ -1,0 +1,77 @@
+"""What came of one trial: its verdict, and all that a table or a person may want to know of it."""
+
+from collections import Counter
+from dataclasses import dataclass
+from enum import StrEnum
+
+from bus_sim.can.faults import Fault
+from bus_sim.faults.scenario import Scenario
+
+#: With all faults over and everybody served, all machines run and all mirrors are equal within this, us (ours).
+CONVERGED_US = 120_000_000
+
+
+class Verdict(StrEnum):
+    """What came of a run, the worst first."""
+
+    VIOLATION = "VIOLATION"
+    CRASHED = "program error"
+    STOPPED = "stopped safely"
+    NOT_SERVED = "not served"
+    NOT_LIVE = "stood still"
+    APART = "not converged"
+    DELAYED = "delayed"
+    TOLD = "told why"
+    SERVED = "served"
+
+
+#: What makes a campaign look closer: a trace and a shrunk scenario are kept.
+FAILURES = (
+    Verdict.VIOLATION,
+    Verdict.CRASHED,
+    Verdict.STOPPED,
+    Verdict.NOT_SERVED,
+    Verdict.NOT_LIVE,
+    Verdict.APART,
+)
+
+
+@dataclass(frozen=True)
+class Report:
+    """What one trial came to; times in s of simulated time. customers, or orders, are counted.
+
+    ``violations``: what the plant's oracle saw happen, and rules of safety that the checkers saw broken on the buses.
+    ``stalls``: rules of liveness that were broken in time without faults. ``recovery``: longest time by measure, us.
+    """
+
+    scenario: Scenario
+    verdict: Verdict
+    violations: tuple[str, ...] = ()
+    stalls: tuple[str, ...] = ()
+    halted: tuple[str, ...] = ()
+    served: int = 0
+    told: int = 0
+    full: int = 0
+    waiting: int = 0
+    longest_wait_s: float = 0.0
+    simulated_s: float = 0.0
+    struck: tuple[tuple[str, int], ...] = ()
+    recovery: tuple[tuple[str, int], ...] = ()
+    is_apart: bool = False
+    error: str = ""
+    #: What ``served``, ``told`` and ``waiting`` count.
+    who: str = "customers"
+
+    def why(self) -> str:
+        """One line for a person."""
+        if self.error:
+            return self.error
+        said = self.violations or self.halted or (() if self.waiting else self.stalls)
+        if not said and self.is_apart and not self.waiting:
+            return f"mirrors differ {CONVERGED_US // 1_000_000} s after all faults and all work"
+        return said[0] if said else f"{self.waiting} still waiting after {self.simulated_s:.0f} s"
+
+
+def kinds_of(scenario: Scenario) -> Counter[str]:
+    """How many faults of each kind a scenario has."""
+    return Counter(fault.kind.value if isinstance(fault, Fault) else fault.kind for fault in scenario.faults)

@@ -1,0 +1,63 @@
+"""Goals for a cell as a seed draws them: parts between points that some robot reaches, and nothing stands on."""
+
+import random
+from dataclasses import replace
+from typing import cast
+
+from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant, make_plant
+from bus_sim.systems.orders import Ended, Orders, System, Tally, tally
+from bus_sim.systems.session import SystemPlant
+from onboard.core.site import Site
+from onboard.kinds.cell.geometry import Point
+from onboard.kinds.cell.messages import OrderResult
+from onboard.kinds.cell.site import Cell, Wish
+
+#: Points are drawn so far from edges of areas and obstacles at least, mm. Ours.
+MARGIN_MM = 500
+#: Attempts to find a point beside all obstacles before one is taken as it is: its goal is refused then. Ours.
+ATTEMPTS = 100
+#: About what one order takes, s: measured on the shipped site.
+ORDER_S = 60.0
+
+
+def draw(site: Site, orders: Orders, seed: int) -> Cell:
+    """The site with drawn goals; none has a deadline, as faults may last longer than any."""
+    assert isinstance(site, Cell)
+    chance = orders.chance(site.name, seed)
+    wishes = [Wish(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
+    return replace(site, wishes=tuple(wishes))
+
+
+def _point(site: Cell, chance: random.Random) -> Point:
+    """Somewhere in the area of a robot that is drawn first."""
+    point = Point(0, 0)
+    for _ in range(ATTEMPTS):
+        area = chance.choice(list(site.arms.values())).area
+        x_mm = chance.randint(area.x0_mm + MARGIN_MM, area.x1_mm - MARGIN_MM)
+        point = Point(x_mm, chance.randint(area.y0_mm + MARGIN_MM, area.y1_mm - MARGIN_MM))
+        if not any(_is_on(point, one.x0_mm, one.y0_mm, one.x1_mm, one.y1_mm) for one in site.obstacles):
+            break
+    return point
+
+
+def _is_on(point: Point, x0_mm: int, y0_mm: int, x1_mm: int, y1_mm: int) -> bool:
+    return x0_mm - MARGIN_MM < point.x_mm < x1_mm + MARGIN_MM and y0_mm - MARGIN_MM < point.y_mm < y1_mm + MARGIN_MM
+
+
+def last_s(site: Site) -> float:
+    """When the last order comes, s after power-up."""
+    assert isinstance(site, Cell)
+    return ORIGIN_US / 1e6 + max((one.at_ms for one in site.wishes), default=0) / 1e3
+
+
+def count(plant: SystemPlant) -> Tally:
+    """What became of the goals."""
+    cell = cast("CellPlant", plant)
+    ended = [
+        Ended(one.result is OrderResult.DONE, one.result is OrderResult.REFUSED, one.begun_us, one.ended_us)
+        for one in cell.entries
+    ]
+    return tally(ended, len(cell.site.wishes), cell.timers.now_us())
+
+
+CELL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(6, 20.0), who="goals")

@@ -1,0 +1,63 @@
+"""Tasks for a pick-up and delivery site as a seed draws them: between its endpoints."""
+
+from dataclasses import replace
+from statistics import fmean
+from typing import cast
+
+from bus_sim.systems.mapd.plant import UnitPlant, make_plant
+from bus_sim.systems.orders import Ended, Orders, System, Tally, nothing_to_draw, tally
+from bus_sim.systems.session import SystemPlant
+from onboard.core.site import Site
+from onboard.kinds.mapd.messages import TransportResult
+from onboard.kinds.mapd.site import FAR, Mapd, Task
+
+#: So many endpoints are looked at to see how long ways are. Ours.
+SAMPLE = 12
+
+
+def draw(site: Site, orders: Orders, seed: int) -> Mapd:
+    """The site with drawn tasks. Raises ``DemandError`` for one with fewer than two endpoints."""
+    assert isinstance(site, Mapd)
+    if len(site.endpoints) < 2:
+        raise nothing_to_draw(site.name, "fewer than two endpoints")
+    chance = orders.chance(site.name, seed)
+    tasks = [
+        Task(number, at_ms // site.step_ms, *chance.sample(site.endpoints, 2))
+        for number, at_ms in enumerate(orders.moments_ms(chance))
+    ]
+    return replace(site, tasks=tuple(tasks))
+
+
+def last_s(site: Site) -> float:
+    """When the last order comes, s after power-up."""
+    assert isinstance(site, Mapd)
+    return max((one.release for one in site.tasks), default=0) * site.step_us / 1e6
+
+
+def count(plant: SystemPlant) -> Tally:
+    """What became of the tasks, after the oracle has gone over the whole run once more, step by step."""
+    mapd = cast("UnitPlant", plant)
+    mapd.check_steps()
+    ended = []
+    for one in mapd.goods.values():
+        refused = one.answer is TransportResult.REFUSED and one.served_step is None
+        ended.append(Ended(one.served_step is not None, refused, one.ordered_us, one.served_us))
+    return tally(ended, len(mapd.site.tasks), mapd.timers.now_us())
+
+
+def order_s(site: Site) -> float:
+    """Twice the mean way between endpoints: to the pick-up and with the load; half as much again for the others."""
+    assert isinstance(site, Mapd)
+    some = site.endpoints[:: -(-len(site.endpoints) // SAMPLE)]
+    ways = [site.floor.steps_to(end)[start] for end in some for start in some if start != end]
+    known = [way for way in ways if way < FAR]
+    return max(1.0, 3 * fmean(known or [1]) * site.step_us / 1e6)
+
+
+def usual(site: Site) -> Orders:
+    """As the robots can just carry out."""
+    assert isinstance(site, Mapd)
+    return Orders(16, order_s(site) / max(1, len(site.robots)))
+
+
+MAPD = System(make_plant, draw, last_s, count, order_s, usual, who="tasks")

@@ -1,0 +1,48 @@
+"""Orders for a turning cell as a seed draws them: the site's own kinds of part, in other numbers and another order."""
+
+from dataclasses import replace
+from typing import cast
+
+from bus_sim.systems.orders import Ended, Orders, System, Tally, nothing_to_draw, tally
+from bus_sim.systems.session import SystemPlant
+from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant, make_plant
+from onboard.core.site import Site
+from onboard.kinds.turning.messages import JobResult
+from onboard.kinds.turning.site import Turning, Wanted
+
+#: Parts of an order, at least and at most. Ours.
+BATCH = (1, 3)
+#: About what one order takes, s: measured on the shipped site.
+ORDER_S = 1_500.0
+
+
+def draw(site: Site, orders: Orders, seed: int) -> Turning:
+    """The site with drawn orders. Raises ``DemandError`` for a site without any of its own, whose parts they take."""
+    assert isinstance(site, Turning)
+    if not site.orders:
+        raise nothing_to_draw(site.name, "no orders to take the parts of")
+    chance = orders.chance(site.name, seed)
+    drawn = []
+    for at_ms in orders.moments_ms(chance):
+        job = chance.choice(site.orders).job
+        drawn.append(Wanted(at_ms, replace(job, batch=chance.randint(*BATCH))))
+    return replace(site, orders=tuple(drawn))
+
+
+def last_s(site: Site) -> float:
+    """When the last order comes, s after power-up."""
+    assert isinstance(site, Turning)
+    return ORIGIN_US / 1e6 + max((one.at_ms for one in site.orders), default=0) / 1e3
+
+
+def count(plant: SystemPlant) -> Tally:
+    """What became of the orders."""
+    turning = cast("TurningPlant", plant)
+    ended = [
+        Ended(one.result is JobResult.DONE, one.result is JobResult.REFUSED, one.begun_us, one.ended_us)
+        for one in turning.entries
+    ]
+    return tally(ended, len(turning.site.orders), turning.timers.now_us())
+
+
+TURNING = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(4, 120.0))

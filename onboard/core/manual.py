@@ -1,0 +1,70 @@
+"""A person in the loop (row M38): a machine that moves is held, and let go again, by an order on the bus.
+
+Held, it begins nothing, asks for no more rights and bids for nothing; what must not be left half done it ends. Its
+rights, its load and its tasks stay its own. The order is in the journal: a machine that was held is held when it is
+started again, since whoever held it may stand before it.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from onboard.core.codes import ManualMode
+from onboard.core.effects import Effect, Record, Send
+from onboard.core.messages import ManualOrder, ManualState
+
+
+@dataclass
+class Manual:
+    """One machine's mode. ``by`` and ``number`` are the last order's sender and number."""
+
+    node_id: int
+    mode: ManualMode = ManualMode.AUTOMATIC
+    number: int = 0
+    by: int = 0
+    #: Held, it has come to rest, as it last said.
+    at_rest: bool = field(default=False, init=False)
+
+    @property
+    def is_automatic(self) -> bool:
+        """Whether nobody has a hand in."""
+        return self.mode is ManualMode.AUTOMATIC
+
+    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+        """After a restart the machine is held if it was; a step by hand is not begun anew."""
+        for entry in entries:
+            if entry.get("record") == "manual":
+                self.mode = ManualMode(int(entry["mode"]))
+                self.number, self.by = int(entry["number"]), int(entry["by"])
+        if self.mode is ManualMode.STEP:
+            self.mode = ManualMode.HELD
+
+    def ordered(self, order: ManualOrder) -> list[Effect]:
+        """A person's order; said again it is only answered again. A single step is not known here: all stays."""
+        if order.manual_mode is ManualMode.STEP:
+            self.by, self.number = order.sender, order.number
+            return [self.told()]
+        return self.take(order) or [self.told()]
+
+    def take(self, order: ManualOrder) -> list[Effect]:
+        """Take an order up: what is journalled and said; nothing where it is the last one, said again."""
+        if (order.sender, order.number) == (self.by, self.number):
+            return []
+        self.mode, self.by, self.number = order.manual_mode, order.sender, order.number
+        self.at_rest = False
+        entry: dict[str, str | int] = {"record": "manual", "mode": int(self.mode), "by": self.by, "number": self.number}
+        return [Record(entry), self.told()]
+
+    def rests(self, at_rest: bool) -> list[Effect]:
+        """Note whether the machine stands and does nothing; it says so where that is news."""
+        if self.is_automatic or at_rest is self.at_rest:
+            return []
+        self.at_rest = at_rest
+        return [self.told()]
+
+    def told(self) -> Effect:
+        """What the machine says of it."""
+        return Send(ManualState(self.node_id, self.number, self.mode, self.at_rest))
+
+    def statement(self) -> list[Effect]:
+        """What it says to whoever asks: nothing while nobody has a hand in."""
+        return [] if self.is_automatic else [self.told()]

@@ -1,0 +1,141 @@
+"""Campaigns on sites that are no car park: orders that a seed draws, and the command that plays all systems alike."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from bus_sim.campaign.profiles import draw_at_rate, draw_faults, kinds_for
+from bus_sim.campaign.report import Verdict
+from bus_sim.campaign.runner import Plan, run_seed
+from bus_sim.campaign.systems import SYSTEMS, span_s, usual_orders, with_orders
+from bus_sim.campaign.trial import play
+from bus_sim.cli import main
+from bus_sim.faults.injection import parse_injection
+from bus_sim.faults.scenario import Scenario, load_scenario
+from bus_sim.importers.command import import_files
+from bus_sim.importers.draft import site_text
+from bus_sim.importers.mapf import Wanted
+from bus_sim.sites import find_site
+from bus_sim.systems.orders import Orders
+from bus_sim.systems.registry import RUNNERS
+from bus_sim.systems.session import FAULTS
+from tests.faults.systems import PLANTS
+
+SHIPPED = ("cell", "graph", "terminal", "turning")
+
+
+@pytest.fixture(scope="module")
+def hotel(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The file of an imported plant."""
+    path = tmp_path_factory.mktemp("hotel") / "hotel.toml"
+    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], Wanted(tasks=3, seed=7))), "utf-8")
+    return str(path)
+
+
+def test_every_system_that_can_be_run_has_campaigns() -> None:
+    assert SYSTEMS.keys() == RUNNERS.keys()
+
+
+@pytest.mark.parametrize("name", [*SHIPPED, "hotel"])
+def test_a_seed_draws_orders_of_its_own_and_they_are_carried_out(name: str, hotel: str) -> None:
+    site = find_site(hotel if name == "hotel" else name)
+    orders = Orders(3, usual_orders(site, None, None).apart_s)
+    drawn = [with_orders(site, orders, seed) for seed in (1, 1, 2)]
+    assert drawn[0] == drawn[1] != drawn[2]
+    assert with_orders(site, Orders(0, 1.0), 1) is site
+    report = play(site, Scenario(site.name, 1, 4 * 3_600.0, orders=orders))
+    assert report.verdict is Verdict.SERVED, report.why()
+    assert report.served >= 3 and report.waiting == 0
+    assert report.simulated_s < 3 * span_s(with_orders(site, orders, 1))[1]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_faults_strike_while_orders_are_carried_out(name: str) -> None:
+    site = with_orders(find_site(name), Orders(4, 30.0), 1)
+    first_s, last_s = span_s(site)
+    for profile in ("bus", "crash", "all"):
+        assert kinds_for(profile, site).keys() <= FAULTS
+        faults = [fault for seed in range(30) for fault in draw_faults(profile, seed, site, (first_s, last_s))]
+        assert all(first_s <= fault.number("at_s") <= last_s for fault in faults)
+    assert kinds_for("people", site) == {}
+    assert draw_at_rate("all", 1, site, 60, 36_000)
+
+
+def test_the_command_plays_a_graph_and_tells_of_orders(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    figures = tmp_path / "figures.json"
+    command = ["campaign", "graph", "--seeds", "1-2", "--jobs", "1", "--orders", "3", "--out", str(tmp_path / "out")]
+    assert main([*command, "--json", str(figures)]) == 0
+    told = capsys.readouterr().out
+    assert "campaign on graph: seeds 1-2, faults all, 3 orders each" in told
+    assert "6 orders: served 6, told why 0, left waiting 0\n" in told
+    runs = json.loads(figures.read_text(encoding="utf-8"))["runs"]
+    assert [run["served"] for run in runs] == [3, 3] and all(run["faults"] for run in runs)
+
+
+def test_orders_of_the_site_itself_are_played_where_none_are_drawn(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["campaign", "graph", "--seeds", "5", "--faults", "none", "--jobs", "1", "--out", str(tmp_path)]
+    assert main([*command, "--orders", "0"]) == 0
+    told = capsys.readouterr().out
+    assert "the site's own orders each" in told and "8 orders: served 8" in told
+
+
+def test_a_failure_is_shrunk_kept_and_played_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    faults = tuple(
+        parse_injection(text)
+        for text in ("burst:at_s=14", "crash:target=OD,at_s=16,restart=no", "drift:target=R1,at_s=9")
+    )
+    monkeypatch.setattr("bus_sim.campaign.runner.draw_faults", lambda *_: faults)
+    result = run_seed(Plan("graph", "all", 120.0, out=tmp_path, orders=Orders(2, 5.0)), 3)
+    assert result.report.verdict is Verdict.NOT_SERVED
+    kept, site = load_scenario(tmp_path / "graph-all-3.toml")
+    assert kept == result.shrunk and kept.faults == faults[1:2] and kept.orders == Orders(2, 5.0)
+    assert play(site, kept).waiting == result.report.waiting
+    trace = tmp_path / "again.log"
+    assert main(["run", "--scenario", str(tmp_path / "graph-all-3.toml"), "--trace", str(trace)]) == 1
+    assert "outcome      not served" in capsys.readouterr().out
+    assert trace.read_bytes() == (tmp_path / "graph-all-3.log").read_bytes() != b""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (("graph", "--cars", "3"), "--cars 3: graph is a graph, and only a car park has it"),
+        (("graph", "--exhaustive", "crash"), "--exhaustive crash: graph is a graph"),
+        (("graph", "--faults", "people"), "--faults people: graph is a graph"),
+        (("graph", "--orders", "-1"), "--orders -1: must be from 0"),
+        (("terminal", "--orders", "40"), "--orders 40: terminal has boxes for 11 missions at most"),
+        (("small", "--orders", "3"), "--orders 3: small is a car park; write --cars"),
+    ],
+)
+def test_a_mistake_is_one_line(arguments: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["campaign", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert told in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("site", "text", "told"),
+    [
+        ("graph", "[demand]\ncars = 3\n", ":5: demand: is nothing for a graph; write [orders], or leave it out"),
+        ("small", "[orders]\ncount = 3\n", ":5: orders: is nothing for a car-park; write [demand], or leave it out"),
+        ("graph", "[orders]\napart_s = 3\n", ":5: orders.count: is missing; write count = 12, or 0"),
+        (
+            "graph",
+            "[orders]\ncount = -3\n",
+            ":5: orders.count = -3: has the wrong value; must be a whole number from 0",
+        ),
+        ("graph", '[[fault]]\nkind = "lost_ticket"\ncar = 1\n', "only a car park has it, and graph is a graph"),
+    ],
+)
+def test_a_mistake_in_a_scenario_is_one_line(
+    site: str, text: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "scenario.toml"
+    path.write_text(f'[scenario]\nsite = "{site}"\nseed = 1\n\n{text}', encoding="utf-8")
+    assert main(["run", "--scenario", str(path)]) == 2
+    assert told in capsys.readouterr().err
