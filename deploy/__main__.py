@@ -71,7 +71,9 @@ def _existing(text: str) -> Path:
 def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     image = commands.add_parser("image", help="the image that 64-bit ARM boards are flashed with")
     image.add_argument("--out", type=Path, default=Path("dist/onboard.img"), metavar="FILE")
-    image.add_argument("--key", type=_existing, metavar="PEM", help="public key of its updates; without one it takes none")
+    image.add_argument(
+        "--key", type=_existing, metavar="PEM", help="public key of its updates; without one it takes none"
+    )
     image.add_argument(
         "--pi-firmware",
         type=_existing,
