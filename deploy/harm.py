@@ -5,9 +5,9 @@ Nothing of this is in the image that people flash. At the board's next start it 
 
 import asyncio
 import os
+import select
 import signal
 import subprocess
-import time
 from pathlib import Path
 
 from onboard.io.journal import FileJournal
@@ -33,8 +33,8 @@ def main() -> None:
 
 def _wait_for_life(restarts: int) -> None:
     while (_show("NRestarts"), _show("ActiveState")) != (str(restarts), "active"):
-        time.sleep(0.5)
-    time.sleep(_LIFE_S)
+        select.select([], [], [], 0.5)
+    select.select([], [], [], _LIFE_S)
 
 
 def _show(what: str) -> str:

@@ -4,6 +4,7 @@ A frame comes back to a second socket of the same computer only once it was sent
 node has acknowledged it (Linux Documentation/networking/can.rst, "local loopback of sent frames").
 """
 
+import select
 import socket
 import struct
 import time
@@ -73,5 +74,5 @@ def _heard(channel: str) -> Iterator[Frame | None]:
             yield None
         except OSError:
             # It is not there yet, or went down.
-            time.sleep(_PATIENCE_S)
+            select.select([], [], [], _PATIENCE_S)
             yield None
