@@ -19,7 +19,7 @@ from bus_sim.campaign.trial import stage_maker
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.journal import SimulatedJournal
 from bus_sim.run import EventLog, NoWatchdog, RunOptions, run_until
-from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.controller.shell import Controller, Ports
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
@@ -99,10 +99,7 @@ class _Wire:
 def record(site: Site, seed: int) -> tuple[list[Frame], list[Frame]]:
     """The corpus: frames of the fleet bus and of all device buses while two customers come and go, or orders."""
     loop = VirtualTimeLoop()
-    try:
-        return loop.run_until_complete(_record(site, seed, loop))
-    finally:
-        loop.close()
+    return run_on(loop, _record(site, seed, loop))
 
 
 async def _record(site: Site, seed: int, loop: VirtualTimeLoop) -> tuple[list[Frame], list[Frame]]:
@@ -175,10 +172,7 @@ class Fuzzer:
     def run(self, frames: int, looks: int = 4) -> Outcome:
         """Feed so many frames; the size of the controller's memory is noted ``looks`` times."""
         loop = VirtualTimeLoop()
-        try:
-            loop.run_until_complete(self._run(frames, max(1, frames // looks), loop))
-        finally:
-            loop.close()
+        run_on(loop, self._run(frames, max(1, frames // looks), loop))
         return self.outcome
 
     async def _run(self, frames: int, look_every: int, loop: VirtualTimeLoop) -> None:

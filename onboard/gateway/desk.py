@@ -81,7 +81,7 @@ class OrderDesk:
             await self._judge(publication, now_us)
             # Only now: had the power failed before, the broker would bring it again.
             taken()
-        await self._perform(self.orders.wake(now_us), now_us)
+        await self._perform(self.orders.wake(now_us, self._publisher.settings.epoch_us + now_us), now_us)
         said, closed = self.pauses.wake(now_us)
         for message in said:
             self._send(message)

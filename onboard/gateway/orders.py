@@ -28,6 +28,7 @@ MOST_OPEN = 200
 #: Lists of stops of one order that wait for the one in hand; one update more is refused.
 MOST_AHEAD = 16
 _PHASES = {
+    TaskPhase.OPEN: Life.CALLED,
     TaskPhase.AWARDED: Life.AWARDED,
     TaskPhase.STARTED: Life.MOVING,
     TaskPhase.LOADED: Life.MOVING,
@@ -160,7 +161,7 @@ class Orders:
 
     def _wish(self, incoming: Incoming) -> Wish:
         if incoming.kind == TRANSPORT:
-            return self._wishes.transport(incoming.told)
+            return self._numbered(self._wishes.transport(incoming.told))
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), 0)
         if not is_robot(self._site, node):
             raise RefusedError("UNKNOWN_MACHINE", "no machine of this name travels", "$.serialNumber")
@@ -168,6 +169,12 @@ class Orders:
         busy = self.of_robot(node)
         if busy is not None and not busy.life.is_over:
             raise RefusedError("BUSY", f"{incoming.serial} has order {busy.name}", "$.orderId")
+        return self._numbered(wish)
+
+    def _numbered(self, wish: Wish) -> Wish:
+        """A name on the bus, for what is told under one of this gateway's."""
+        if wish.what not in ("visit", "send"):
+            return wish
         self._number = successor(self._number, 16)
         return with_number(wish, self._number)
 
@@ -200,7 +207,8 @@ class Orders:
     def _on_report(self, order: Order, report: TaskReport, outcome: Outcome) -> None:
         life = _PHASES.get(report.phase)
         by_robot = is_robot(self._site, report.sender)
-        if life is None or (not by_robot and life is not Life.REFUSED):
+        by_desk = report.sender == order.wish.node and order.wish.what == "send"
+        if life is None or (not by_robot and not by_desk and life is not Life.REFUSED):
             return
         if life is Life.DONE and order.wish.what == "visit":
             order.owner = report.sender
@@ -211,29 +219,29 @@ class Orders:
             reason = report.reason.name if life is Life.REFUSED else ""
             order.owner = report.sender if by_robot else order.owner
             outcome.changed.append(self._end(order, life, reason, ""))
-        elif life is Life.CALLED or RANK[life] > RANK[order.life]:
+        elif report.phase is TaskPhase.FORFEITED or RANK[life] > RANK[order.life]:
             order.task, order.life, order.due_us = report.task, life, 0 if order.is_cancelled else None
-            order.owner = report.sender if life is not Life.CALLED else 0
+            order.owner = report.sender if by_robot and life is not Life.CALLED else 0
             outcome.changed.append(order)
 
-    def wake(self, now_us: int) -> Outcome:
-        """Say what is due."""
+    def wake(self, now_us: int, wall_us: int) -> Outcome:
+        """Say what is due; ``wall_us`` is the same moment since 1970."""
         outcome = Outcome()
         if not self._asked:
             self._asked = True
             outcome.say += self._wishes.ask_all(self._node_id)
         for order in self.open:
             if order.due_us is not None and order.due_us <= now_us:
-                self._say(order, now_us, outcome)
+                self._say(order, now_us, wall_us, outcome)
         return outcome
 
     def next_wake(self) -> int | None:
         """When something is due; None for never."""
         return min((order.due_us for order in self.open if order.due_us is not None), default=None)
 
-    def _say(self, order: Order, now_us: int, outcome: Outcome) -> None:
+    def _say(self, order: Order, now_us: int, wall_us: int, outcome: Outcome) -> None:
         try:
-            said = self._wishes.say(order, self._node_id)
+            said = self._wishes.say(order, self._node_id, wall_us)
         except RefusedError as refused:
             gone = order.was_said and refused.reason == "UNKNOWN_TICKET"
             # Asked for before, and not in the park any more: somebody has it.

@@ -12,11 +12,13 @@ from typing import Any, Protocol
 from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, Operation, OperatorAction
 from onboard.core.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference, SyncRequest
 from onboard.core.site import Site
-from onboard.gateway.order import Order, Wish
+from onboard.gateway.order import Life, Order, Wish
 from onboard.kinds.car_park.site import CarPark
 from onboard.kinds.graph.messages import VisitList, five
 from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph
 from onboard.kinds.mapd.site import Mapd
+from onboard.kinds.terminal.messages import BoxOrder
+from onboard.kinds.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
 
 #: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
@@ -25,6 +27,8 @@ TICKET_AGAIN_US = 30_000_000
 KEY_PATIENCE_US = 20_000_000
 #: A visit list is said again so often until its robot answers, us; as by kinds/graph/desk.
 VISIT_AGAIN_US = 1_000_000
+#: The longest time that a terminal's desk is told, s (dbc/terminal.dbc).
+MOST_WITHIN_S = 32_767
 #: After its start a gateway asks all what they vouch for, and knows the cars so much later, us. Ours.
 LISTEN_US = 3_000_000
 
@@ -59,8 +63,8 @@ class Wishes(Protocol):
     def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
         """A VDA 5050 order's wish to a robot; an update's from ``since`` on. Raises ``RefusedError``."""
 
-    def say(self, order: Order, sender: int) -> Said:
-        """Say an order, for the first time or again. Raises ``RefusedError``."""
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+        """Say an order, for the first time or again, at a wall time. Raises ``RefusedError``."""
 
     def task_of(self, order: Order, message: Message) -> Reference | None:
         """The task that an order has become, where this message tells."""
@@ -73,6 +77,8 @@ def wishes_of(site: Site, view: SiteView, place: Callable[[int], str | None]) ->
     """The way of a site's system; ``place`` names a station by its number."""
     if isinstance(site, FactoryGraph):
         return GraphWishes(site)
+    if isinstance(site, Terminal):
+        return TerminalWishes(site)
     return ParkWishes(site, view, place) if isinstance(site, CarPark) else NoWishes(site)
 
 
@@ -98,7 +104,7 @@ class NoWishes:
         """None is taken."""
         raise RefusedError("UNSUPPORTED", f"machines of a {self._site.system} take no orders by name")
 
-    def say(self, order: Order, sender: int) -> Said:
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
         """Nothing was taken."""
         raise RefusedError("UNSUPPORTED", "not of this site")
 
@@ -122,6 +128,7 @@ class ParkWishes(NoWishes):
     def transport(self, told: dict[str, Any]) -> Wish:
         """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""
         urgent = told.get("priority", 0) > 0
+        _no_load(told)
         if "to" in told:
             node = self._desk(told["to"], "$.to")
             if "car" not in told and "from" not in told:
@@ -132,7 +139,7 @@ class ParkWishes(NoWishes):
             raise RefusedError("INCOMPLETE", "name a compartment to hand out at, or one to park from", "$.to")
         return Wish("park", self._desk(told["from"], "$.from"), urgent=urgent)
 
-    def say(self, order: Order, sender: int) -> Said:
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
         """A ticket, or the key."""
         wish = order.wish
         if wish.car is None:
@@ -174,6 +181,44 @@ class ParkWishes(NoWishes):
         raise RefusedError("UNKNOWN_TICKET", "no car is known to stand there", "$.from")
 
 
+class TerminalWishes(NoWishes):
+    """A container terminal: a mission of its desk, for one box (rows M05, M39)."""
+
+    def __init__(self, site: Terminal) -> None:
+        super().__init__(site)
+        self._terminal = site
+        self._boxes = {box.name: number for number, box in enumerate(site.boxes, start=1)}
+        stations = [one for one in site.entities.values() if one.kind is EntityKind.STATION]
+        self._stations = {one.name: one.number for one in stations}
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """``load``, a box by its name, ``to`` a station."""
+        for key in ("load", "to"):
+            if key not in told:
+                raise RefusedError("INCOMPLETE", "name the box and the station", f"$.{key}")
+        if told["load"] not in self._boxes:
+            raise RefusedError("UNKNOWN_LOAD", "no box of this name", "$.load")
+        if told["to"] not in self._stations:
+            raise RefusedError("UNKNOWN_PLACE", f"no station; one of {', '.join(self._stations)}", "$.to")
+        stops = (self._boxes[told["load"]], self._stations[told["to"]])
+        return Wish("send", self._terminal.desk, stops=stops, urgent=told.get("priority", 0) > 0)
+
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+        """The order, until the desk answers."""
+        wish, within_s = order.wish, 0
+        if order.before_us is not None:
+            within_s = min(max(1, (order.before_us - wall_us) // 1_000_000), MOST_WITHIN_S)
+        box, station = wish.stops
+        return Said((BoxOrder(sender, wish.node, wish.number, box, station, within_s, wish.urgent),), VISIT_AGAIN_US)
+
+    def is_done(self, order: Order, message: Message) -> bool:
+        """The box stands there: the vehicle's own report may have been lost."""
+        if not isinstance(message, CarAt) or order.life in (Life.ACCEPTED, Life.CALLED):
+            return False
+        box, station = order.wish.stops
+        return (message.car.number, message.station) == (box, station)
+
+
 class GraphWishes(NoWishes):
     """A factory graph."""
 
@@ -182,8 +227,18 @@ class GraphWishes(NoWishes):
         self._graph = site
 
     def transport(self, told: dict[str, Any]) -> Wish:
-        """Only an order desk calls for the nearest robot (onboard/kinds/graph/desk.py)."""
-        raise RefusedError("UNSUPPORTED", "give a VDA 5050 order to a robot; transports come in at a desk")
+        """``from`` one node ``to`` another: a desk calls for it, and the robot that does it best has it (row G28)."""
+        desks = sorted(node for node, one in self._graph.machines.items() if one.kind is KindCode.DESK)
+        if not desks:
+            raise RefusedError("UNSUPPORTED", "this site has no desk that calls for a transport")
+        _no_load(told)
+        if "car" in told:
+            raise RefusedError("UNSUPPORTED", "loads have no names here; say from where to where", "$.car")
+        for key in ("from", "to"):
+            if key not in told:
+                raise RefusedError("INCOMPLETE", "say from where to where", f"$.{key}")
+            self._node(told[key], f"$.{key}")
+        return Wish("send", desks[0], stops=(int(told["from"]), int(told["to"])))
 
     def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
         """The nodes with an action and the last one are stops; between them the robot goes its own way.
@@ -210,14 +265,17 @@ class GraphWishes(NoWishes):
         return Wish("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
 
     def _check(self, node: dict[str, Any], path: str) -> None:
-        if not node["nodeId"].isdecimal() or int(node["nodeId"]) not in self._graph.graph.neighbours:
-            raise RefusedError("UNKNOWN_PLACE", "no node of this graph", f"{path}.nodeId")
+        self._node(node["nodeId"], f"{path}.nodeId")
         for number, action in enumerate(node["actions"]):
             if action["actionType"] not in ("pick", "drop"):
                 where = f"{path}.actions[{number}].actionType"
                 raise RefusedError("UNSUPPORTED", "of actions only pick and drop are known", where)
 
-    def say(self, order: Order, sender: int) -> Said:
+    def _node(self, name: str, path: str) -> None:
+        if not name.isdecimal() or int(name) not in self._graph.graph.neighbours:
+            raise RefusedError("UNKNOWN_PLACE", "no node of this graph", path)
+
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
         """The list of nodes until the robot answers; without any node, that the order is taken back."""
         wish = order.wish
         stops = () if order.is_cancelled else wish.stops
@@ -229,6 +287,11 @@ def is_robot(site: Site, node: int) -> bool:
     """Whether a node is a machine that carries."""
     machine = site.machines.get(node)
     return machine is not None and machine.kind in (KindCode.ROBOT, KindCode.VEHICLE)
+
+
+def _no_load(told: dict[str, Any]) -> None:
+    if "load" in told:
+        raise RefusedError("UNSUPPORTED", "loads have no names here", "$.load")
 
 
 def _car(text: str) -> Reference:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from bus_sim.faults.injection import parse_injection
 from bus_sim.run import BusRun
 from bus_sim.systems.graph.plant import make_plant
 from bus_sim.systems.registry import SystemOptions
@@ -62,14 +63,21 @@ def topic(name: str = "order", serial: str = "R1", version: str = "2.1") -> str:
     return f"{'uagv/v2' if version == '2.1' else 'vda5050/v3'}/onboard/{serial}/{name}"
 
 
-def run(orders: Sequence[tuple[float, str, Any]], **options: Any) -> tuple[Played, Ordered]:
+def run(
+    orders: Sequence[tuple[float, str, Any]], *, faults: Sequence[str] = (), **options: Any
+) -> tuple[Played, Ordered]:
     ordered = Ordered(orders, **options)
 
     def prepare(simulated: BusRun) -> None:
         ordered.attach(simulated)
         simulated.loop.call_at(END_S, ordered.stop)
 
-    return play(SITE, SystemOptions(quiet=True, limit_s=300), make_plant, prepare=prepare), ordered
+    return play(
+        SITE,
+        SystemOptions(quiet=True, limit_s=300, faults=tuple(parse_injection(one) for one in faults)),
+        make_plant,
+        prepare=prepare,
+    ), ordered
 
 
 def ends(played: Played) -> list[tuple[int, TaskPhase]]:

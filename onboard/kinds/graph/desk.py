@@ -13,6 +13,7 @@ from onboard.core.negotiation import Closed, Estimator, NegotiationEvent
 from onboard.core.site import Machine, Site
 from onboard.kinds.graph.messages import VisitAnswer, VisitKey, VisitList, VisitResult, five, stops_of
 from onboard.kinds.graph.planning import call_terms
+from onboard.kinds.graph.site import FactoryGraph
 
 #: After power-up the desk listens so long before it calls: who has an order in hand says so, us. Ours.
 LISTEN_US = 3_000_000
@@ -43,6 +44,18 @@ _RESULTS = {
 }
 
 
+#: What an order from outside is told as.
+_PHASES = {
+    Stage.HEARD: TaskPhase.OPEN,
+    Stage.CALLED: TaskPhase.OPEN,
+    Stage.IN_HAND: TaskPhase.AWARDED,
+    Stage.DONE: TaskPhase.DONE,
+    Stage.REFUSED: TaskPhase.REFUSED,
+}
+#: From here to there.
+TRANSPORT_STOPS = 2
+
+
 @dataclass
 class DeskOrder:
     """One order: ``robot`` is whom it is for or who has it, 0 for nobody yet; ``named`` where a person named it."""
@@ -58,7 +71,11 @@ class DeskOrder:
     def record(self) -> Record:
         """All of it, for the journal."""
         entry: dict[str, str | int] = {"record": "visit", "number": self.task.number, "robot": self.robot}
-        entry |= {"named": int(self.named), "stops": " ".join(str(one) for one in self.stops)}
+        entry |= {
+            "origin": self.task.origin,
+            "named": int(self.named),
+            "stops": " ".join(str(one) for one in self.stops),
+        }
         return Record(entry | {"stage": self.stage.name})
 
 
@@ -86,7 +103,7 @@ class OrderDesk:
     def __post_init__(self) -> None:
         for entry in self.fleet.entries:
             if entry.get("record") == "visit":
-                task = Reference(self.fleet.node_id, int(entry["number"]))
+                task = Reference(int(entry.get("origin", self.fleet.node_id)), int(entry["number"]))
                 stops = tuple(int(one) for one in str(entry["stops"]).split())
                 order = DeskOrder(task, stops, int(entry["robot"]), bool(entry["named"]), Stage[str(entry["stage"])])
                 # A call of an earlier life may still find a winner: it tells by its report.
@@ -129,7 +146,9 @@ class OrderDesk:
         return [order.record()]
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """Robots' reports."""
+        """Robots' reports; orders from outside, which a gateway passes on."""
+        if isinstance(message, VisitList) and message.robot == self.fleet.node_id:
+            return self._ordered(message, now_us)
         if not isinstance(message, TaskReport) or message.task not in self.orders:
             return []
         order = self.orders[message.task]
@@ -173,6 +192,9 @@ class OrderDesk:
             if order.answer_at_us is not None and order.answer_at_us <= now_us:
                 over = order.stage in (Stage.DONE, Stage.REFUSED)
                 order.answer_at_us = None if over else now_us + ANSWER_US
+                if order.task.origin != self.fleet.node_id:
+                    # It did not come in at the counter.
+                    continue
                 result = _RESULTS[order.stage]
                 effects.append(Actuate(VisitAnswer(self.fleet.node_id, order.task.number, result, order.robot)))
         return effects
@@ -189,6 +211,18 @@ class OrderDesk:
     def statements(self, now_us: int) -> list[Effect]:
         """No rights, no itinerary."""
         return []
+
+    def _ordered(self, message: VisitList, now_us: int) -> list[Effect]:
+        """A transport for whichever robot does it best, under the name that its giver has for it; it is answered."""
+        task, stops = Reference(message.sender, message.order), stops_of(message)
+        order, site = self.orders.get(task), self.fleet.site
+        if order is None:
+            nodes = site.graph.neighbours if isinstance(site, FactoryGraph) else {}
+            if len(stops) != TRANSPORT_STOPS or any(stop not in nodes for stop in stops):
+                return [Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.IMPOSSIBLE))]
+            order = self.orders[task] = DeskOrder(task, stops, NOBODY, named=False, due_us=now_us)
+            return [order.record(), Send(TaskReport(self.fleet.node_id, task, TaskPhase.OPEN, 0, Reason.NONE))]
+        return [Send(TaskReport(self.fleet.node_id, task, _PHASES[order.stage], 0, Reason.NONE))]
 
     # --- steps -------------------------------------------------------------------------------------------------
 

@@ -37,6 +37,7 @@ from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.kinds.terminal.memory import box_record, read_boxes
 from onboard.kinds.terminal.messages import (
+    BoxOrder,
     LaneSensor,
     LaneState,
     ManualKey,
@@ -168,6 +169,8 @@ class Desk:
                 self._is_moved = True
             case ManualState():
                 self._on_manual(message)
+            case BoxOrder() if message.desk == self.fleet.node_id:
+                return self._ordered(message, now_us)
         return []
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
@@ -243,11 +246,27 @@ class Desk:
         is_taken = self.orders.answer(key)
         if order is None:
             return [] if is_taken is None else [Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
-        effects: list[Effect] = [
-            Record(self.orders.record()),
-            Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True)),
-        ]
-        if order.urgent:
+        record, *others = self._ranked(order.urgent, now_us)
+        return [record, Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True)), *others]
+
+    def _ordered(self, wanted: BoxOrder, now_us: int) -> list[Effect]:
+        """A box that is wanted from outside; who asks again is told how it stands."""
+        task, reason = Reference(wanted.sender, wanted.number), Reason.NONE
+        phase, effects = self.orders.phase_of(task), list[Effect]()
+        if phase is None and self.mirror.station_of(wanted.box) == wanted.target:
+            phase = TaskPhase.DONE
+        elif phase is None and not self.orders.may_order(wanted.box, wanted.target):
+            phase, reason = TaskPhase.REFUSED, Reason.IMPOSSIBLE
+        elif phase is None:
+            before_us = now_us + wanted.within_s * 1_000_000 if wanted.within_s else 0
+            self.orders.order(task, wanted.box, wanted.target, before_us, urgent=wanted.urgent)
+            phase, effects = TaskPhase.OPEN, self._ranked(wanted.urgent, now_us)
+        return [*effects, Send(TaskReport(self.fleet.node_id, task, phase, wanted.target, reason))]
+
+    def _ranked(self, urgent: bool, now_us: int) -> list[Effect]:
+        """A new mission is journalled, and finds its place among the others."""
+        effects: list[Effect] = [Record(self.orders.record())]
+        if urgent:
             for task, terms in list(self.calls.items()):
                 transport = self.orders.open.get(task)
                 if transport is not None and not transport.urgent:

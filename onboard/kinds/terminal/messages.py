@@ -136,6 +136,18 @@ class Assignment(Message):
     target: int
 
 
+@dataclass(frozen=True, slots=True)
+class BoxOrder(Message):
+    """A box is wanted at a station, as a mission of ``desk``; ``within_s`` from now, 0 for any time."""
+
+    desk: int
+    number: int
+    box: int
+    target: int
+    within_s: int
+    urgent: bool
+
+
 # --- device buses --------------------------------------------------------------------------------------------------
 
 
@@ -224,7 +236,7 @@ class ManualKey(Message):
 
 
 MESSAGES = (
-    PlanHead, PlanStep, PlanTask, StepReport, LaneState, TaskTerms, Assignment,
+    PlanHead, PlanStep, PlanTask, StepReport, LaneState, TaskTerms, Assignment, BoxOrder,
     MoveOrder, MoveState, HandlerOrder, HandlerState, LaneSensor, MissionKey,
     MissionAnswer, ManualKey,
 )  # fmt: skip

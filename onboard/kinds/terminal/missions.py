@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from onboard.core.codes import TaskPhase
 from onboard.core.messages import Reference
 from onboard.kinds.terminal.messages import MissionKey, Verb
 from onboard.kinds.terminal.mirror import TerminalMirror
@@ -11,6 +12,8 @@ from onboard.kinds.terminal.site import EntityKind, Terminal
 
 #: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
 KNOWN = 127
+#: Tasks from outside that are remembered once they are over.
+MOST_OVER = 64
 
 
 @dataclass
@@ -25,6 +28,8 @@ class Order:
     named: list[int] = field(default_factory=list)
     before_us: int = 0
     urgent: bool = False
+    #: The task's name where it was ordered from outside: one box then.
+    task: Reference | None = None
 
     @property
     def rank(self) -> tuple[bool, int, int]:
@@ -57,6 +62,8 @@ class Orders:
     last_task: int = 0
     #: The newest missions that were taken, so that one said again is not carried out again.
     taken: deque[int] = field(default_factory=lambda: deque(maxlen=KNOWN))
+    #: Tasks from outside that are done, the newest so many: who asks for one again is told so.
+    over: deque[Reference] = field(default_factory=lambda: deque(maxlen=MOST_OVER))
     _typed: dict[int, Order] = field(default_factory=dict)
 
     def key(self, key: MissionKey) -> Order | None:
@@ -111,8 +118,10 @@ class Orders:
                 order.left -= 1
             if not order.named and not order.left:
                 del self.missions[order.number]
-            self.last_task += 1
-            task = Reference(self.node_id, self.last_task)
+            task = order.task
+            if task is None:
+                self.last_task += 1
+                task = Reference(self.node_id, self.last_task)
             transport = Transport(task, order.number, box, order.target, order.before_us, order.urgent)
             self.open[task] = transport
             return transport
@@ -162,6 +171,7 @@ class Orders:
             transport.mission,
             Order(transport.mission, transport.target, before_us=transport.before_us, urgent=transport.urgent),
         )
+        order.task = None if task.origin == self.node_id else task
         if order.type:
             order.left += 1
         else:
@@ -173,7 +183,32 @@ class Orders:
         if self.open.pop(task, None) is None:
             return False
         self.done += 1
+        if task.origin != self.node_id:
+            self.over.append(task)
         return True
+
+    # --- from outside --------------------------------------------------------------------------------------------
+
+    def phase_of(self, task: Reference) -> TaskPhase | None:
+        """How a task from outside stands; None for one that is not known."""
+        if task in self.over:
+            return TaskPhase.DONE
+        if task in self.open:
+            return TaskPhase.AWARDED if task in self.won else TaskPhase.OPEN
+        return TaskPhase.OPEN if any(one.task == task for one in self.missions.values()) else None
+
+    def may_order(self, box: int, target: int) -> bool:
+        """Whether there are such a box and such a station, and nobody has ordered that box yet."""
+        place = self.site.entities.get(target)
+        ordered = {one for order in self.missions.values() for one in order.named}
+        ordered |= {transport.box for transport in self.open.values()}
+        is_known = 1 <= box <= len(self.site.boxes) and place is not None and place.kind is EntityKind.STATION
+        return is_known and box not in ordered
+
+    def order(self, task: Reference, box: int, target: int, before_us: int, *, urgent: bool) -> None:
+        """One box for one station, as a mission of its own; its number is none that a keyboard has."""
+        number = task.origin << 16 | task.number
+        self.missions[number] = Order(number, target, named=[box], before_us=before_us, urgent=urgent, task=task)
 
     # --- journal -----------------------------------------------------------------------------------------------
 
@@ -182,16 +217,18 @@ class Orders:
         missions = ";".join(
             f"{one.number},{one.target},{one.left},{one.type},{one.source},{one.before_us},{int(one.urgent)},"
             + "+".join(str(box) for box in one.named)
+            + (f",{one.task.origin},{one.task.number}" if one.task is not None else "")
             for one in self.missions.values()
         )
         tasks = ";".join(
             f"{one.task.number},{one.mission},{one.box},{one.target},{one.before_us},{int(one.urgent)},"
-            f"{self.won.get(one.task, 0)}"
+            f"{self.won.get(one.task, 0)},{one.task.origin}"
             for one in self.open.values()
         )
         taken = ";".join(str(number) for number in self.taken)
-        counts: dict[str, str | int] = {"last": self.last_task, "done": self.done}
-        return {"record": "orders", "missions": missions, "tasks": tasks, "taken": taken, **counts}
+        over = ";".join(f"{one.origin},{one.number}" for one in self.over)
+        told: dict[str, str | int] = {"record": "orders", "missions": missions, "tasks": tasks, "over": over}
+        return told | {"taken": taken, "last": self.last_task, "done": self.done}
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """What the newest entry says."""
@@ -200,18 +237,22 @@ class Orders:
             return
         self.last_task, self.done = int(newest["last"]), int(newest["done"])
         self.taken.extend(int(number) for number in str(newest.get("taken", "")).split(";") if number)
+        for row in str(newest.get("over", "")).split(";"):
+            if row:
+                self.over.append(Reference(*(int(one) for one in row.split(","))))
         for row in str(newest["missions"]).split(";"):
             if row:
-                number, target, left, kind, source, before, is_urgent, named = row.split(",")
+                number, target, left, kind, source, before, is_urgent, named, *name = row.split(",")
                 boxes = [int(box) for box in named.split("+") if box]
                 self.missions[int(number)] = Order(
                     int(number), int(target), int(left), kind, int(source), boxes, int(before), is_urgent == "1"
                 )
+                self.missions[int(number)].task = Reference(int(name[0]), int(name[1])) if name else None
         for row in str(newest["tasks"]).split(";"):
             if row:
                 numbers = [int(one) for one in row.split(",")]
-                task = Reference(self.node_id, numbers[0])
-                _, mission, box, to, before_us, urgent, winner = numbers
+                _, mission, box, to, before_us, urgent, winner, *origin = numbers
+                task = Reference(origin[0] if origin else self.node_id, numbers[0])
                 self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent))
                 if winner:
                     self.won[task] = winner
