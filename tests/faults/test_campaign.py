@@ -102,6 +102,24 @@ def test_the_command_tells_and_answers_by_its_status(tmp_path: Path, capsys: pyt
     assert not (tmp_path / "out").exists()
 
 
+def test_of_a_run_that_broke_off_only_what_was_before_is_played_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A day that goes wrong in its first hour costs the shrinking no days."""
+    faults = tuple(parse_injection(f"burst:at_s={at_s}") for at_s in (100, 200, 3_000, 4_000, 80_000))
+    played: list[Scenario] = []
+
+    def broken(site: Site, scenario: Scenario, **_: object) -> Report:
+        played.append(scenario)
+        is_bad = faults[1] in scenario.faults
+        return Report(scenario, Verdict.VIOLATION if is_bad else Verdict.SERVED, simulated_s=3_500.0)
+
+    monkeypatch.setattr("bus_sim.campaign.runner.play", broken)
+    monkeypatch.setattr("bus_sim.campaign.runner.draw_faults", lambda *_: faults)
+    result = run_seed(Plan("small", "bus", 86_400.0, has_baseline=False), 1)
+    assert [one.limit_s for one in played] == [86_400.0, *[4_100] * (len(played) - 1)]
+    assert played[1].faults == faults[:3]
+    assert result.shrunk is not None and result.shrunk.faults == faults[1:2]
+
+
 def test_long_runs_bring_customers_and_faults_at_a_rate(tmp_path: Path) -> None:
     figures = tmp_path / "figures.json"
     command = ["campaign", "small", "--seeds", "4", "--faults", "bus", "--jobs", "1", "--out", str(tmp_path / "out")]
