@@ -96,9 +96,9 @@ def beat(node: int) -> Heartbeat:
 
 def test_who_is_pushed_by_hand_has_time_to_ask_and_no_more() -> None:
     pushed = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, at(MR1, 1, 11))
-    assert pushed.say(2.01, grant(Segment(1, 11), 1, MR2, MR1)).say(9, beat(MR1)).broken() == {}
+    assert pushed.say(2.01, grant(Segment(1, 11), 1, MR2, MR1)).say(90, beat(MR1)).broken() == {}
     stays = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, at(MR1, 1, 11))
-    assert stays.say(6, beat(MR1)).say(8, beat(MR1)).broken() == {"inside-authority": 1}
+    assert stays.say(60, beat(MR1)).say(63, beat(MR1)).broken() == {"inside-authority": 1}
     drives = Tape(one_alley()).say(1, at(MR1, 1, 12)).say(2, at(MR1, 1, 11)).say(3, at(MR1, 1, 11, 0, -10))
     assert drives.broken() == {"inside-authority": 1}
 

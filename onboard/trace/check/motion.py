@@ -21,8 +21,9 @@ from onboard.trace.check.geometry import (
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 
-#: Who was pushed by hand has so long to get the rights to where it is, us: requests are repeated every second. Ours.
-PUSHED_US = 5_000_000
+#: Who was pushed by hand has so long to get the rights to where it is, us: it may have to start first, and to listen
+#: until it is admitted (seen: 30 s). Ours.
+PUSHED_US = 60_000_000
 
 
 class InsideAuthority(Rule):
