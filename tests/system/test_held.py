@@ -14,6 +14,8 @@ from onboard.core.codes import DriveMode, MachineState, ManualMode, Reason, Task
 from onboard.core.lifts import lift_at
 from onboard.core.messages import Bid, DriveState, Heartbeat, ManualOrder, ManualState, Progress, TaskReport
 from onboard.core.site import Segment, Site
+from onboard.trace.story.why import Why
+from onboard.trace.view import SiteView
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
 from tests.system.test_spurs import alley
@@ -149,3 +151,20 @@ def test_a_turn_in_the_mouth_of_a_spur_is_ended(at_s: float) -> None:
     turned = [t for t, one in scene.all(DriveState, "MR1") if one.mode is DriveMode.TURNING]
     assert not [t for t in turned if rests_us(scene, FIRST) < t < (at_s + 40) * 1e6]
     assert scene.simulation.plant.street.summary().served == 2
+
+
+def test_the_log_tells_that_a_person_held_it_and_for_how_long() -> None:
+    """What `onboard trace why` and the picture say of a car that waited aboard."""
+    scene = held([(52, FIRST, HELD), (152, FIRST, AUTOMATIC)])
+    why, view = Why(SITE), SiteView(SITE)
+    for said in scene.said:
+        if said.bus == "fleet":
+            why.feed(said.message, said.time_us)
+            view.feed(said.message, said.time_us)
+    why.finish()
+    parts = [part for story in why.tasks.values() for part in story.parts if part.cause.what == "held by a person"]
+    rest_us = rests_us(scene, FIRST)
+    assert any(abs(part.begin_us - rest_us) < 1_000_000 and abs(part.end_us - 152e6) < 1_000_000 for part in parts)
+    events = [text for _, text in view.events if text.startswith("MR1 ")]
+    told = [text for text in events if "person" in text or "itself" in text]
+    assert told == ["MR1 is held by a person", "MR1 is held by a person and stands", "MR1 goes on by itself"]
