@@ -10,9 +10,18 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
-from onboard.core.codes import DriveMode, MachineState, ManualMode, Reason, TaskPhase
+from onboard.core.codes import DriveMode, MachineState, ManualMode, Reason, ShuttleMode, TaskPhase
 from onboard.core.lifts import lift_at
-from onboard.core.messages import Bid, DriveState, Heartbeat, ManualOrder, ManualState, Progress, TaskReport
+from onboard.core.messages import (
+    Bid,
+    DriveState,
+    Heartbeat,
+    ManualOrder,
+    ManualState,
+    Progress,
+    ShuttleState,
+    TaskReport,
+)
 from onboard.core.site import Segment, Site
 from onboard.trace.story.why import Why
 from onboard.trace.view import SiteView
@@ -65,6 +74,8 @@ def assert_stands(scene: Scene, at_s: int, rest_us: int, until_s: int) -> None:
     assert moves(scene, FIRST, rest_us, until_s * 1e6) == []
     where = [one for t, one in scene.all(Progress) if one.sender == FIRST and t <= rest_us][-1]
     assert lift_at(SITE, Segment(where.track, where.index)) is None
+    shuttle = [one.mode for t, one in scene.all(ShuttleState, "MR1") if t <= rest_us][-1]
+    assert shuttle is ShuttleMode.HOME, "no car is half taken"
     states = {beat.state for t, beat in scene.all(Heartbeat) if beat.sender == FIRST and rest_us < t < until_s * 1e6}
     assert states == {MachineState.OBSTACLE}
     assert not [one for t, one in scene.all(Bid) if one.sender == FIRST and at_s * 1e6 < t < until_s * 1e6]
