@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from bus_sim.demand import Demand
 from bus_sim.run import RunOptions, Simulation, build, run_until
-from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.codes import TaskPhase
 from onboard.core.frame import Frame
 from onboard.core.messages import TaskReport
@@ -80,10 +80,7 @@ def measure(site: Site, bit_rate: int, minutes: float, seed: int = 1) -> Measure
     """Play random arrivals for so long in virtual time."""
     site = dataclasses.replace(site, bitrate=bit_rate)
     loop = VirtualTimeLoop()
-    try:
-        simulation, meter = loop.run_until_complete(_play(site, minutes, seed, loop))
-    finally:
-        loop.close()
+    simulation, meter = run_on(loop, _play(site, minutes, seed, loop))
     statistics = simulation.fleet.statistics()
     return judge(site, meter, statistics.mean_load, statistics.worst_second_load)
 

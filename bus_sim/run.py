@@ -153,6 +153,7 @@ class BusRun:
         if controller is None:
             return
         controller.holon.halted = "power cut"
+        controller.power_off()
         for bus in (controller.ports.fleet_bus, controller.ports.device_bus):
             assert isinstance(bus, SimulatedBus)
             bus.power_off()

@@ -343,3 +343,9 @@ def run(main: Coroutine[Any, Any, _T], *, start_us: int = 0, pace: float | None 
     """``asyncio.run`` on a ``VirtualTimeLoop``. Raises ``DeadlockError`` and whatever ``main`` raises."""
     with asyncio.Runner(loop_factory=lambda: VirtualTimeLoop(start_us=start_us, pace=pace)) as runner:
         return runner.run(main)
+
+
+def run_on(loop: VirtualTimeLoop, main: Coroutine[Any, Any, _T]) -> _T:
+    """The same on a loop that ``main`` knows already; in the end what still waits is cancelled and the loop closed."""
+    with asyncio.Runner(loop_factory=lambda: loop) as runner:
+        return runner.run(main)

@@ -15,7 +15,7 @@ from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.run import RunOptions, build, run_until
-from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 
@@ -59,10 +59,7 @@ def reference(site_name: str, limit_s: float) -> Scenario:
 def count(site: Site, scenario: Scenario) -> Counts:
     """Play the scene without a fault, and count."""
     loop = VirtualTimeLoop()
-    try:
-        return loop.run_until_complete(_count(site, scenario, loop))
-    finally:
-        loop.close()
+    return run_on(loop, _count(site, scenario, loop))
 
 
 async def _count(site: Site, scenario: Scenario, loop: VirtualTimeLoop) -> Counts:

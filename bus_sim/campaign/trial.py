@@ -1,6 +1,5 @@
 """One trial: a scenario is played to its end, and judged first for safety, then for what became of all who came."""
 
-import asyncio
 from collections import Counter
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from bus_sim.campaign.systems import SYSTEMS, SystemStage
 from bus_sim.faults.arm import frame_faults
 from bus_sim.faults.scenario import Scenario
 from bus_sim.run import BusRun, RunOptions, run_until
-from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.site import Site
 
 #: Looks whether it is over, us.
@@ -30,12 +29,7 @@ def stage_maker(site: Site) -> StageMaker:
 def play(site: Site, scenario: Scenario, *, usual_wait_s: float | None = None, trace: Path | None = None) -> Report:
     """Play a scenario; ``usual_wait_s`` is the longest wait without its faults, where it is known."""
     loop = VirtualTimeLoop()
-    try:
-        asyncio.set_event_loop(loop)
-        return loop.run_until_complete(_play(site, scenario, usual_wait_s, trace, loop))
-    finally:
-        asyncio.set_event_loop(None)
-        loop.close()
+    return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop))
 
 
 async def _play(

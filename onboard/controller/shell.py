@@ -73,6 +73,11 @@ class Controller:
             await self.ports.device_bus.close()
         await self.ports.journal.close()
 
+    def power_off(self) -> None:
+        """A write under way is lost with everything else, as when the board loses its power."""
+        if self._writing is not None:
+            self._writing.cancel()
+
     @property
     def is_idle(self) -> bool:
         """Whether no journal write is under way, so that a frame is taken up at once."""

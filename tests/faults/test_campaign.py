@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bus_sim.campaign.profiles import draw_faults
-from bus_sim.campaign.report import Report, Verdict
+from bus_sim.campaign.report import FAILURES, Report, Verdict
 from bus_sim.campaign.runner import Plan, Result, run_campaign, run_seed
 from bus_sim.campaign.table import lines, to_json
 from bus_sim.campaign.trial import play
@@ -54,7 +54,7 @@ def test_without_faults_no_checker_finds_anything(name: str) -> None:
 def test_what_a_campaign_once_found_does_not_come_back(name: str) -> None:
     scenario, site = load_scenario(SCENARIOS / f"{name}.toml")
     report = play(site, scenario)
-    assert (report.violations, report.error, report.waiting) == ((), "", 0)
+    assert report.verdict not in FAILURES, report.why()
 
 
 def test_a_seed_plays_the_same_in_every_process() -> None:

@@ -18,6 +18,7 @@ from onboard.core.stall import Stall
 from onboard.core.unheard import Unheard
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.program import Handling, Work
+from onboard.kinds.car_park.travel import Carriage
 
 
 class Phase(Enum):
@@ -165,3 +166,10 @@ class ShuttleWork:
             if self.fleet.tokens.holds(token):
                 effects += self.fleet.tokens.give(token, owner, now_us)
         return effects
+
+
+def handle(carriage: Carriage, shuttle: ShuttleWork, now_us: int) -> list[Effect]:
+    """Carrier or shuttle, never both: who was pushed off the station goes back first, and not with the shuttle out."""
+    if carriage.goal is None or carriage.arrived:
+        return carriage.advance(now_us) + shuttle.advance(now_us)
+    return [] if shuttle.is_out else carriage.advance(now_us)

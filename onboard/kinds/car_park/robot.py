@@ -41,7 +41,7 @@ from onboard.kinds.car_park.asking import AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution, weighed
 from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.going_around import GoingAround
-from onboard.kinds.car_park.handling import Phase, ShuttleWork
+from onboard.kinds.car_park.handling import Phase, ShuttleWork, handle
 from onboard.kinds.car_park.holding import Holding
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
 from onboard.kinds.car_park.recovery import Recovery, award_record, ends_at, floor_record, handled_record, ride_record
@@ -425,7 +425,7 @@ class Robot:
         if step.action is LegAction.RIDE:
             return self.riding.advance(now_us)
         if step.work is not None:
-            return self.carriage.advance(now_us) + self.shuttle.advance(now_us)
+            return handle(self.carriage, self.shuttle, now_us)
         if self.shuttle.is_out:
             return [Halt("the carrier should move while its shuttle is out")]
         return self.carriage.advance(now_us)
