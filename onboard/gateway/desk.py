@@ -90,7 +90,7 @@ class OrderDesk:
     async def feed(self, message: Message, now_us: int) -> None:
         """Take up one message of the fleet bus."""
         if isinstance(message, ManualState):
-            self._close(self.pauses.feed(message), now_us)
+            self._close(self.pauses.feed(message, now_us), now_us)
         if isinstance(message, _HEARD) and self.orders.open:
             await self._perform(self.orders.feed(message), now_us)
 

@@ -155,6 +155,9 @@ class Machines:
         if body.state is not message.state:
             body.state = message.state
             self.changed.add(message.sender)
+        if message.state in (MachineState.IDLE, MachineState.WORKING):
+            # None that stands because it is held says so: its word that it was let go may have been lost.
+            body.is_held = body.is_paused = False
         if message.state in (MachineState.IDLE, MachineState.WORKING) and self.emergency is not None:
             # After an emergency stop only a machine that a person has started anew works again.
             self.emergency = None

@@ -1,7 +1,7 @@
 """startPause and stopPause (VDA 5050 2.1, section 6.8.2): a machine is held on the bus, and let go, by its own word.
 
-An order is said until the machine answers it. startPause runs until the machine says that it has come to rest; nothing
-is told that the machine has not said.
+An order is said until the machine answers it. startPause runs until the machine says that it has come to rest; it is
+asked again meanwhile, for its word may be lost, and nothing is told that it has not said.
 """
 
 from collections.abc import Iterable
@@ -15,16 +15,18 @@ from onboard.gateway.dialect import Json
 MODES = {"startPause": ManualMode.HELD, "stopPause": ManualMode.AUTOMATIC}
 #: An order that is not answered is said again after this, us (dbc/fleet.dbc), and given up after that. Ours.
 AGAIN_US, PATIENCE_US = 1_000_000, 10_000_000
+#: A machine that has answered and comes to rest is asked again after this, us. Ours.
+RESTS_YET_US = 5_000_000
 
 
 @dataclass(slots=True)
 class _Asked:
-    """What is asked of one machine. ``again_us`` None: it has answered, and comes to rest."""
+    """What is asked of one machine. ``give_up_us`` None: it has answered, and comes to rest."""
 
     action: Json
     order: ManualOrder
-    give_up_us: int
-    again_us: int | None
+    give_up_us: int | None
+    again_us: int
 
 
 #: An action that is over: whose, which, and why it failed; empty where it did not.
@@ -44,7 +46,7 @@ class Pauses:
         self._asked[node] = _Asked(action, self._order(node, action), now_us + PATIENCE_US, now_us)
         return [] if before is None else [(node, before.action, "another one came before it was over")]
 
-    def feed(self, message: Message) -> list[Closed]:
+    def feed(self, message: Message, now_us: int) -> list[Closed]:
         """Take up a machine's word."""
         asked = self._asked.get(message.sender) if isinstance(message, ManualState) else None
         if not isinstance(message, ManualState) or asked is None or message.number != asked.order.number:
@@ -53,7 +55,7 @@ class Pauses:
             # An order of another life had this number: the machine takes mine for that one, said again.
             asked.order = self._order(message.sender, asked.action)
             return []
-        asked.again_us = None
+        asked.give_up_us, asked.again_us = None, now_us + RESTS_YET_US
         if message.manual_mode is ManualMode.HELD and not message.at_rest:
             return []
         del self._asked[message.sender]
@@ -64,19 +66,19 @@ class Pauses:
         said: list[Message] = []
         closed: list[Closed] = []
         for node, asked in list(self._asked.items()):
-            if asked.again_us is None or asked.again_us > now_us:
+            if asked.again_us > now_us:
                 continue
-            if asked.give_up_us <= now_us:
+            if asked.give_up_us is not None and asked.give_up_us <= now_us:
                 del self._asked[node]
                 closed.append((node, asked.action, "the machine does not answer"))
             else:
-                asked.again_us = now_us + AGAIN_US
+                asked.again_us = now_us + (AGAIN_US if asked.give_up_us is not None else RESTS_YET_US)
                 said.append(asked.order)
         return said, closed
 
     def due(self) -> Iterable[int]:
         """When something is to be said again, or given up, us."""
-        return (asked.again_us for asked in self._asked.values() if asked.again_us is not None)
+        return (asked.again_us for asked in self._asked.values())
 
     def _order(self, node: int, action: Json) -> ManualOrder:
         self._number = self._number % 255 + 1

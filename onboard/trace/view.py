@@ -16,6 +16,7 @@ from onboard.core.codes import (
     Criterion,
     Grade,
     MachineState,
+    ManualMode,
     Operation,
     Reason,
     TaskPhase,
@@ -29,6 +30,7 @@ from onboard.core.messages import (
     Clear,
     Heartbeat,
     Itinerary,
+    ManualState,
     Message,
     Progress,
     Reference,
@@ -49,6 +51,17 @@ CALL_LIMIT, TASK_LIMIT = 512, 512
 TASKS_OVER = (TaskPhase.DONE, TaskPhase.REFUSED)
 #: Ends of a call after which its task has neither an owner nor a call.
 CALLS_OVER = (CallResult.REFUSED, CallResult.WITHDRAWN, CallResult.REJECTED)
+
+#: Who has a hand in a machine, and whether it stands.
+_HANDS = {
+    (mode, at_rest): words + (" and stands" if at_rest else "")
+    for mode, words in (
+        (ManualMode.AUTOMATIC, "goes on by itself"),
+        (ManualMode.HELD, "is held by a person"),
+        (ManualMode.STEP, "does one step for a person"),
+    )
+    for at_rest in (False, True)
+}
 
 
 @dataclass
@@ -141,18 +154,20 @@ class SiteView:
                 self.itineraries[message.sender] = message
             case TaskReport():
                 self._on_report(message, time_us)
-            case Waiting() | Blocked() | Clear():
-                self._on_segment(message, time_us)
+            case Waiting() | Blocked() | Clear() | ManualState():
+                self._on_word(message, time_us)
 
-    def _on_segment(self, message: Waiting | Blocked | Clear, time_us: int) -> None:
+    def _on_word(self, message: Waiting | Blocked | Clear | ManualState, time_us: int) -> None:
         if isinstance(message, Blocked):
             self.blocked.add(Segment(message.track, message.index))
         elif isinstance(message, Clear):
             self.blocked.discard(Segment(message.track, message.index))
         self.say(time_us, self._told_of(message))
 
-    def _told_of(self, message: Waiting | Blocked | Clear) -> str:
-        """What is said of one segment, in words."""
+    def _told_of(self, message: Waiting | Blocked | Clear | ManualState) -> str:
+        """What is said of one segment, or of a person's hand in a machine, in words."""
+        if isinstance(message, ManualState):
+            return f"{self.name(message.sender)} {_HANDS[message.manual_mode, message.at_rest]}"
         where = Segment(message.track, message.index)
         why = message.reason.name.lower().replace("_", " ")
         if isinstance(message, Waiting):

@@ -1,6 +1,7 @@
 """startPause and stopPause: a machine is held by a word on the bus, and what its state tells is its own word."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,9 +13,10 @@ from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import Played, play
 from bus_sim.systems.terminal.run import TerminalRun
 from bus_sim.systems.terminal.run import play as play_terminal
-from onboard.core.codes import ManualMode
-from onboard.core.messages import ManualOrder, ManualState
+from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode
+from onboard.core.messages import Heartbeat, ManualOrder, ManualState
 from onboard.core.site import Site
+from onboard.gateway.machines import Machines
 from onboard.gateway.pauses import Pauses
 from onboard.kinds.graph.messages import RobotAt
 from tests.graph.sites import hall, made
@@ -148,7 +150,34 @@ def test_a_number_that_an_earlier_life_used_is_not_taken_for_its_order() -> None
     pauses.ask(11, {"actionType": "stopPause"}, 0)
     (order_,), _ = pauses.wake(0)
     assert isinstance(order_, ManualOrder)
-    assert pauses.feed(ManualState(11, order_.number, ManualMode.HELD, True)) == [], "that was another order"
+    assert pauses.feed(ManualState(11, order_.number, ManualMode.HELD, True), 0) == [], "that was another order"
     (again,), _ = pauses.wake(1_000_000)
     assert isinstance(again, ManualOrder) and again.number != order_.number
-    assert [failure for *_, failure in pauses.feed(ManualState(11, again.number, ManualMode.AUTOMATIC, False))] == [""]
+    assert [failure for *_, failure in pauses.feed(ManualState(11, again.number, ManualMode.AUTOMATIC, False), 0)] == [
+        ""
+    ]
+
+
+def test_a_machine_whose_word_was_lost_is_asked_again_whether_it_has_come_to_rest() -> None:
+    pauses = Pauses(NODE, seed=0)
+    pauses.ask(11, {"actionType": "startPause"}, 0)
+    (order_,), _ = pauses.wake(0)
+    assert isinstance(order_, ManualOrder)
+    assert pauses.feed(ManualState(11, order_.number, ManualMode.HELD, False), 200_000) == []
+    assert pauses.wake(4_000_000) == ([], []), "it has answered"
+    assert pauses.wake(30_000_000) == ([order_], []), "and is not given up"
+    assert [failure for *_, failure in pauses.feed(ManualState(11, order_.number, ManualMode.HELD, True), 0)] == [""]
+    assert list(pauses.due()) == []
+
+
+@pytest.mark.parametrize("state", [MachineState.IDLE, MachineState.WORKING])
+def test_a_machine_that_works_is_not_told_as_paused_though_its_word_was_lost(state: MachineState) -> None:
+    site = one_floor()
+    machines = Machines(site)
+    node = site.machine("MR1").node_id
+    machines.feed(ManualState(node, 1, ManualMode.HELD, True), 0)
+    beat = Heartbeat(node, CONTRACT_VERSION, site.digest, 0, 1, KindCode.ROBOT, MachineState.OBSTACLE)
+    machines.feed(beat, 1)
+    assert machines.bodies[node].is_paused
+    machines.feed(replace(beat, state=state), 2)
+    assert not machines.bodies[node].is_paused

@@ -7,13 +7,14 @@ fleet bus said last before it: silence, a wait that was announced, a refusal, a 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import CallResult, Grade, LegAction, Operation, Reason, TaskPhase, TokenKind
+from onboard.core.codes import CallResult, Grade, LegAction, ManualMode, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.messages import (
     Award,
     CallForProposals,
     Heartbeat,
     Itinerary,
     Leg,
+    ManualState,
     Message,
     Progress,
     Reference,
@@ -88,6 +89,8 @@ class _Body:
     boot: int | None = None
     #: Started anew and has not moved since.
     is_fresh: bool = False
+    #: A person holds it, and it has come to rest.
+    is_held: bool = False
 
 
 class Why:
@@ -124,6 +127,8 @@ class Why:
                 body.legs, body.leg = message.legs, 0
             case Waiting():
                 body.wait = message
+            case ManualState():
+                body.is_held = message.at_rest and message.manual_mode is not ManualMode.AUTOMATIC
             case TokenRefusal():
                 self._body(message.requester).refusal = (time_us, message)
 
@@ -199,6 +204,8 @@ class Why:
     def _cause(self, story: TaskStory, now_us: int) -> Cause:
         if not story.owner:
             return self._negotiation(story)
+        if self._body(story.owner).is_held:
+            return Cause("held by a person", story.owner)
         before = next((one for one in self._open if one is not story and self._goes_first(one, story)), None)
         if before is not None:
             return Cause(f"still busy with task {self._words.reference(before.task)}", story.owner)
