@@ -1,8 +1,8 @@
 """Live controllers under random and mutated frames.
 
-``python -m bench.fuzz [FRAMES] [SEED]``: a million frames for one machine of each kind on the small site. Each line:
-frames, program errors (must be 0), drops that no reason counted (must be 0), size of all tables over time, frames a
-second.
+``python -m bench.fuzz [FRAMES] [SEED] [SITE ...]``: a million frames for one machine of each kind on the small site, or
+on those named (shipped ones, or site files of any system). Each line: frames, program errors (must be 0), drops that no
+reason counted (must be 0), size of all tables over time, frames a second.
 """
 
 import sys
@@ -10,15 +10,26 @@ import time
 
 from bus_sim.campaign.fuzz import Fuzzer
 from bus_sim.sites import find_site
+from onboard.core.codes import KindCode
+from onboard.core.site import Machine, Site
+
+
+def one_of_each_kind(site: Site) -> list[Machine]:
+    """The machine of each kind with the lowest node-ID, in the order of node-IDs."""
+    found: dict[KindCode, Machine] = {}
+    for _, machine in sorted(site.machines.items()):
+        found.setdefault(machine.kind, machine)
+    return list(found.values())
 
 
 def main() -> int:
     frames = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
     seed = int(sys.argv[2]) if len(sys.argv) > 2 else 1
-    site, failed = find_site("small"), False
-    for name in ("IOC1", "ER1", "MR1"):
-        began_s = time.process_time()
-        outcome = Fuzzer(site, site.machine(name), seed).run(frames, looks=10)
+    sites, failed = [find_site(name) for name in sys.argv[3:] or ["small"]], False
+    for site, machine in [(one, machine) for one in sites for machine in one_of_each_kind(one)]:
+        fuzzer, began_s = Fuzzer(site, machine, seed), time.process_time()
+        outcome = fuzzer.run(frames, looks=10)
+        name = f"{site.name} {machine.name}"
         rate = outcome.frames / (time.process_time() - began_s)
         print(f"{name}: {outcome.frames} frames, {len(outcome.errors)} errors, {len(outcome.uncounted)} not counted")
         print(f"  items {outcome.sizes}, {rate:.0f} frames a second")

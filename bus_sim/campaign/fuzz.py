@@ -1,9 +1,9 @@
 """A live controller under random and mutated frames: no exception, bounded memory, every drop counted with its reason.
 
-The corpus is what was on the buses while the site ran with customers: its frames come again as they were, out of
-order, from other senders, with bits flipped, too short, too long; between them frames of pure chance. The controller
-is the real one, with its shell, journal and timers, in virtual time. A halt is no error (a forged stop, a second node
-under its own node-ID); it is started again then, from its journal.
+The corpus is what was on the buses while the site ran with customers, or with orders: its frames come again as they
+were, out of order, from other senders, with bits flipped, too short, too long; between them frames of pure chance. The
+controller is the real one, with its shell, journal and timers, in virtual time. A halt is no error (a forged stop, a
+second node under its own node-ID); it is started again then, from its journal.
 """
 
 import asyncio
@@ -14,18 +14,20 @@ from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from bus_sim.demand import Demand
+from bus_sim.campaign.systems import SYSTEMS, usual_orders
+from bus_sim.campaign.trial import stage_maker
+from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.journal import SimulatedJournal
-from bus_sim.run import EventLog, NoWatchdog, RunOptions, build, run_until
+from bus_sim.run import EventLog, NoWatchdog, RunOptions, run_until
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.controller.shell import Controller, Ports
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.site import Machine, Site
-from onboard.kinds.registry import factory_for
+from onboard.kinds.registry import factory_for, system_of
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
-from onboard.wire.codec import Codec, device_codec, fleet_codec
+from onboard.wire.codec import Codecs, codecs
 
 #: What a controller that fell over by a program error says; everything else that it halts for is a decision.
 _ERROR = "Error: "
@@ -95,21 +97,22 @@ class _Wire:
 
 
 def record(site: Site, seed: int) -> tuple[list[Frame], list[Frame]]:
-    """The corpus: frames of the fleet bus and of all device buses while two customers come and go."""
+    """The corpus: frames of the fleet bus and of all device buses while two customers come and go, or orders."""
     loop = VirtualTimeLoop()
     return run_on(loop, _record(site, seed, loop))
 
 
 async def _record(site: Site, seed: int, loop: VirtualTimeLoop) -> tuple[list[Frame], list[Frame]]:
-    simulation = build(site, RunOptions(seed=seed), loop)
+    orders = usual_orders(site, None, None) if site.system in SYSTEMS else None
+    scenario = Scenario(site.name, seed, CORPUS_S, Arrivals(2, 30.0, 5.0, 60.0), orders=orders)
+    stage = stage_maker(site)(site, scenario, RunOptions(seed=seed), loop)
     fleet: list[Frame] = []
     devices: list[Frame] = []
-    simulation.fleet.tap(lambda frame, _time_us, _sender: fleet.append(frame))
-    for medium in simulation.devices.values():
+    stage.run.fleet.tap(lambda frame, _time_us, _sender: fleet.append(frame))
+    for medium in stage.run.devices.values():
         medium.tap(lambda frame, _time_us, _sender: devices.append(frame))
-    simulation.plant.street.add_all(Demand.by_mean(30.0, 5.0, seed, count=2, min_stay_s=60.0), 5_000_000)
-    simulation.start()
-    await run_until(simulation, lambda: simulation.plant.street.is_over, round(CORPUS_S * 1e6), 1_000_000)
+    stage.run.start()
+    await run_until(stage.run, lambda: stage.is_over, round(CORPUS_S * 1e6), 1_000_000)
     return fleet, devices
 
 
@@ -157,11 +160,12 @@ class Fuzzer:
         self._chance = random.Random(f"fuzz:{site.name}:{machine.name}:{seed}")
         self._share = device_share
         self._journal = SimulatedJournal()
-        self._codecs: tuple[Codec, Codec] = (fleet_codec(), device_codec())
+        system = system_of(site)
+        self._codecs: Codecs = codecs(system.name, system.messages)
         fleet, devices = record(site, seed)
         # A node of its own on the bus would be heard at once; so nearly all forged frames have other senders.
         others = [frame for frame in fleet if frame.arbitration_id & 0xFF != machine.node_id]
-        own = [frame for frame in devices if frame.arbitration_id & 0xFF == machine.node_id]
+        own = [frame for frame in devices if frame.arbitration_id & 0xFF == machine.node_id] or devices
         self._sources = (_mutations(self._chance, others, machine.node_id), _mutations(self._chance, own, 0))
         self.outcome = Outcome()
 

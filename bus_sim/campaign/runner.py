@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -15,8 +15,9 @@ from bus_sim.campaign.report import FAILURES, Report, Verdict
 from bus_sim.campaign.shrink import shrink
 from bus_sim.campaign.systems import SYSTEMS, patience_s, span_s, with_orders
 from bus_sim.campaign.trial import play
-from bus_sim.faults.injection import AnyFault
+from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.faults.table import KINDS
 from bus_sim.sites import find_site
 from bus_sim.systems.orders import Orders
 from onboard.core.site import Site
@@ -40,6 +41,10 @@ class Plan:
     has_baseline: bool = True
     #: What each seed brings to a site that is no car park.
     orders: Orders | None = None
+
+
+#: Verdicts with which a run breaks off; it is played again only until so long after that, s (ours).
+AT_ONCE, MARGIN_S = (Verdict.VIOLATION, Verdict.CRASHED), 600
 
 
 class Point(NamedTuple):
@@ -71,8 +76,24 @@ def run_seed(plan: Plan, seed: int) -> Result:
         report = play(site, scenario, usual_wait_s=usual.longest_wait_s if usual is not None else None)
     if report.verdict not in FAILURES:
         return Result(seed, report)
-    least = scenario.with_faults(shrink(scenario.faults, partial(_still_fails, site, scenario, report.verdict)))
+    least = _least(site, scenario, report)
     return Result(seed, report, least, _keep(plan, site, seed, least, report))
+
+
+def _least(site: Site, scenario: Scenario, report: Report) -> Scenario:
+    """The fewest faults that still fail. Where the run broke off, what was to come after that is left out at once."""
+    if report.verdict in AT_ONCE and report.simulated_s + MARGIN_S < scenario.limit_s:
+        begun = [one for one in scenario.faults if _begin_s(one) <= report.simulated_s]
+        cut = replace(scenario, limit_s=math.ceil(report.simulated_s) + MARGIN_S).with_faults(begun)
+        if play(site, cut).verdict is report.verdict:
+            scenario = cut
+    return scenario.with_faults(shrink(scenario.faults, partial(_still_fails, site, scenario, report.verdict)))
+
+
+def _begin_s(fault: AnyFault) -> float:
+    """When a fault begins, s; one without a moment of its own, or of single frames, was there from the beginning."""
+    has_moment = isinstance(fault, Injection) and "at_s" in KINDS[fault.kind].settings
+    return fault.number("at_s") if isinstance(fault, Injection) and has_moment else 0.0
 
 
 def _limit_s(plan: Plan, site: Site, seed: int) -> float:

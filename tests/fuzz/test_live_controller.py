@@ -8,8 +8,11 @@ import pytest
 from bus_sim.campaign.fuzz import NO_REST, Fuzzer
 from bus_sim.sites import find_site
 from onboard.core.codes import Reason
+from tests.mapd.sites import drawn, made
 
 FRAMES = 20_000
+#: Where a machine's own frames are few, or its device bus is silent, most that can be found is found in so many.
+SYSTEM_FRAMES = 8_000
 #: Items in all tables of one controller; a run of the site without a fuzzer has about a third of it.
 MOST_ITEMS = 40_000
 
@@ -23,6 +26,33 @@ def test_a_controller_survives_whatever_the_wire_brings(name: str) -> None:
     assert max(outcome.sizes) < MOST_ITEMS
     assert outcome.reasons.keys() >= {Reason.UNKNOWN_IDENTIFIER, Reason.SHORT_FRAME, Reason.VALUE_OUT_OF_RANGE}
     assert outcome.reasons.keys() >= {Reason.OTHER_CONTRACT, Reason.OTHER_SITE, Reason.INCOMPLETE_SET}
+
+
+#: One machine of every kind of the other systems; the last one's site is drawn.
+MACHINES = [
+    ("graph", "R1"),
+    ("graph", "NA"),
+    ("graph", "OD"),
+    ("cell", "R1"),
+    ("cell", "GM"),
+    ("turning", "L1"),
+    ("turning", "DESK"),
+    ("terminal", "R1"),
+    ("terminal", "Desk"),
+    ("warehouse", "R1"),
+    ("warehouse", "Desk"),
+]
+
+
+@pytest.mark.parametrize(("name", "machine"), MACHINES)
+def test_a_machine_of_any_system_survives_it_too(name: str, machine: str) -> None:
+    site = made(3, drawn(8, 1)) if name == "warehouse" else find_site(name)
+    outcome = Fuzzer(site, site.machine(machine)).run(SYSTEM_FRAMES)
+    assert outcome.errors == []
+    assert outcome.uncounted == []
+    assert max(outcome.sizes) < MOST_ITEMS
+    assert outcome.reasons.keys() >= {Reason.UNKNOWN_IDENTIFIER, Reason.SHORT_FRAME, Reason.VALUE_OUT_OF_RANGE}
+    assert outcome.reasons.keys() >= {Reason.OTHER_CONTRACT, Reason.OTHER_SITE}
 
 
 def test_a_drop_that_nobody_counts_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from itertools import permutations, product
 
+import pytest
+
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.table import plan_table
 from onboard.core.codes import Criterion, KindCode, Operation
@@ -123,6 +125,41 @@ def test_m23_only_a_box_with_nothing_above_it_is_called_for() -> None:
     plan(picture, 14, "B4", "S1")
     second = orders.next(picture, {first.box})
     assert second is not None and second.box == box("B3"), "B4 is in a plan"
+
+
+def _typed(verb: Verb, what: int, count: int = 0, to: str = "S1", source: str = "") -> MissionKey:
+    return MissionKey(1, 7, verb, what, count, BY_NAME[source] if source else 0, BY_NAME[to], 0, urgent=False)
+
+
+def test_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -> None:
+    orders = Orders(SITE, 1)
+    one, other, end = _typed(Verb.TRANSHIP, box("B3")), _typed(Verb.TRANSHIP, box("B4")), _typed(Verb.END, 0, 2)
+    assert orders.key(one) is orders.answer(one) is None
+    assert orders.key(end) is orders.answer(end) is None, "one of two boxes was not heard"
+    assert [orders.key(key) is None for key in (one, other, end)] == [True, True, False]
+    assert orders.answer(end) is True
+    again = Orders(SITE, 1)
+    again.replay([orders.record()])
+    for known in (orders, again):
+        assert [known.key(key) for key in (one, other, end)] == [None] * 3
+        assert known.answer(end) is True
+        assert [mission.named for mission in known.missions.values()] == [[box("B3"), box("B4")]]
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        _typed(Verb.LOAD, 99, 1, source="A4"),
+        _typed(Verb.LOAD, 0, 0, source="A4"),
+        _typed(Verb.LOAD, 0, 1, source="L11"),
+        _typed(Verb.LOAD, 0, 1, to="L11", source="A4"),
+        _typed(Verb.END, 0),
+    ],
+)
+def test_what_nobody_can_carry_out_is_refused_at_the_desk(key: MissionKey) -> None:
+    orders = Orders(SITE, 1)
+    assert orders.key(key) is None and orders.answer(key) is False
+    assert orders.missions == {} and orders.next(mirror(1), set()) is None
 
 
 def test_m02_in_a_stacker_every_box_can_be_had() -> None:

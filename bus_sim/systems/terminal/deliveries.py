@@ -1,5 +1,6 @@
 """Which box served which mission: what a terminal's indicators and its end are counted by."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from bus_sim.systems.terminal.world import Handling
@@ -17,9 +18,10 @@ class Delivery:
     late_us: int
 
 
-def ordered(site: Terminal) -> int:
-    """How many boxes all missions ask for."""
-    return sum(max(mission.count, len(mission.boxes)) for mission in site.missions)
+def ordered(site: Terminal, refused: Collection[int] = ()) -> int:
+    """How many boxes all missions ask for but those of these numbers."""
+    wanted = [one for number, one in enumerate(site.missions, 1) if number not in refused]
+    return sum(max(mission.count, len(mission.boxes)) for mission in wanted)
 
 
 def deliveries(site: Terminal, handled: list[Handling]) -> list[Delivery]:

@@ -100,14 +100,15 @@ def last_s(site: Site) -> float:
 
 
 def count(plant: SystemPlant) -> Tally:
-    """What became of the boxes; nobody refuses one."""
+    """What became of the boxes."""
     run = cast("TerminalPlant", plant)
     found = deliveries(run.site, run.world.handled)
-    left = ordered(run.site) - len(found)
+    told = ordered(run.site) - ordered(run.site, run.refused)
+    left = ordered(run.site) - told - len(found)
     waits_us = [one.finished_us for one in found]
     if left:
         waits_us.append(run.now_us() - min((one.at_us for one in run.site.missions), default=0))
-    return Tally(len(found), 0, left, max(waits_us, default=0) / 1e6)
+    return Tally(len(found), told, left, max(waits_us, default=0) / 1e6)
 
 
 TERMINAL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(5, 30.0), who="boxes")

@@ -8,7 +8,7 @@ from bus_sim.plant.link import BusDeviceLink
 from bus_sim.plant.timers import Timers
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.world import VehicleBody, World
-from onboard.core.codes import ManualMode
+from onboard.core.codes import KindCode, ManualMode
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.kinds.terminal.messages import (
@@ -18,6 +18,7 @@ from onboard.kinds.terminal.messages import (
     HandlerState,
     LaneSensor,
     ManualKey,
+    MissionAnswer,
     MissionKey,
     MoveMode,
     MoveOrder,
@@ -34,6 +35,8 @@ PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMo
 HOP_US = 300_000
 #: Devices and cameras say again how things stand, us (dbc/terminal.dbc).
 SLOW_US = 10_000_000
+#: An operator types a mission again after this while the desk has not answered, us (dbc/terminal.dbc).
+KEY_US = 1_000_000
 #: Real durations are up to so much longer than planned: the paper's robots' speed is of course not constant. Ours.
 NOISE = 0.1
 
@@ -189,6 +192,12 @@ class TerminalPlant:
         self.world = World(site)
         self.violations = self.world.violations
         self.links = links
+        #: Missions that were taken, and those that a desk said it cannot carry out, by number.
+        self.taken: set[int] = set()
+        self.refused: set[int] = set()
+        for node, machine in site.machines.items():
+            if machine.kind is KindCode.DESK:
+                links[node].subscribe(self._answered)
         self.vehicles = {
             node: VehicleDevices(self, body, links[node], seed) for node, body in self.world.bodies.items()
         }
@@ -208,8 +217,8 @@ class TerminalPlant:
 
     @property
     def is_over(self) -> bool:
-        """Whether every box that was ordered was put down where it was wanted."""
-        return len(deliveries(self.site, self.world.handled)) >= ordered(self.site)
+        """Whether every box that was ordered was put down where it was wanted, or refused."""
+        return len(deliveries(self.site, self.world.handled)) >= ordered(self.site, self.refused)
 
     def now_us(self) -> int:
         """Loop time."""
@@ -249,7 +258,10 @@ class TerminalPlant:
         self.links[desk].send(ManualKey(desk, number, press.vehicle, PRESSES[press.what]))
 
     def _type(self, number: int, mission: Mission) -> None:
-        """The operator types a mission at its desk."""
+        """The operator types a mission at its desk, and again until the desk has it."""
+        if number in self.taken | self.refused:
+            return
+        self.after(KEY_US, _call(self._type, number, mission))
         before_s = -(-mission.before_us // 1_000_000)
         desk, link = mission.desk, self.links[mission.desk]
 
@@ -259,9 +271,13 @@ class TerminalPlant:
         for box in mission.boxes:
             link.send(key(Verb.TRANSHIP, box, 0, 0))
         if mission.boxes:
-            link.send(key(Verb.END, 0, 0, 0))
+            link.send(key(Verb.END, 0, len(mission.boxes), 0))
         else:
             link.send(key(Verb.LOAD, types_of(self.site).index(mission.type), mission.count, mission.source))
+
+    def _answered(self, message: Message, _: int) -> None:
+        if isinstance(message, MissionAnswer):
+            (self.taken if message.is_taken else self.refused).add(message.mission)
 
 
 def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> TerminalPlant:

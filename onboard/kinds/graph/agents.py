@@ -97,6 +97,10 @@ class NodeAgents:
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Robots that come near, where they are, and neighbours' notices."""
         match message:
+            case TurnSignal() if message.sender not in self.site.robots:
+                self.fleet.drops[Reason.NOT_AUTHORISED] += 1
+            case EdgeNotice() if message.other not in self.site.graph.neighbours.get(message.node, ()):
+                self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             case TurnSignal():
                 return self._on_signal(message, now_us)
             case RobotAt():

@@ -144,6 +144,8 @@ class GraphRobot:
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Body and approach sensor (row G10)."""
         match message:
+            case BodyState() if not self._is_somewhere(message):
+                self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             case BodyState():
                 if self.body is None:
                     self._sequence = message.sequence
@@ -157,6 +159,13 @@ class GraphRobot:
             case ApproachSensor() if self.body is not None and message.node == self.body.node:
                 self._sensed = True
         return []
+
+    def _is_somewhere(self, body: BodyState) -> bool:
+        """Whether a position is one of this graph: a node, come to by one of its edges, or by none yet."""
+        neighbours = self.site.graph.neighbours
+        if body.node not in neighbours:
+            return False
+        return body.behind in neighbours[body.node] or (body.behind == NO_NODE and body.body_place is BodyPlace.IN_NODE)
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Answers of the node agent ahead and of no other (row G05); other robots; orders by name; awards."""

@@ -114,6 +114,9 @@ class UnitRobot(Plain):
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """The body."""
         if isinstance(message, CartState):
+            if message.cell >= len(self.site.floor.ways):
+                self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+                return []
             first = self.driving.cart.state is None
             self.driving.cart.sense(message)
             self._is_new = True

@@ -6,7 +6,7 @@ whoever plans to carry it.
 
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey
+from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import (
     CallResult,
@@ -19,7 +19,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
     CallForProposals,
     CarAt,
@@ -29,16 +29,19 @@ from onboard.core.messages import (
     Message,
     Reference,
     TaskReport,
+    TokenGrant,
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
+from onboard.kinds.terminal.memory import box_record, read_boxes
 from onboard.kinds.terminal.messages import (
     BoxOrder,
     LaneSensor,
     LaneState,
     ManualKey,
+    MissionAnswer,
     MissionKey,
     PlanHead,
     TaskTerms,
@@ -46,7 +49,7 @@ from onboard.kinds.terminal.messages import (
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.missions import Orders, Transport
 from onboard.kinds.terminal.site import EntityKind, Terminal
-from onboard.kinds.terminal.vehicle import NO_WHEELBASE_MM, terminal
+from onboard.kinds.terminal.vehicle import terminal
 
 #: After a refusal, and while no robot is about to be free, the desk looks again after this, us. Ours.
 LOOK_US = 5_000_000
@@ -95,6 +98,7 @@ class Desk:
     _won_at_us: dict[Reference, int] = field(default_factory=dict)
     _lanes: dict[int, LaneState] = field(default_factory=dict)
     _is_new: bool = False
+    _is_moved: bool = False
     #: Vehicles in which a person has a hand, and orders to vehicles that were not heard to have come.
     held: set[int] = field(default_factory=set)
     _manual: dict[int, ManualOrder] = field(default_factory=dict)
@@ -133,6 +137,7 @@ class Desk:
             self.orders.give_back(task)
         self._won_at_us = dict.fromkeys(self.orders.won, now_us)
         self._look_at_us = now_us + LOOK_US
+        self.mirror.remember(read_boxes(self.fleet.node_id, self.fleet.node_id, self.fleet.entries))
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
@@ -160,6 +165,8 @@ class Desk:
                 return self.mirror.ask(message)
             case PlanHead():
                 self._is_new = True
+            case CarAt() | TokenGrant():
+                self._is_moved = True
             case ManualState():
                 self._on_manual(message)
             case BoxOrder() if message.desk == self.fleet.node_id:
@@ -189,7 +196,7 @@ class Desk:
 
     def advance(self, now_us: int) -> list[Effect]:
         """Open the next call where a robot is about to be free; tell blocked lanes again; look after won tasks."""
-        effects: list[Effect] = []
+        effects = self._take_over() if self._is_moved else []
         if self._repeat_at_us is not None and self._repeat_at_us <= now_us:
             self._repeat_at_us = now_us + LANE_REPEAT_US
             effects += self._lanes_told()
@@ -210,23 +217,37 @@ class Desk:
 
     def statements(self, now_us: int) -> list[Effect]:
         """Lanes, the boxes that are not where they were at first, and the rights that I hold."""
-        boxes: list[Effect] = []
-        if self.fleet.node_id == self.site.desk:
-            boxes = [
-                Send(CarAt(self.fleet.node_id, car, record.station, record.version, NO_WHEELBASE_MM))
-                for car, record in self.fleet.mirror.cars.items()
-                if record.custodian == self.fleet.node_id
-            ]
-        return self._lanes_told() + boxes + self.fleet.tokens.statements()
+        boxes = [Send(one) for one in self.mirror.kept_by(self.fleet.node_id)]
+        return [*self._lanes_told(), *boxes, *self.fleet.tokens.statements()]
+
+    def _take_over(self) -> list[Effect]:
+        """A box in my books was put down, and its right came back: from now on I vouch for where it stands.
+
+        The vehicle that put it down may be switched off at any time; without this nobody could tell a machine that
+        was off meanwhile (campaign terminal, all, seed 11).
+        """
+        self._is_moved = False
+        effects: list[Effect] = []
+        for car, record in list(self.fleet.mirror.cars.items()):
+            key = car_token(*car)
+            stands = record.station in self.site.entities and record.custodian != self.fleet.node_id
+            if stands and car.origin == self.fleet.node_id and self.fleet.tokens.holds(key):
+                version = self.fleet.tokens.seen.get(key, 0)
+                statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
+                self.fleet.mirror.on_car(statement)
+                effects += [Record(box_record(statement)), Send(statement)]
+        return effects
 
     # --- missions ----------------------------------------------------------------------------------------------
 
     def _typed(self, key: MissionKey, now_us: int) -> list[Effect]:
         """A mission; an urgent one interrupts: what was called for and not awarded waits (row M29)."""
         order = self.orders.key(key)
+        is_taken = self.orders.answer(key)
         if order is None:
-            return []
-        return self._ranked(order.urgent, now_us)
+            return [] if is_taken is None else [Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
+        record, *others = self._ranked(order.urgent, now_us)
+        return [record, Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True)), *others]
 
     def _ordered(self, wanted: BoxOrder, now_us: int) -> list[Effect]:
         """A box that is wanted from outside; who asks again is told how it stands."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from onboard.core.messages import Reference
+from onboard.core.messages import CarAt, Reference
 from onboard.kinds.terminal.messages import Action
 from onboard.kinds.terminal.plan import Load, Plan, Step, VisitKey
 
@@ -21,6 +21,32 @@ def plan_record(plan: Plan) -> dict[str, str | int]:
 def step_record(version: int, step: int, ended_us: int) -> dict[str, str | int]:
     """A step is over."""
     return {"record": "step", "version": version, "step": step, "ended": ended_us}
+
+
+def box_record(statement: CarAt) -> dict[str, str | int]:
+    """Where I know a box to stand: nobody else may know it when the power comes back."""
+    return {
+        "record": "box",
+        "box": statement.car.number,
+        "station": statement.station,
+        "version": statement.version,
+        "wheelbase": statement.wheelbase_mm,
+    }
+
+
+def read_boxes(node: int, desk: int, entries: Iterable[Entry]) -> list[CarAt]:
+    """What I said of boxes that I had put down, or have in my books, in the order in which they came to stand there."""
+    return [
+        CarAt(
+            node,
+            Reference(desk, int(entry["box"])),
+            int(entry["station"]),
+            int(entry["version"]),
+            int(entry["wheelbase"]),
+        )
+        for entry in entries
+        if entry.get("record") == "box"
+    ]
 
 
 def read_plan(owner: int, entries: Iterable[Entry]) -> tuple[Plan | None, list[tuple[int, int]]]:

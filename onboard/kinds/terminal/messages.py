@@ -219,6 +219,14 @@ class MissionKey(Message):
 
 
 @dataclass(frozen=True, slots=True)
+class MissionAnswer(Message):
+    """A mission that came whole is in the desk's journal, or is nothing that can be carried out."""
+
+    mission: int
+    is_taken: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ManualKey(Message):
     """What a person presses for ``vehicle``; ``number`` grows by one with each press at a desk."""
 
@@ -229,5 +237,6 @@ class ManualKey(Message):
 
 MESSAGES = (
     PlanHead, PlanStep, PlanTask, StepReport, LaneState, TaskTerms, Assignment, BoxOrder,
-    MoveOrder, MoveState, HandlerOrder, HandlerState, LaneSensor, MissionKey, ManualKey,
+    MoveOrder, MoveState, HandlerOrder, HandlerState, LaneSensor, MissionKey,
+    MissionAnswer, ManualKey,
 )  # fmt: skip

@@ -1,5 +1,6 @@
 """What a machine of a terminal believes of the others: plans, boxes, lanes; built from bus traffic alone."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import ANY_STATION, Grade
@@ -96,7 +97,7 @@ class TerminalMirror:
     def _on_box(self, statement: CarAt) -> None:
         record = self.fleet.cars.get(statement.car)
         number = statement.car.number
-        if record is None or statement.car.origin != self.site.desk:
+        if record is None or statement.car.origin != self.site.desk or not 0 < number <= len(self.site.boxes):
             return
         station = record.station if record.station != ANY_STATION else 0
         if any(number in row for at, row in self.standing.items() if at == station):
@@ -128,6 +129,23 @@ class TerminalMirror:
         else:
             is_behind = owned is not None
         return [Send(SyncRequest(self.node_id, beat.sender))] if is_behind else []
+
+    def kept_by(self, node: int) -> list[CarAt]:
+        """What a machine vouches for: boxes at stations of which it is the custodian, those of a stack from below."""
+        found = []
+        for station, row in self.standing.items():
+            for number in row:
+                car = self.site.box(number)
+                record = self.fleet.cars.get(car)
+                if record is not None and (record.custodian, record.station) == (node, station):
+                    found.append(CarAt(node, car, station, record.version, record.wheelbase_mm))
+        return found
+
+    def remember(self, statements: Iterable[CarAt]) -> None:
+        """What I said before the power failed, from my journal: older than whatever others say meanwhile."""
+        for statement in statements:
+            if self.fleet.on_car(statement):
+                self._on_box(statement)
 
     def station_of(self, box: int) -> int:
         """The station at which a box stands, 0 where it stands nowhere."""

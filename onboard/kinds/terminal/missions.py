@@ -10,6 +10,8 @@ from onboard.kinds.terminal.messages import MissionKey, Verb
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.site import EntityKind, Terminal
 
+#: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
+KNOWN = 127
 #: Tasks from outside that are remembered once they are over.
 MOST_OVER = 64
 
@@ -58,12 +60,16 @@ class Orders:
     won: dict[Reference, int] = field(default_factory=dict)
     done: int = 0
     last_task: int = 0
+    #: The newest missions that were taken, so that one said again is not carried out again.
+    taken: deque[int] = field(default_factory=lambda: deque(maxlen=KNOWN))
     #: Tasks from outside that are done, the newest so many: who asks for one again is told so.
     over: deque[Reference] = field(default_factory=lambda: deque(maxlen=MOST_OVER))
     _typed: dict[int, Order] = field(default_factory=dict)
 
     def key(self, key: MissionKey) -> Order | None:
         """What an operator types; the mission that it completes, or None. Unknown types and boxes are passed over."""
+        if key.mission in self.taken:
+            return None
         order = self._typed.setdefault(
             key.mission,
             Order(key.mission, key.target, before_us=key.before_s * 1_000_000, urgent=key.urgent),
@@ -72,16 +78,33 @@ class Orders:
             if 1 <= key.what <= len(self.site.boxes) and key.what not in order.named:
                 order.named.append(key.what)
             return None
+        if key.verb is Verb.END and len(order.named) < key.count:
+            return None
         del self._typed[key.mission]
         if key.verb is Verb.LOAD:
             types = types_of(self.site)
-            if key.what >= len(types) or key.source not in self.site.entities:
+            if key.what >= len(types) or not (self._is_place(key.source) or self._is_area(key.source)):
                 return None
             order.left, order.type, order.source = key.count, types[key.what], key.source
-        if key.mission in self.missions or key.target not in self.site.entities:
+        if key.mission in self.missions or not (order.left or order.named) or not self._is_place(key.target):
             return None
         self.missions[key.mission] = order
+        self.taken.append(key.mission)
         return order
+
+    def answer(self, key: MissionKey) -> bool | None:
+        """Whether what was typed is a mission that will be carried out; None while more of it is to come."""
+        if key.mission in self.taken:
+            return True
+        return None if key.verb is Verb.TRANSHIP or key.mission in self._typed else False
+
+    def _is_place(self, number: int) -> bool:
+        entity = self.site.entities.get(number)
+        return entity is not None and entity.kind is EntityKind.STATION
+
+    def _is_area(self, number: int) -> bool:
+        entity = self.site.entities.get(number)
+        return entity is not None and entity.kind is EntityKind.AREA
 
     def next(self, mirror: TerminalMirror, taken: set[int]) -> Transport | None:
         """The transport to be called for next: the best mission with an available box (nothing above, M23)."""
@@ -202,9 +225,10 @@ class Orders:
             f"{self.won.get(one.task, 0)},{one.task.origin}"
             for one in self.open.values()
         )
+        taken = ";".join(str(number) for number in self.taken)
         over = ";".join(f"{one.origin},{one.number}" for one in self.over)
         told: dict[str, str | int] = {"record": "orders", "missions": missions, "tasks": tasks, "over": over}
-        return told | {"last": self.last_task, "done": self.done}
+        return told | {"taken": taken, "last": self.last_task, "done": self.done}
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """What the newest entry says."""
@@ -212,6 +236,7 @@ class Orders:
         if newest is None:
             return
         self.last_task, self.done = int(newest["last"]), int(newest["done"])
+        self.taken.extend(int(number) for number in str(newest.get("taken", "")).split(";") if number)
         for row in str(newest.get("over", "")).split(";"):
             if row:
                 self.over.append(Reference(*(int(one) for one in row.split(","))))

@@ -25,6 +25,8 @@ AGAIN_US = 10_000_000
 SAY_US = 5_000_000
 #: Refused for so long without anybody before me, us: the steward sees another order. Ours.
 TELL_US = 10_000_000
+#: Refused for so long behind somebody, us: whoever that is may wait for me by a list that only I have otherwise. Ours.
+TELL_BEHIND_US = 30_000_000
 #: Plans are adopted in turns of bus time, one vehicle so long after the other, us: each sees what the one before has
 #: told, so that no two plans are made at once around the same gaps. Ours.
 TURN_US = 50_000
@@ -48,7 +50,8 @@ class Planner:
     _queue_at_us: int | None = None
     _said_at_us: int | None = None
     _turn_at_us: int | None = None
-    _refused_us: int | None = None
+    #: The step in hand, and since when the right to go on from it is refused.
+    _refused: tuple[int, int] | None = None
 
     @property
     def site(self) -> Terminal:
@@ -151,6 +154,9 @@ class Planner:
         if self.mirror.in_plans(job.box) not in (None, self.fleet.node_id):
             self._drop_first()
             return [Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.FORFEITED, job.source, Reason.NONE))]
+        if self.mirror.traffic.dates(now_us).circle:
+            # While plans wait for each other there are no dates to put anything behind: one is made anew first.
+            return []
         found = self.generation.plan(job, now_us, version=successor(self.version, 8))
         if found is None:
             self._queue_at_us = now_us + AGAIN_US
@@ -171,17 +177,22 @@ class Planner:
         return effects
 
     def _tell_anew(self, now_us: int) -> list[Effect]:
-        """A steward that refuses me while I see nobody before me has another order: my plan is told anew, as it is."""
+        """A steward that refuses me while I see nobody before me has another order: my plan is told anew, as it is.
+
+        So it is after long where I do see somebody: lists may differ without any plan being missed, and then two may
+        each wait for the other with nobody else's picture showing why (campaign terminal, all, seed 15).
+        """
         owned, tokens = self.owned, self.fleet.tokens
         refused = [key.number >> 8 for key, why in tokens.refused.items() if why is Reason.TOKEN_NOT_GRANTABLE_YET]
-        first = [entity for entity in refused if self._is_first(entity)]
-        if owned is None or not first:
-            self._refused_us = None
+        if owned is None or not refused:
+            self._refused = None
             return []
-        self._refused_us = now_us if self._refused_us is None else self._refused_us
-        if now_us - self._refused_us < TELL_US:
+        if self._refused is None or self._refused[0] != owned.current:
+            self._refused = (owned.current, now_us)
+        patience_us = TELL_US if any(self._is_first(entity) for entity in refused) else TELL_BEHIND_US
+        if now_us - self._refused[1] < patience_us:
             return []
-        self._refused_us = now_us
+        self._refused = None
         left = remaining(self.mirror.traffic, self.fleet.node_id, now_us)
         return [] if left is None else self._adopt(replace(left, version=successor(self.version, 8)), now_us)
 

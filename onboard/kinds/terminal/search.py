@@ -333,15 +333,17 @@ def remaining(traffic: Traffic, owner: int, now: int) -> Plan | None:
         return None
     old, skip = owned.plan, owned.current
     dates = traffic.dates(now).at
-    steps = []
+    steps, end = [], owned.began
     for number in range(skip, len(old.steps)):
         step = old.steps[number]
+        # On a circle there are no dates; a plan that is told then still follows itself in time.
+        end = max(dates[Node(owner, number + 1)], end + step.duration)
         row = traffic.lists.get(step.entity, [])
         place = next((n for n, one in enumerate(row) if one.owner == owner and one.first <= number <= one.last), 0)
         after = row[place - 1].key if place else NOBODY_BEFORE
         if after.owner == owner:
             after = after._replace(step=max(0, after.step - skip))
-        steps.append(step._replace(end=dates[Node(owner, number + 1)], after=after))
+        steps.append(step._replace(end=end, after=after))
     loads = tuple(
         load._replace(pick=load.pick - skip if skip <= load.pick < NO_STEP else NO_STEP, put=load.put - skip)
         for load in old.loads

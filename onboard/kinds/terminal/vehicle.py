@@ -18,7 +18,7 @@ from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.terminal.body import Body
 from onboard.kinds.terminal.generation import VehicleGeneration
 from onboard.kinds.terminal.manual import Manual
-from onboard.kinds.terminal.memory import step_record
+from onboard.kinds.terminal.memory import box_record, read_boxes, step_record
 from onboard.kinds.terminal.messages import (
     Action,
     Assignment,
@@ -122,6 +122,7 @@ class Vehicle:
 
     def start(self, now_us: int) -> list[Effect]:
         """After a restart the journal knows the plan and how far it has come."""
+        self.mirror.remember(read_boxes(self.fleet.node_id, self.site.desk, self.fleet.entries))
         self.planner.start(now_us)
         self.manual.replay(self.fleet.entries)
         self.generation.is_held = not self.manual.is_automatic
@@ -181,8 +182,9 @@ class Vehicle:
         return min((time for time in times if time is not None), default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
-        """My plan, how far it has come, the box that I carry, the rights that I hold."""
+        """My plan, how far it has come, the box that I carry, those put down that no desk keeps yet, my rights."""
         effects = self.planner.statement(now_us)
+        effects += [Send(one) for one in self.mirror.kept_by(self.fleet.node_id)]
         handler = self.body.handler
         if handler is not None and handler.box and self.fleet.tokens.holds(self._box_token(handler.box)):
             effects.append(Send(self._box_at(handler.box, ANY_STATION)))
@@ -318,7 +320,8 @@ class Vehicle:
         assert load is not None and self.body.handler is not None
         if self.body.handler.box == 0 and not self.body.is_handling:
             station = owned.plan.steps[owned.current].entity
-            effects = self._state_box(load.box, station)
+            effects: list[Effect] = [Record(box_record(self._box_at(load.box, station)))]
+            effects += self._state_box(load.box, station)
             key = self._box_token(load.box)
             if self.fleet.tokens.holds(key):
                 effects += self.fleet.tokens.give(key, self.site.desk, now_us)
