@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from onboard.core.authority import TokenKey, segment_token
+from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     CallResult,
@@ -332,8 +332,8 @@ class Robot:
         here = self.carriage.standing_at
         if here is not None and here == self.carriage.nearest:
             return self._admit(here, now_us)
-        may_move = self.carriage.goal is None and not self.holding.is_held
-        if may_move and all(self.fleet.tokens.holds(segment_token(slot)) for slot in self.carriage.occupied()):
+        if self.carriage.goal is None and not self.holding.is_held:
+            # It asks first for what it is in: it may have been pushed there while it was off.
             self.carriage.go(self.carriage.nearest)
         return []
 
