@@ -62,16 +62,30 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _existing(text: str) -> Path:
+    if not Path(text).is_file():
+        raise argparse.ArgumentTypeError(f"{text}: no such file")
+    return Path(text)
+
+
 def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     image = commands.add_parser("image", help="the image that 64-bit ARM boards are flashed with")
     image.add_argument("--out", type=Path, default=Path("dist/onboard.img"), metavar="FILE")
-    image.add_argument("--key", type=Path, metavar="PEM", help="public key of its updates; without one it takes none")
+    image.add_argument(
+        "--key", type=_existing, metavar="PEM", help="public key of its updates; without one it takes none"
+    )
+    image.add_argument(
+        "--pi-firmware",
+        type=_existing,
+        metavar="DEB",
+        help="Debian's package raspi-firmware, not free software; a Raspberry Pi does not start without it",
+    )
     keys = commands.add_parser("keys", help="a pair of keys for updates")
     keys.add_argument("--out", type=Path, default=Path("update-key.pem"), metavar="FILE", help="the secret one")
     update = commands.add_parser("update", help="a signed update for boards with such an image")
     update.add_argument("--out", type=Path, metavar="FILE", help="dist/onboard-VERSION.update")
     update.add_argument(
-        "--secret", type=Path, required=True, metavar="PEM", help="the secret key (python -m deploy keys)"
+        "--secret", type=_existing, required=True, metavar="PEM", help="the secret key (python -m deploy keys)"
     )
     update.add_argument("--site", default="", metavar="NAME", help="only machines of this site take it")
     for parser in (image, update):
@@ -108,7 +122,8 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
         case "image":
             args.out.parent.mkdir(parents=True, exist_ok=True)
             version_key(args.version)
-            image = build_image(args.out, Release(args.version, args.key.read_bytes() if args.key else b""))
+            release = Release(args.version, args.key.read_bytes() if args.key else b"")
+            image = build_image(args.out, release, pi_firmware=args.pi_firmware)
             return [image.disk, f"sha256 {image.digest}", f"root file system: sha256 {image.root.digest}"]
         case "keys":
             public = args.out.with_suffix(".pub.pem")

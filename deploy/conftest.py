@@ -14,6 +14,21 @@ from deploy.update.signature import make_keys
 SITE = Path(__file__).parents[1] / "bus_sim" / "sites" / "level1.toml"
 
 
+#: Does to the controller what ``deploy/harm.py`` says, where the kernel's parameters have test.harm.
+UNIT = b"""\
+[Unit]
+ConditionKernelCommandLine=test.harm
+After=onboard.service
+RequiresMountsFor=/var/lib/onboard
+[Service]
+ExecStart=/usr/bin/python3 -I /usr/lib/test/harm.py
+StandardOutput=journal+console
+StandardError=journal+console
+[Install]
+WantedBy=multi-user.target
+"""
+
+
 @pytest.fixture(scope="session")
 def secret(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The secret key of the updates that the image takes; the public one is beside it."""
@@ -25,7 +40,12 @@ def secret(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def release(secret: Path) -> Release:
     """What the image says of itself."""
-    return Release("1.0", secret.with_suffix(".pub.pem").read_bytes())
+    extra = {
+        "usr/lib/test/harm.py": Path(__file__).with_name("harm.py").read_bytes(),
+        "etc/systemd/system/test-harm.service": UNIT,
+        "etc/systemd/system/multi-user.target.d/test.conf": b"[Unit]\nWants=test-harm.service\n",
+    }
+    return Release("1.0", secret.with_suffix(".pub.pem").read_bytes(), extra)
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""The image boots in an emulated machine, survives the loss of its power, and says what is wrong."""
+"""The image boots in an emulated machine, survives kill, freeze and the loss of its power, and says what is wrong."""
 
 import re
 from pathlib import Path
@@ -13,17 +13,29 @@ LIMIT_S = 400.0
 BEAT = re.compile(r"can0 1250000B#[0-9A-F]{10}([0-9A-F]{2})")
 
 
-def boots(console: str) -> list[int]:
-    return [int(found, 16) for found in BEAT.findall(console)]
+def lives(console: str) -> list[int]:
+    """The controller's boot counters in the order in which they were heard."""
+    return list(dict.fromkeys(int(found, 16) for found in BEAT.findall(console)))
 
 
-def test_it_boots_to_its_heartbeat_and_after_a_power_cut_it_knows_that_this_is_another_life(mr1: Path) -> None:
-    lives = []
-    for _ in range(2):
-        with Board(mr1) as board:
-            board.until("a heartbeat", lambda console: bool(boots(console)), LIMIT_S)
-            lives.append(boots(board.console)[0])
-    assert lives == [1, 2]
+def written(console: str) -> list[int]:
+    return [int(found) for found in re.findall(r"test: record (\d+)\b", console)]
+
+
+def test_killed_frozen_and_without_power_in_the_middle_of_a_write_it_comes_back(mr1: Path) -> None:
+    personalise(mr1, [], "onboard.emulated test.harm")
+    with Board(mr1) as board:
+        board.until("a heartbeat", lambda console: lives(console) == [1], LIMIT_S)
+        board.until("a heartbeat after kill -9", lambda console: lives(console) == [1, 2], LIMIT_S)
+        board.until("a heartbeat after a freeze", lambda console: lives(console) == [1, 2, 3], LIMIT_S)
+        board.until("journal writes", lambda console: len(written(console)) >= 5, LIMIT_S)
+    kept = written(board.console)[-1]
+    with Board(mr1) as board:
+        board.until("a heartbeat", lambda console: bool(lives(console)), LIMIT_S)
+        board.until("the journal", lambda console: "test: found " in console, LIMIT_S)
+    assert lives(board.console)[0] == 4
+    found = re.search(r"test: found (\d+) records, (\d+) torn", board.console)
+    assert found is not None and int(found[1]) >= kept and int(found[2]) <= 1
 
 
 def test_without_a_machine_file_it_is_silent_and_says_why(disk: Path) -> None:

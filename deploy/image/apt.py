@@ -21,6 +21,7 @@ _PACKAGES = {
     "mkfs.vfat": " (apt-get install dosfstools)",
     "mkfs.ext4": " (apt-get install e2fsprogs)",
     "depmod": " (apt-get install kmod)",
+    **dict.fromkeys(("dtc", "fdtget", "fdtput"), " (apt-get install device-tree-compiler)"),
 }
 
 

@@ -90,7 +90,7 @@ def _fetch_packages(apt: Apt, to: Debian) -> None:
     debs = {file.name.partition("_")[0]: file for file in apt.folder.glob("*.deb")}
     for name, (folder, parts) in wanted.items():
         shutil.rmtree(folder, ignore_errors=True)
-        _unpack(debs[name], folder, parts)
+        unpack(debs[name], folder, parts)
     # The links in it are relative to the folder's own root.
     run_tool(["depmod", "-b", str(to.kernel), to.release])
 
@@ -121,7 +121,8 @@ def _runs_arm() -> bool:
         return False
 
 
-def _unpack(deb: Path, to: Path, wanted: Sequence[str]) -> None:
+def unpack(deb: Path, to: Path, wanted: Sequence[str]) -> None:
+    """Unpack what a package has by these patterns. Raises ``DeployError`` where that is nothing."""
     to.mkdir(parents=True)
     with subprocess.Popen(["dpkg-deb", "--fsys-tarfile", str(deb)], stdout=subprocess.PIPE) as reading:
         # A pattern that this kernel has no file for is no mistake.

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from deploy.update.board import SIGNATURE
 from deploy.wheels import DeployError
 
-#: What the first file system knows our disk by; it stands where an MBR has its disk signature (bytes 440 to 443).
-SIGNATURE = b"ONBD"
 SECTOR_BYTES = 512
 #: Partitions begin on whole megabytes, as erase blocks of cards do.
 _ALIGN = (1 << 20) // SECTOR_BYTES

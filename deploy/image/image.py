@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deploy.image.apt import run_tool
-from deploy.image.boot import BOOT_MB, boot_files, make_boot_partition
+from deploy.image.boot import BOOT_MB, boot_files, make_fat
 from deploy.image.debian import EPOCH_S, STORE, fetch_debian
 from deploy.image.disk import FAT32_LBA, LINUX, Part, write_disk
 from deploy.image.release import Release
@@ -30,12 +30,12 @@ class Image:
     root: Root
 
 
-def build_image(to: Path, release: Release, store: Path = STORE) -> Image:
+def build_image(to: Path, release: Release, store: Path = STORE, pi_firmware: Path | None = None) -> Image:
     """Write the image, and beside it, in a folder, what it was made from. Raises ``DeployError``, ``OSError``."""
     parts = to.with_suffix("")
     root = build_root(parts, release, store)
-    boot = boot_files(fetch_debian(store), root, parts / "boot")
-    partition = make_boot_partition(parts / "boot.img", sorted(boot.iterdir()))
+    boot = boot_files(fetch_debian(store), root, parts / "boot", pi_firmware)
+    partition = make_fat(parts / "boot.img", sorted(boot.iterdir()))
     journal = make_journal_partition(parts / "journal.img")
     slots = [Part(LINUX, SLOT_MB, root.squashfs), Part(LINUX, SLOT_MB)]
     write_disk([Part(FAT32_LBA, BOOT_MB, partition), *slots, Part(LINUX, JOURNAL_MB, journal)], to)

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import IO
 
 from deploy.image.debian import EPOCH_S, STORE, Debian, fetch_debian
-from deploy.image.disk import SIGNATURE
 from deploy.image.layer import build_layer
 from deploy.image.release import Release
 from deploy.image.squash import make_squashfs
+from deploy.update.board import SIGNATURE
 from hil.guest.initrd import newc
 from hil.guest.kernel import Kernel
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 SLOTS = ("a", "b")
-#: How often a new system is started before it counts as bad.
+#: How often a new system is started that says nothing of itself: a power cut while it starts is no fault of its own.
 ATTEMPTS = 3
 #: File on the boot partition.
 STATE_NAME = "slots.env"
@@ -31,9 +31,11 @@ class Phase(Enum):
 class Event(Enum):
     """What happens to a board between two updates."""
 
+    BEGUN = auto()
     INSTALLED = auto()
     STARTED = auto()
     HEALTHY = auto()
+    UNHEALTHY = auto()
     FELL_BACK = auto()
 
 
@@ -68,6 +70,10 @@ def other(slot: str) -> str:
     return SLOTS[1 - SLOTS.index(slot)]
 
 
+def _begin(state: Slots, _: str) -> Slots:
+    return Slots(good=state.good, failed=state.failed)
+
+
 def _install(state: Slots, version: str) -> Slots:
     return replace(state, trial=other(state.good), tries=ATTEMPTS, version=version)
 
@@ -80,6 +86,10 @@ def _settle(state: Slots, _: str) -> Slots:
     return Slots(good=state.trial)
 
 
+def _spend(state: Slots, _: str) -> Slots:
+    return replace(state, tries=0)
+
+
 def _give_up(state: Slots, _: str) -> Slots:
     return Slots(good=state.good, failed=state.version)
 
@@ -88,17 +98,20 @@ def _stay(state: Slots, _: str) -> Slots:
     return state
 
 
-#: What is not here cannot happen, and raises. ``STARTED`` is the boot loader's part (``files/grub.cfg``); an update
-#: may replace one that waits or has failed, but a system on trial is judged before it installs another.
+#: What is not here cannot happen, and raises. An update may replace one that waits; from ``BEGUN`` on the other slot is
+#: being written, so nothing may start it. ``STARTED`` is the boot loader's part (``deploy/image/files/grub.cfg``).
 RULES: dict[tuple[Phase, Event], Callable[[Slots, str], Slots]] = {
+    (Phase.SETTLED, Event.BEGUN): _begin,
+    (Phase.PENDING, Event.BEGUN): _begin,
+    (Phase.SPENT, Event.BEGUN): _begin,
     (Phase.SETTLED, Event.INSTALLED): _install,
-    (Phase.PENDING, Event.INSTALLED): _install,
-    (Phase.SPENT, Event.INSTALLED): _install,
     (Phase.SETTLED, Event.STARTED): _stay,
     (Phase.PENDING, Event.STARTED): _attempt,
     (Phase.SPENT, Event.STARTED): _stay,
     (Phase.PENDING, Event.HEALTHY): _settle,
     (Phase.SPENT, Event.HEALTHY): _settle,
+    (Phase.PENDING, Event.UNHEALTHY): _spend,
+    (Phase.SPENT, Event.UNHEALTHY): _spend,
     (Phase.SPENT, Event.FELL_BACK): _give_up,
     (Phase.PENDING, Event.FELL_BACK): _give_up,
 }

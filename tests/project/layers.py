@@ -128,7 +128,14 @@ LAYERS: dict[str, Layer] = {
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
-    "deploy": Layer(("onboard", "onboard.config", *CORE_TYPES, "hil.guest.initrd", "hil.guest.kernel"), ("pytest",)),
+    # A board's updater listens for its own controller's heartbeats.
+    "deploy": Layer(
+        (
+            *("onboard", "onboard.config", *CORE_TYPES, "onboard.io.journal", "onboard.wire"),
+            *("hil.guest.initrd", "hil.guest.kernel"),
+        ),
+        ("pytest",),
+    ),
     # A bench starts the programs themselves.
     "hil": Layer(("onboard", "onboard.cli", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
 }
