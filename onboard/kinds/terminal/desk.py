@@ -246,8 +246,8 @@ class Desk:
         is_taken = self.orders.answer(key)
         if order is None:
             return [] if is_taken is None else [Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
-        record, *others = self._ranked(order.urgent, now_us)
-        return [record, Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True)), *others]
+        taken = Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True))
+        return [*self._ranked(order.urgent, now_us), taken]
 
     def _ordered(self, wanted: BoxOrder, now_us: int) -> list[Effect]:
         """A box that is wanted from outside; who asks again is told how it stands."""

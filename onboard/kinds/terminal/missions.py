@@ -10,10 +10,10 @@ from onboard.kinds.terminal.messages import MissionKey, Verb
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.site import EntityKind, Terminal
 
-#: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
-KNOWN = 127
 #: Tasks from outside that are remembered once they are over.
 MOST_OVER = 64
+#: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
+KNOWN = 127
 
 
 @dataclass
@@ -60,10 +60,10 @@ class Orders:
     won: dict[Reference, int] = field(default_factory=dict)
     done: int = 0
     last_task: int = 0
-    #: The newest missions that were taken, so that one said again is not carried out again.
-    taken: deque[int] = field(default_factory=lambda: deque(maxlen=KNOWN))
     #: Tasks from outside that are done, the newest so many: who asks for one again is told so.
     over: deque[Reference] = field(default_factory=lambda: deque(maxlen=MOST_OVER))
+    #: The newest missions that were taken, so that one said again is not carried out again.
+    taken: deque[int] = field(default_factory=lambda: deque(maxlen=KNOWN))
     _typed: dict[int, Order] = field(default_factory=dict)
 
     def key(self, key: MissionKey) -> Order | None:
@@ -225,8 +225,8 @@ class Orders:
             f"{self.won.get(one.task, 0)},{one.task.origin}"
             for one in self.open.values()
         )
-        taken = ";".join(str(number) for number in self.taken)
         over = ";".join(f"{one.origin},{one.number}" for one in self.over)
+        taken = ";".join(str(number) for number in self.taken)
         told: dict[str, str | int] = {"record": "orders", "missions": missions, "tasks": tasks, "over": over}
         return told | {"taken": taken, "last": self.last_task, "done": self.done}
 
@@ -236,10 +236,10 @@ class Orders:
         if newest is None:
             return
         self.last_task, self.done = int(newest["last"]), int(newest["done"])
-        self.taken.extend(int(number) for number in str(newest.get("taken", "")).split(";") if number)
         for row in str(newest.get("over", "")).split(";"):
             if row:
                 self.over.append(Reference(*(int(one) for one in row.split(","))))
+        self.taken.extend(int(number) for number in str(newest.get("taken", "")).split(";") if number)
         for row in str(newest["missions"]).split(";"):
             if row:
                 number, target, left, kind, source, before, is_urgent, named, *name = row.split(",")
