@@ -10,8 +10,9 @@ from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 
-#: A call is closed at its deadline; a restart of the initiator, a journal write and a busy bus need less than this, us.
-CLOSED_WITHIN_US = 2_000_000
+#: A call is closed at its deadline; a restart of the initiator, a journal write and a busy bus need less than this, us,
+#: and so does a machine that has lost bus time: it closes nothing until two time messages (5 s apart) say the same.
+CLOSED_WITHIN_US = 12_000_000
 #: Closed calls are remembered so long, since awards are said again until the winner is heard, us.
 REMEMBERED_US = 600_000_000
 #: Two bids may cross on their way: the second was queued before the first was heard, us.
