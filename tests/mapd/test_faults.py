@@ -79,3 +79,9 @@ _CALL = TransportCall(1, 3, 12, 15)
 def test_each_checker_finds_what_it_is_for(rule: str, said: list[Message]) -> None:
     verdict = judged(SITE, [(1_000_000 * number, one) for number, one in enumerate(said, 1)])
     assert verdict.counts[rule] == 1, verdict.lines()
+
+
+def test_what_is_aboard_where_a_log_begins_is_taken_for_granted() -> None:
+    """Also where the time of the bus began anew in the middle, as after the stale frames of a node that was off."""
+    said = [_at(11, 90, 13, 3, loaded=True), _CALL, _at(11, 91, 14, 3, loaded=True)]
+    assert judged(SITE, [(1_000_000 * number, one) for number, one in enumerate(said, 1)]).counts["task-once"] == 0

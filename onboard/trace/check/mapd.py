@@ -123,13 +123,17 @@ class TaskOnce(Rule):
 
     def _on_state(self, event: Event[StepState]) -> None:
         state, robot = event.message, event.message.sender
+        # A log that begins in the middle, or whose clock began anew, takes what is aboard for granted.
+        is_midway = robot not in self._cells and state.step > 0
         cells = self._cells[robot] = (*self._cells.get(robot, ())[-1:], state.cell)
         call = self._calls.get(state.task)
         if state.loaded:
             first = self._carrier.setdefault(state.task, robot)
+            # Also where the call was not heard: said again later, it makes no news of what is aboard.
+            is_news = self._is_news(state) and not is_midway
             if first != robot:
                 self.find(event, (first, robot), f"both have task {state.task}")
-            elif call is not None and self._is_news(state) and call.pickup not in cells:
+            elif call is not None and is_news and call.pickup not in cells:
                 self.find(event, (robot,), f"has task {state.task} aboard and was not in cell {call.pickup}")
         if state.served:
             before = self._served.setdefault(state.task, (robot, state.step))
