@@ -231,7 +231,6 @@ def test_a_mistake_in_a_site_file_gets_a_line(
     ("arguments", "wanted"),
     [
         (["run", "SITE", "--fault", "linger:car=1,for_s=3"], "only a car park has it, and s is a mapd"),
-        (["campaign", "SITE"], "a mapd, and campaigns bring cars; name a car park"),
         (["compare", "SITE"], "a mapd, and only car parks are compared; name a car park"),
     ],
 )

@@ -84,6 +84,8 @@ def test_p57_the_run_used_most_of_the_contract(run: Heard) -> None:
         "Diagnostic",
         "Waiting",
         "TokenRefusal",
+        "ManualOrder",
+        "ManualState",
     }
 
 

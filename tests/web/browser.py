@@ -54,6 +54,8 @@ def served(words: list[str], folder: Path) -> Iterator[str]:
 def drawn(page: Page, what: str) -> dict[str, dict[str, Any]]:
     """What stands in the picture now, of one sort: boxes by their names or numbers."""
     page.wait_for_function("() => document.querySelector('#picture').drawn !== undefined")
+    # The tables are newer than the picture by one frame of the browser: the second one from now has drawn all of it.
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(0))))")
     boxes: list[dict[str, Any]] = page.evaluate("document.querySelector('#picture').drawn")
     return {str(box["id"]): box for box in boxes if box["what"] == what}
 
