@@ -26,7 +26,7 @@ SYSTEMS: Final[dict[str, System]] = {
 }
 #: Faults begin so long after power-up, s: the machines have found each other, and the first orders are there.
 BEGIN_S = 12.0
-#: A run is given up after so many times what an order takes, and once more for each order: they may wait for each other.
+#: A run is given up after so many times what an order takes, and once more for each that is usual: they may all wait.
 PATIENCE = 20
 
 
@@ -50,7 +50,7 @@ def span_s(site: Site) -> tuple[float, float]:
 def patience_s(site: Site) -> float:
     """When a run with the site's orders is given up, s after power-up."""
     system = SYSTEMS[site.system]
-    return span_s(site)[1] + (PATIENCE + system.count(site)) * system.order_s(site)
+    return span_s(site)[1] + (PATIENCE + system.usual(site).count) * system.order_s(site)
 
 
 class SystemStage:
