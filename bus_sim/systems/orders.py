@@ -1,9 +1,10 @@
 """Orders that a seed draws for a site of any system but the car park, and what became of them at the run's end."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from enum import Enum
+from typing import NamedTuple, Protocol
 
 from bus_sim.demand import DemandError, Law
 from bus_sim.systems.session import PlantMaker, SystemPlant
@@ -58,6 +59,22 @@ class System:
     who: str = "orders"
 
 
+class Answered(Protocol):
+    """An order at a plant's counter: its last answer, and its times, us."""
+
+    @property
+    def result(self) -> Enum | None:
+        """The counter's last word of it."""
+
+    @property
+    def begun_us(self) -> int:
+        """When it came."""
+
+    @property
+    def ended_us(self) -> int | None:
+        """When it was over."""
+
+
 class Ended(NamedTuple):
     """One order at the end: whether it was carried out, or refused, or neither; its times, us."""
 
@@ -77,3 +94,14 @@ def tally(entries: list[Ended], expected: int, now_us: int) -> Tally:
 def nothing_to_draw(site: str, what: str) -> DemandError:
     """The line for a site from which no order can be drawn."""
     return DemandError(f"{site}: no orders can be drawn for it, as it has {what}; write --orders 0 for its own")
+
+
+def last_of(moments_ms: Iterable[int], origin_us: int) -> float:
+    """When the last of the orders at these moments after ``origin_us`` comes, s after power-up."""
+    return origin_us / 1e6 + max(moments_ms, default=0) / 1e3
+
+
+def tally_of(entries: Iterable[Answered], done: Enum, refused: Enum, expected: int, now_us: int) -> Tally:
+    """What became of orders that a counter answers: the last word of each is ``done``, ``refused`` or another."""
+    ended = [Ended(one.result is done, one.result is refused, one.begun_us, one.ended_us) for one in entries]
+    return tally(ended, expected, now_us)

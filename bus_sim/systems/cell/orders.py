@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import cast
 
 from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant, make_plant
-from bus_sim.systems.orders import Ended, Orders, System, Tally, tally
+from bus_sim.systems.orders import Orders, System, Tally, last_of, tally_of
 from bus_sim.systems.session import SystemPlant
 from onboard.core.site import Site
 from onboard.kinds.cell.geometry import Point
@@ -47,17 +47,14 @@ def _is_on(point: Point, x0_mm: int, y0_mm: int, x1_mm: int, y1_mm: int) -> bool
 def last_s(site: Site) -> float:
     """When the last order comes, s after power-up."""
     assert isinstance(site, Cell)
-    return ORIGIN_US / 1e6 + max((one.at_ms for one in site.wishes), default=0) / 1e3
+    return last_of((one.at_ms for one in site.wishes), ORIGIN_US)
 
 
 def count(plant: SystemPlant) -> Tally:
     """What became of the goals."""
     cell = cast("CellPlant", plant)
-    ended = [
-        Ended(one.result is OrderResult.DONE, one.result is OrderResult.REFUSED, one.begun_us, one.ended_us)
-        for one in cell.entries
-    ]
-    return tally(ended, len(cell.site.wishes), cell.timers.now_us())
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(cell.site.wishes)
+    return tally_of(cell.entries, done, refused, expected, cell.timers.now_us())
 
 
 CELL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(6, 20.0), who="goals")

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import cast
 
 from bus_sim.systems.graph.plant import ORIGIN_US, GraphPlant, make_plant
-from bus_sim.systems.orders import Ended, Orders, System, Tally, nothing_to_draw, tally
+from bus_sim.systems.orders import Orders, System, Tally, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.session import SystemPlant
 from onboard.core.site import Site
 from onboard.kinds.graph.messages import VisitResult
@@ -33,17 +33,14 @@ def draw(site: Site, orders: Orders, seed: int) -> FactoryGraph:
 def last_s(site: Site) -> float:
     """When the last order comes, s after power-up."""
     assert isinstance(site, FactoryGraph)
-    return ORIGIN_US / 1e6 + max((one.at_ms for one in site.orders), default=0) / 1e3
+    return last_of((one.at_ms for one in site.orders), ORIGIN_US)
 
 
 def count(plant: SystemPlant) -> Tally:
     """What became of the orders."""
     graph = cast("GraphPlant", plant)
-    ended = [
-        Ended(one.result is VisitResult.DONE, one.result is VisitResult.REFUSED, one.begun_us, one.ended_us)
-        for one in graph.entries
-    ]
-    return tally(ended, len(graph.site.orders), graph.timers.now_us())
+    done, refused, expected = VisitResult.DONE, VisitResult.REFUSED, len(graph.site.orders)
+    return tally_of(graph.entries, done, refused, expected, graph.timers.now_us())
 
 
 def usual(site: Site) -> Orders:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import cast
 
-from bus_sim.systems.orders import Ended, Orders, System, Tally, nothing_to_draw, tally
+from bus_sim.systems.orders import Orders, System, Tally, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.session import SystemPlant
 from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant, make_plant
 from onboard.core.site import Site
@@ -32,17 +32,14 @@ def draw(site: Site, orders: Orders, seed: int) -> Turning:
 def last_s(site: Site) -> float:
     """When the last order comes, s after power-up."""
     assert isinstance(site, Turning)
-    return ORIGIN_US / 1e6 + max((one.at_ms for one in site.orders), default=0) / 1e3
+    return last_of((one.at_ms for one in site.orders), ORIGIN_US)
 
 
 def count(plant: SystemPlant) -> Tally:
     """What became of the orders."""
     turning = cast("TurningPlant", plant)
-    ended = [
-        Ended(one.result is JobResult.DONE, one.result is JobResult.REFUSED, one.begun_us, one.ended_us)
-        for one in turning.entries
-    ]
-    return tally(ended, len(turning.site.orders), turning.timers.now_us())
+    done, refused, expected = JobResult.DONE, JobResult.REFUSED, len(turning.site.orders)
+    return tally_of(turning.entries, done, refused, expected, turning.timers.now_us())
 
 
 TURNING = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(4, 120.0))
