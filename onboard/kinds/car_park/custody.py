@@ -14,7 +14,6 @@ from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CarAt, Reference, TokenGrant
-from onboard.core.serial import successor
 from onboard.core.site import Site, Station
 from onboard.kinds.car_park.bay_memory import car_record
 
@@ -51,7 +50,7 @@ def replay(fleet: Fleet, said: Iterable[CarAt]) -> None:
     for one in said:
         key = car_token(*one.car)
         leaving = tokens.leaving.get(key)
-        given = leaving is not None and leaving.version == successor(one.version, 16)
+        given = leaving is not None and leaving.version == one.version + 1
         if given or tokens.held.get(key) == one.version:
             fleet.mirror.on_car(one)
 
@@ -68,7 +67,7 @@ def statements(fleet: Fleet) -> list[Effect]:
 def before_grant(fleet: Fleet, grant: TokenGrant) -> list[Effect]:
     """Where the car stood when I gave its token away, as long as nobody has said anything newer."""
     record = fleet.mirror.cars.get(car_of(grant)) if grant.token_kind is TokenKind.CAR else None
-    if record is None or record.custodian != fleet.node_id or successor(record.version, 16) != grant.version:
+    if record is None or record.custodian != fleet.node_id or record.version + 1 != grant.version:
         return []
     return [Send(CarAt(fleet.node_id, car_of(grant), record.station, record.version, record.wheelbase_mm))]
 
@@ -82,7 +81,7 @@ def before_taking(fleet: Fleet, grant: TokenGrant) -> list[Effect] | None:
         record is None
         or record.station in (ANY_STATION, OUTSIDE)
         or record.custodian != grant.sender
-        or successor(record.version, 16) != grant.version
+        or record.version + 1 != grant.version
     ):
         fleet.drops[Reason.MIRROR_BEHIND] += 1
         return None
