@@ -12,11 +12,25 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.core.belief import Belief, Beliefs, Key
-from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, KindCode, Reason, TokenKind
+from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
-from onboard.core.site import Segment, Site, Station
+from onboard.core.site import Segment, Site
+from onboard.core.token_keys import TokenKey, car_token, genesis_holder, may_exist, segment_token, station_token
+
+__all__ = [
+    "Claim",
+    "MotionState",
+    "TokenBook",
+    "TokenKey",
+    "authorised",
+    "car_token",
+    "genesis_holder",
+    "may_exist",
+    "segment_token",
+    "station_token",
+]
 
 #: Highest version of a token: 163 years of the busiest slot, so that it never wraps (28 bits in dbc/fleet.dbc).
 MAX_VERSION = (1 << 28) - 1
@@ -24,52 +38,6 @@ MAX_VERSION = (1 << 28) - 1
 REFUSED_REPEATS = 5
 #: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst. Ours.
 IN_FLIGHT_US = 20_000
-
-
-class TokenKey(NamedTuple):
-    """Which token: its kind and 24-bit number."""
-
-    kind: TokenKind
-    number: int
-
-
-def segment_token(segment: Segment) -> TokenKey:
-    """The token of one body slot."""
-    return TokenKey(TokenKind.SEGMENT, segment.number)
-
-
-def station_token(station: Station) -> TokenKey:
-    """The token of one place, or of a compartment's bay: who holds it may send a shuttle in."""
-    return TokenKey(TokenKind.STATION, station.number)
-
-
-def car_token(origin: int, number: int) -> TokenKey:
-    """The token of one car: its holder is the custodian."""
-    return TokenKey(TokenKind.CAR, origin << 16 | number)
-
-
-def genesis_holder(site: Site, key: TokenKey) -> int:
-    """Who holds a token before it first moves, by the site file alone.
-
-    A robot holds the segment of its home, a compartment its bay; the track's steward holds all other segments and
-    places. Cars and tasks are made by their origin node.
-    """
-    if key.kind in (TokenKind.CAR, TokenKind.TASK):
-        return key.number >> 16
-    if key.kind is TokenKind.SEGMENT:
-        for machine in site.machines.values():
-            if machine.kind is KindCode.ROBOT and machine.home.number == key.number:
-                return machine.node_id
-    else:
-        for node_id, station in site.compartments.items():
-            if station.number == key.number:
-                return node_id
-    return site.stewards.get(key.number >> 8, 0)
-
-
-def may_exist(site: Site, key: TokenKey) -> bool:
-    """Whether the site has such a token, so that no frame can fill the book with what nobody ever made."""
-    return genesis_holder(site, key) in site.machines
 
 
 class Claim(NamedTuple):
@@ -128,8 +96,8 @@ class TokenBook:
     #: Tokens asked for without an agreed order, and since when the holder's view of the order has differed from mine.
     unordered: set[TokenKey] = field(default_factory=set)
     behind_since_us: dict[TokenKey, int] = field(default_factory=dict)
-    #: Whether tokens never seen to move count as with their first holders: not while my journal may be lost.
-    genesis_counts: bool = True
+    #: Whether what the journal says is mine may be used: not before all that live have answered after a start.
+    is_synced: bool = True
     #: Nodes asked for all that they vouch for that have not ended their answer: what they say they hold is believed.
     asked: set[int] = field(default_factory=set)
     #: Words that came to nothing, by reason: the holon's own count; and who claimed a right of mine how often.
@@ -167,9 +135,15 @@ class TokenBook:
 
     def holds(self, key: TokenKey) -> bool:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
-        if key in self.held:
-            return True
-        return self.genesis_counts and self._is_own_at_first(key)
+        return self.is_synced and self.is_mine_by_journal(key)
+
+    def is_mine_by_journal(self, key: TokenKey) -> bool:
+        """Whether this node holds a token if its journal is all that ever was."""
+        return key in self.held or self._is_own_at_first(key)
+
+    def mine(self) -> list[TokenKey]:
+        """Tokens that came to this node and that it may use or give away now."""
+        return list(self.held) if self.is_synced else []
 
     def holder_of(self, key: TokenKey) -> int:
         """Who holds a token as far as this node heard: exact for its own, a hint for others."""
@@ -179,13 +153,17 @@ class TokenBook:
         """The newest version of a token that is known for sure, 0 where it never moved."""
         return max(self.seen.get(key, 0), self.beliefs.of(key).version)
 
+    def own_version(self, key: TokenKey) -> int:
+        """The version under which this node holds a token, or gave it away last; 0 where it never had it but first."""
+        return self.held.get(key, self.seen.get(key, 0))
+
     def is_known(self, key: TokenKey) -> bool:
         """Whether anything was ever heard of a token."""
         return key in self.seen or key in self.beliefs.verified or key in self.beliefs.hints
 
-    def trust_genesis(self) -> None:
-        """Nobody knew an earlier life of this node: what the site file gives it first is its own."""
-        self.genesis_counts = True
+    def trust(self) -> None:
+        """Nobody knows better than the journal: what it says is mine, and what the site file gives me first, is."""
+        self.is_synced = True
         self.changes += 1
 
     def create(self, key: TokenKey) -> list[Effect]:
@@ -209,7 +187,7 @@ class TokenBook:
 
     def want(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Ask for a token until it is granted or no longer wanted. Nothing happens where it is held or asked for."""
-        if key in self.held or key in self.wanted or self._is_own_at_first(key):
+        if self.is_mine_by_journal(key) or key in self.wanted:
             return []
         self.wanted[key] = now_us
         self.changes += 1
@@ -229,7 +207,7 @@ class TokenBook:
         """
         if not self.holds(key):
             raise ValueError(f"node {self.node_id} gives {key} which it does not hold")
-        version = self._own_version(key) + 1
+        version = self.own_version(key) + 1
         if version > MAX_VERSION:
             raise ValueError(f"{key} has no version left after {MAX_VERSION}: regenerate the tokens of this site")
         self.held.pop(key, None)
@@ -245,7 +223,7 @@ class TokenBook:
     def on_request(self, request: TokenRequest, verdict: Reason, now_us: int) -> list[Effect]:
         """Answer a request for a token held here: ``verdict`` NONE grants, any other reason refuses and says so."""
         key = TokenKey(request.token_kind, request.token)
-        pending = self.leaving.get(key)
+        pending = self.leaving.get(key) if self.is_synced else None
         if pending is not None and pending.holder == request.sender:
             if now_us < pending.repeat_at_us - self.site.timing.token_repeat_us + IN_FLIGHT_US:
                 return []
@@ -254,7 +232,7 @@ class TokenBook:
             return []
         if verdict is Reason.NONE:
             return self.give(key, request.sender, now_us)
-        version = _told(self._own_version(key))
+        version = _told(self.own_version(key))
         return [Send(TokenRefusal(self.node_id, key.kind, key.number, version, request.sender, verdict))]
 
     def on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
@@ -273,7 +251,7 @@ class TokenBook:
         key = TokenKey(statement.token_kind, statement.token)
         sender, version = statement.sender, statement.version
         if self.holds(key):
-            is_old = version < self._own_version(key)
+            is_old = version < self.own_version(key)
             return self._tell_seen(key, now_us) if is_old else self._claimed(key, sender, now_us)
         belief = self.beliefs.of(key)
         if belief == (version, sender, True):
@@ -321,9 +299,18 @@ class TokenBook:
         """What this node holds away from the site file's first holders, said for a node that asks."""
         return [Send(TokenHeld(self.node_id, key.kind, key.number, version)) for key, version in self.held.items()]
 
+    def testimony(self) -> list[Effect]:
+        """What the journal says that this node holds and has under way, for others to compare with what they know."""
+        gone = [
+            Send(TokenGiven(self.node_id, *key, grant.version, grant.holder)) for key, grant in self.leaving.items()
+        ]
+        return [*self.statements(), *gone]
+
     def wake(self, now_us: int) -> list[Effect]:
         """Say again what has waited long enough: wanted tokens, and grants whose receiver was not heard."""
         effects: list[Effect] = []
+        if not self.is_synced:
+            return effects
         repeat_us = self.site.timing.token_repeat_us
         for key, due_us in self.wanted.items():
             if due_us <= now_us:
@@ -338,6 +325,8 @@ class TokenBook:
 
     def next_wake(self) -> int | None:
         """When something falls due to be said again, bus time in us."""
+        if not self.is_synced:
+            return None
         times = [*self.wanted.values(), *(grant.repeat_at_us for grant in self.leaving.values())]
         return min(times) if times else None
 
@@ -356,10 +345,6 @@ class TokenBook:
             found = self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
         return found
 
-    def _own_version(self, key: TokenKey) -> int:
-        """The version under which I hold a token; one never seen to move has 0."""
-        return self.held.get(key, self.seen.get(key, 0))
-
     def _hold(self, key: TokenKey, version: int) -> None:
         self.held[key] = self.seen[key] = version
         self.beliefs.take_up(key, version, self.node_id, confirmed=True)
@@ -368,6 +353,8 @@ class TokenBook:
         self.forget(key)
 
     def _offered(self, key: TokenKey, grant: TokenGrant, now_us: int) -> list[Effect]:
+        if not self.is_synced:
+            return []
         if grant.version <= self.seen.get(key, 0):
             # A repeated grant of what I accepted means that my statement was lost.
             return self._answer(key, now_us)
@@ -394,7 +381,7 @@ class TokenBook:
     def _overheard(self, key: TokenKey, giver: int, version: int, holder: int, now_us: int) -> list[Effect]:
         """``giver`` says that it gave a token to ``holder``: believed of whom I believe to have held it."""
         if self.holds(key):
-            return self._claimed(key, giver, now_us) if version > self._own_version(key) else []
+            return self._claimed(key, giver, now_us) if version > self.own_version(key) else []
         belief = self.beliefs.of(key)
         if version <= belief.version or holder == self.node_id:
             # What is given to me comes with its grant.
@@ -433,8 +420,8 @@ class TokenBook:
         given = self.given.get(key)
         word: Message
         if self.holds(key):
-            word = TokenHeld(self.node_id, key.kind, key.number, self._own_version(key))
-        elif given is not None and key not in self.held:
+            word = TokenHeld(self.node_id, key.kind, key.number, self.own_version(key))
+        elif given is not None and self.is_synced:
             word = TokenGiven(self.node_id, key.kind, key.number, given.version, given.holder)
         else:
             return []
@@ -442,7 +429,9 @@ class TokenBook:
 
     def _tell_seen(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Somebody says that it holds a token under a version older than I know."""
-        version, holder, _ = (self._own_version(key), self.node_id, True) if self.holds(key) else self.beliefs.of(key)
+        version, holder, _ = self.beliefs.of(key)
+        if self.is_mine_by_journal(key):
+            version, holder = self.own_version(key), self.node_id
         word = TokenSeen(self.node_id, key.kind, key.number, version, holder)
         return self._once(key, word, self.site.timing.token_repeat_us, now_us)
 

@@ -36,6 +36,7 @@ from onboard.core.presence import Presence
 from onboard.core.rights import Rights
 from onboard.core.serial import is_newer
 from onboard.core.site import Machine, Site
+from onboard.core.witness import Witness
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
 DIGEST_PATIENCE = 2
@@ -71,8 +72,6 @@ class Holon:
         entries = tuple(entries)
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
-        self.tokens.genesis_counts = self._has_past
-        self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
         for entry in entries:
             if entry.get("record") in ("blocked", "clear"):
@@ -91,7 +90,8 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
-        self.rights = Rights(self.fleet, self.behaviour.may_grant)
+        self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements)
+        self.rights = Rights(self.fleet, self.behaviour.may_grant, self.witness)
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
         self._mismatches: Counter[int] = Counter()
@@ -118,9 +118,6 @@ class Holon:
 
     def start(self, local_us: int) -> list[Effect]:
         """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
-        if not self._has_past:
-            # A first life, or a lost journal: peers that knew an earlier one have so long to say so.
-            self._trust_at_us = local_us + self.site.timing.heartbeat_us
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self._elect_time_source(local_us)
         now_us = self.clock.bus_us(local_us)
@@ -128,7 +125,7 @@ class Holon:
         effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
         effects += self.behaviour.start(now_us)
         effects += self._beat(now_us)
-        effects.append(Send(SyncRequest(self.node_id, NOBODY)))
+        effects += self.witness.begin(now_us)
         return self._settle(effects, now_us)
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
@@ -163,17 +160,15 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         self._elect_time_source(local_us)
-        if self._trust_at_us is not None and self._trust_at_us <= local_us:
-            self._trust_at_us = None
-            self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
-        effects = self._awake(now_us) + self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
+        effects = self._awake(now_us) + self.witness.wake(now_us)
+        effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self._heartbeat_due_us = now_us
-        if not self._bus_time_lost and not self.presence.is_held:
+        if not self._bus_time_lost and not self._is_still:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self._beat(now_us)
         return self._settle(effects, now_us)
@@ -183,16 +178,20 @@ class Holon:
         times = [
             self._heartbeat_due_us,
             self._bus_time_due_us,
+            self.witness.next_wake(),
             self.tokens.next_wake(),
             self.rights.petition_due(),
             self.presence.held_until_us,
-            None if self.presence.is_held else self._negotiation_due(),
-            None if self.presence.is_held else self.behaviour.next_wake(),
+            None if self._is_still else self._negotiation_due(),
+            None if self._is_still else self.behaviour.next_wake(),
         ]
         due = [self.clock.local_us(time) for time in times if time is not None]
-        if self._trust_at_us is not None:
-            due.append(self._trust_at_us)
         return min(due) if due and self.halted is None else None
+
+    @property
+    def _is_still(self) -> bool:
+        """Whether this machine begins nothing: it is an obstacle, or was started again and not all have answered."""
+        return self.presence.is_held or (self._has_past and not self.witness.is_over)
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
@@ -200,7 +199,7 @@ class Holon:
             return []
         self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
         # One by one: all are asked at power-up only.
-        asked: list[Effect] = [Send(SyncRequest(self.node_id, node)) for node in self.mirror.peers]
+        asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
@@ -213,14 +212,19 @@ class Holon:
             machine = self.site.machines.get(message.sender)
             if machine is None or machine.kind in MOBILE_KINDS:
                 self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-            elif self.clock.adopt(message.bus_time_us, local_us):
+                return []
+            before_us = self.clock.bus_us(local_us)
+            if self.clock.adopt(message.bus_time_us, local_us):
+                self.witness.shift(self.clock.bus_us(local_us) - before_us)
                 self._heartbeat_due_us = self._bus_time_due_us = self.clock.bus_us(local_us)
             return []
         if self.machine.kind not in MOBILE_KINDS and self.clock.refutes(message.bus_time_us, local_us):
             return [Send(BusTime(self.node_id, self.clock.bus_us(local_us) % BUS_TIME_MODULUS))]
         first = not self.clock.is_set
         self._bus_time_lost = False
+        before_us = self.clock.bus_us(local_us)
         self.clock.heard(message.bus_time_us, local_us)
+        self.witness.shift(self.clock.bus_us(local_us) - before_us)
         effects: list[Effect] = []
         if first:
             now_us = self.clock.bus_us(local_us)
@@ -253,7 +257,7 @@ class Holon:
     def _may_not_bid(self, now_us: int) -> Reason:
         if self.clock.is_lost(self.clock.local_us(now_us)):
             return Reason.BUS_TIME_LOST
-        if self.presence.is_held or self.behaviour.state in (
+        if self._is_still or self.behaviour.state in (
             MachineState.OBSTACLE,
             MachineState.STOPPED,
             MachineState.STARTING,
@@ -284,7 +288,8 @@ class Holon:
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self._elect_time_source(self.clock.local_us(now_us))
         if fresh:
-            return [Send(SyncRequest(self.node_id, beat.sender, self.mirror.boots_before[beat.sender]))]
+            self.witness.on_fresh(beat.sender)
+            return self.witness.ask(beat.sender, self.mirror.boots_before[beat.sender])
         if beat.mirror_digest == self.mirror.digest():
             del self._mismatches[beat.sender]
             return []
@@ -292,7 +297,7 @@ class Holon:
         if self._mismatches[beat.sender] < DIGEST_PATIENCE:
             return []
         del self._mismatches[beat.sender]
-        return [Send(SyncRequest(self.node_id, beat.sender))]
+        return self.witness.ask(beat.sender)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
@@ -302,7 +307,7 @@ class Holon:
                 f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
                 "a person must regenerate its tokens"
             )
-        effects = self.behaviour.statements(now_us) + self._blocked_again()
+        effects = self.witness.on_request(request.sender, now_us)
         known = self.mirror.peers.get(request.sender)
         if (
             request.whom == NOBODY
@@ -310,11 +315,14 @@ class Holon:
             and known.since_us + self.site.timing.heartbeat_us // 2 < now_us
         ):
             # All are asked at power-up only: I knew it before, even where its counter is the same again.
-            effects.append(Send(SyncRequest(self.node_id, request.sender, known.boot)))
+            effects += self.witness.ask(request.sender, known.boot)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
             effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
         return effects
+
+    def _statements(self, now_us: int) -> list[Effect]:
+        return self.behaviour.statements(now_us) + self._blocked_again()
 
     def _has_forgotten(self, request: SyncRequest) -> bool:
         """Whether my journal lacks a life that a peer knew: tokens that I gave away then would seem to be mine."""
@@ -342,14 +350,25 @@ class Holon:
 
     def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
+        effects = effects + self._doubts()
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
-        for _ in range(0 if self.presence.is_held else MAX_ROUNDS):
+        for _ in range(0 if self._is_still else MAX_ROUNDS):
             more = self.behaviour.advance(now_us)
             if not more:
                 return effects
             effects = effects + more
-        return effects if self.presence.is_held else effects + self._halt("the machine's steps do not come to rest")
+        return effects if self._is_still else effects + self._halt("the machine's steps do not come to rest")
+
+    def _doubts(self) -> list[Effect]:
+        """Somebody knows that the journal is old: nothing of it is used any more."""
+        doubt = self.witness.doubt
+        if doubt is None:
+            return []
+        return self._halt(
+            f"the journal is lost or old ({doubt.reason.name}): node {doubt.cause} knows version {doubt.version} of "
+            f"{doubt.key.kind.name} {doubt.key.number}; a person must regenerate its tokens"
+        )
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []

@@ -20,8 +20,9 @@ from onboard.core.messages import (
     TokenRefusal,
     TokenRequest,
 )
-from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
+from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
+from onboard.core.witness import Witness
 
 #: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
 ASK_AGAIN_US = 1_000_000
@@ -36,6 +37,7 @@ class Rights:
 
     fleet: Fleet
     may_grant: Callable[[TokenKey, int, int], Reason]
+    witness: Witness
     _asked_again_us: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -55,11 +57,13 @@ class Rights:
             TokenDispute: self._on_dispute,
             TokenGiven: self._on_given,
             TokenSeen: self._on_seen,
+            SyncDone: self.witness.on_done,
         }
 
     def _on_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
         key = TokenKey(request.token_kind, request.token)
         self.petitions.hear(key, request, now_us)
+        self.witness.hear(request)
         if not self.tokens.holds(key):
             return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
         verdict = self.may_grant(key, request.sender, now_us)
@@ -106,6 +110,7 @@ class Rights:
         key = TokenKey(grant.token_kind, grant.token)
         if not self._may_move(key, grant.holder):
             return []
+        self.witness.hear(grant)
         if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):
             if key.kind is TokenKind.SEGMENT:
                 self.mirror.order.on_return(grant.sender, Segment(key.number >> 8, key.number & 0xFF))
@@ -116,15 +121,20 @@ class Rights:
         key = TokenKey(statement.token_kind, statement.token)
         if not self._may_move(key, statement.sender):
             return []
+        self.witness.hear(statement)
         self.petitions.close(key, statement.sender)
         return self._after(key, self.tokens.on_held(statement, now_us), now_us)
 
     def _on_given(self, word: TokenGiven, now_us: int) -> list[Effect]:
         key = TokenKey(word.token_kind, word.token)
-        return self._after(key, self.tokens.on_given(word, now_us), now_us) if self._may_move(key, word.holder) else []
+        if not self._may_move(key, word.holder):
+            return []
+        self.witness.hear(word)
+        return self._after(key, self.tokens.on_given(word, now_us), now_us)
 
     def _on_seen(self, word: TokenSeen, now_us: int) -> list[Effect]:
         if self._may_move(TokenKey(word.token_kind, word.token), word.holder):
+            self.witness.hear(word)
             self.tokens.on_seen(word)
         return []
 

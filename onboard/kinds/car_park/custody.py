@@ -96,7 +96,7 @@ def give_back(fleet: Fleet, needed: Container[TokenKey], now_us: int) -> list[Ef
     A car goes with the word where it stands; one that is aboard, or that nobody has told of, is kept.
     """
     effects: list[Effect] = []
-    for key in [key for key in fleet.tokens.held if key.kind is not TokenKind.SEGMENT and key not in needed]:
+    for key in [key for key in fleet.tokens.mine() if key.kind is not TokenKind.SEGMENT and key not in needed]:
         if key.kind is TokenKind.STATION:
             effects += fleet.tokens.give(key, keeper(fleet.site, Station.from_number(key.number)), now_us)
             continue

@@ -263,7 +263,7 @@ class Vehicle:
         tokens = self.fleet.tokens
         for key in [one for one in tokens.wanted if one.kind is TokenKind.SEGMENT and one not in keep]:
             tokens.forget(key)
-        for key in [one for one in tokens.held if one.kind is TokenKind.SEGMENT and one not in keep]:
+        for key in [one for one in tokens.mine() if one.kind is TokenKind.SEGMENT and one not in keep]:
             effects += tokens.give(key, self.site.stewards[key.number >> 8], now_us)
         return effects
 
