@@ -14,6 +14,7 @@ from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon
 from onboard.core.serial import next_boot
+from onboard.core.site import journal_owner
 from onboard.gateway.options import add_mqtt_arguments
 from onboard.gateway.settings import GatewayError
 from onboard.io.broker_address import is_mqtt_installed
@@ -168,11 +169,16 @@ async def run(
     config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path, gateway: GatewayMaker | None = None
 ) -> int:
     """Run until stopped: 0 where a signal ended it, 1 where the controller or its bus ended it."""
-    journal = FileJournal(journal_directory)
+    journal = FileJournal(journal_directory, journal_owner(config.site, config.machine))
     entries = journal.replay()
     boot = next_boot(entries)
     holon = Holon(
-        config.site, config.machine, factory_for(config.site, config.machine.kind), boot=boot, entries=entries
+        config.site,
+        config.machine,
+        factory_for(config.site, config.machine.kind),
+        boot=boot,
+        entries=entries,
+        journal=journal.condition,
     )
     fleet_bus = device_bus = await open_bus(fleet_settings)
     device_settings = BusSettings.of(config.device_bus)

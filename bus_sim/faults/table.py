@@ -4,6 +4,8 @@ from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Final, NamedTuple
 
+from bus_sim.faults.journals import HARMS
+
 Value = str | int | float
 
 
@@ -146,8 +148,8 @@ KINDS: Final[Mapping[str, Kind]] = {
             frame=_count("a whole number, 0 for none", 0),
             write=_count("a whole number, 0 for none", 0),
             durable=_one_of("no", "yes"),
-            journal=_one_of("kept", "lost", "torn", "rolled_back"),
-            entries=_count("how many journal entries are rolled back", 10, 1),
+            journal=_one_of(*HARMS),
+            entries=_count("how many entries are cut off or rolled back, or which from the end is flipped", 10, 1),
         ),
     ),
     "pause": Kind(

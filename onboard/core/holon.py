@@ -13,6 +13,7 @@ from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.journal_state import INTACT, JournalCondition
 from onboard.core.messages import (
     Award,
     Bid,
@@ -61,8 +62,11 @@ class Holon:
         *,
         boot: int = 1,
         entries: Iterable[Mapping[str, str | int]] = (),
+        journal: JournalCondition = INTACT,
     ) -> None:
         self.site = site
+        #: How the journal was found; its ``entries`` are all that there ever were only where it is reliable.
+        self.journal = journal
         self.machine = machine
         self.node_id = machine.node_id
         self.boot = boot
@@ -126,7 +130,12 @@ class Holon:
     # --- events in ---------------------------------------------------------------------------------------------
 
     def start(self, local_us: int) -> list[Effect]:
-        """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
+        """First effects after power-up: the boot counter to the journal, then the first heartbeat.
+
+        Where the journal lacks what was once confirmed, the machine says so and holds: it cannot know its rights.
+        """
+        if not self.journal.is_reliable:
+            return self._without_journal()
         if not self._has_past:
             # A first life, or a lost journal: peers that knew an earlier one have so long to say so.
             self._trust_at_us = local_us + self.site.timing.heartbeat_us
@@ -139,6 +148,15 @@ class Holon:
         effects += self._beat(now_us)
         effects.append(Send(SyncRequest(self.node_id, NOBODY)))
         return self._settle(effects, now_us)
+
+    def _without_journal(self) -> list[Effect]:
+        """Rights that were given away since would seem to be mine: none is used, and nothing is written."""
+        missing = self.journal.missing
+        told = Diagnostic(self.node_id, Reason.JOURNAL_LOST, 1 if missing is None else max(1, missing))
+        return [
+            Send(told),
+            *self._halt(f"{self.journal.why}; a person must regenerate its rights, or bring its own journal back"),
+        ]
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""

@@ -14,6 +14,7 @@ from pathlib import Path
 CORE_TYPES = (
     "onboard.core.codes",
     "onboard.core.frame",
+    "onboard.core.journal_state",
     "onboard.core.messages",
     "onboard.core.serial",
     "onboard.core.site",
