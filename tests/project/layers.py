@@ -16,6 +16,7 @@ CORE_TYPES = (
     "onboard.core.frame",
     "onboard.core.journal_state",
     "onboard.core.messages",
+    "onboard.core.recovery_messages",
     "onboard.core.serial",
     "onboard.core.site",
 )
