@@ -28,6 +28,7 @@ from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError
+from onboard.io.signals import terminated_as_interrupted
 from onboard.web.address import WebError
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.site_dbc import site_dbc
@@ -210,7 +211,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
-        return COMMANDS[args.command](args)
+        with terminated_as_interrupted():
+            return COMMANDS[args.command](args)
     except (
         ConfigError,
         WebError,
@@ -227,6 +229,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except BrokenPipeError:
         return 1
+    except KeyboardInterrupt:
+        return 130
 
 
 def _sites(args: argparse.Namespace) -> int:

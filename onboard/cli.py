@@ -22,6 +22,7 @@ from onboard.io.console import ConsoleTelemetry, ManyTelemetry
 from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
+from onboard.io.signals import terminated_as_interrupted
 from onboard.io.watchdog import SystemdWatchdog
 from onboard.kinds.registry import factory_for, system_of
 from onboard.ports.broker import BrokerError
@@ -130,7 +131,8 @@ def _beside(args: argparse.Namespace, config: MachineConfig) -> GatewayMaker:
 def _trace(words: list[str]) -> int:
     from onboard.trace.cli import main as trace  # noqa: PLC0415  # a controller must not carry it
 
-    return trace(words)
+    with terminated_as_interrupted():
+        return trace(words)
 
 
 def _networkd(config: MachineConfig, fleet_settings: BusSettings, to: Path) -> int:

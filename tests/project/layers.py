@@ -134,7 +134,7 @@ LAYERS: dict[str, Layer] = {
     "deploy": Layer(
         (
             *("onboard", "onboard.config", *CORE_TYPES, "onboard.io.journal", "onboard.wire"),
-            *("hil.guest.initrd", "hil.guest.kernel"),
+            *("hil.guest.effort", "hil.guest.initrd", "hil.guest.kernel"),
         ),
         ("pytest",),
     ),
