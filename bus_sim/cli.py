@@ -23,6 +23,7 @@ from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names, site_text
 from bus_sim.systems.registry import RUNNERS, SystemOptions
+from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
@@ -227,6 +228,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
         return 2
+    except (StandstillError, DeadlockError) as error:
+        print(f"bus-sim: {error}", file=sys.stderr)
+        return 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt:

@@ -9,6 +9,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from onboard.controller.rest import Rest
 from onboard.core.codes import Reason
 from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
 from onboard.core.frame import Frame
@@ -50,6 +51,8 @@ class Controller:
         self._writing: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._timer_us: int | None = None
+        #: Whether its wakes come to rest; a run in simulated time ends with a machine whose wakes do not.
+        self.rest = Rest()
 
     def start(self) -> None:
         """Join both buses and let the holon begin. To be called on the running loop."""
@@ -127,8 +130,11 @@ class Controller:
         if self._writing is not None:
             return
         self.holon.wire_drops = self.wire_drops()
-        self._guarded(lambda: self._outbox.extend(self.holon.wake(self._now_us())))
-        self.ports.watchdog.alive()
+        now_us = self._now_us()
+        self.rest.woke(now_us)
+        self._guarded(lambda: self._outbox.extend(self.holon.wake(now_us)))
+        if not self.rest.is_in_doubt:
+            self.ports.watchdog.alive()
         self._carry_out()
 
     # --- effects out -------------------------------------------------------------------------------------------
@@ -195,6 +201,10 @@ class Controller:
         """One timer for the holon's next wish; a later wish leaves an earlier timer in place."""
         due_us = self.holon.next_wake()
         if due_us is None or (self._timer_us is not None and self._timer_us <= due_us):
+            return
+        self.rest.due(due_us)
+        if self.rest.is_broken:
+            self._halt(self.rest.why)
             return
         if self._timer is not None:
             self._timer.cancel()

@@ -95,7 +95,7 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
-        self.rights = Rights(self.fleet, self.behaviour.may_grant)
+        self.rights = Rights(self.fleet, lambda key, requester, now_us: self.behaviour.may_grant(key, requester, now_us))
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
         self._mismatches: Counter[int] = Counter()
