@@ -384,6 +384,7 @@ class Holon:
             self.presence.review(now_us)
             effects.append(Send(self._heartbeat()))
             effects += self._diagnostics()
+            effects += self.fleet.forgotten()
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
             effects.append(Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)))
