@@ -24,7 +24,7 @@ from onboard.core.holon import Holon
 from onboard.core.messages import Message
 from onboard.core.serial import next_boot
 from onboard.core.site import Machine, Site, journal_owner
-from onboard.kinds.registry import factory_for, system_of
+from onboard.kinds.registry import compaction_for, factory_for, system_of
 from onboard.ports.bus import Bus
 from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
@@ -142,6 +142,7 @@ class BusRun:
             journal,
             self.log,
             NoWatchdog(),
+            compaction_for(self.site),
         )
         controller = Controller(holon, ports, self.codecs.fleet, self.codecs.device)
         self.controllers[machine.node_id] = controller

@@ -24,7 +24,7 @@ from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.io.signals import terminated_as_interrupted
 from onboard.io.watchdog import SystemdWatchdog
-from onboard.kinds.registry import factory_for, system_of
+from onboard.kinds.registry import compaction_for, factory_for, system_of
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
 from onboard.web.address import is_installed as is_web_installed
@@ -195,7 +195,7 @@ async def run(
         telemetry = ManyTelemetry(telemetry, beside)
         published = asyncio.get_running_loop().create_task(beside.run())
         published.add_done_callback(_tell_ended)
-    ports = Ports(fleet_bus, device_bus, journal, telemetry, SystemdWatchdog())
+    ports = Ports(fleet_bus, device_bus, journal, telemetry, SystemdWatchdog(), compaction_for(config.site))
     controller = Controller(holon, ports, codec.fleet, codec.device)
     controller.start()
     status, why = await _until_ended(controller, fleet_bus, device_bus)

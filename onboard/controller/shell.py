@@ -10,12 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from onboard.controller.rest import Rest
-from onboard.core.codes import Reason
+from onboard.core.codes import MachineState, Reason
 from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.ports.bus import Bus
-from onboard.ports.journal import Journal
+from onboard.ports.journal import Compaction, Journal
 from onboard.ports.telemetry import Telemetry
 from onboard.ports.watchdog import Watchdog
 from onboard.wire.codec import Codec
@@ -34,6 +34,8 @@ class Ports:
     journal: Journal
     telemetry: Telemetry
     watchdog: Watchdog
+    #: What the journal may leave out when it has grown; None: nothing ever.
+    fewer: Compaction | None = None
 
 
 class Controller:
@@ -42,6 +44,7 @@ class Controller:
     def __init__(self, holon: Holon, ports: Ports, fleet: Codec, device: Codec) -> None:
         self.holon = holon
         self.ports = ports
+        self._fewer = ports.fewer
         self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
         self._codecs = (fleet, device)
@@ -150,8 +153,15 @@ class Controller:
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
         self._guarded(self._work_off)
+        if self._writing is None and self._may_compact():
+            self._writing = self._loop.create_task(self._compact())
         if self._writing is None:
             self._set_timer()
+
+    def _may_compact(self) -> bool:
+        """Nothing waits and nothing moves: whoever needs this machine's word meanwhile waits so long."""
+        is_idle = self.holon.halted is None and self.holon.behaviour.state is MachineState.IDLE
+        return self._fewer is not None and is_idle and self.ports.journal.has_grown
 
     def _work_off(self) -> None:
         while self._writing is None:
@@ -185,6 +195,17 @@ class Controller:
             # What cannot be made durable must not be said: the machine stops where its authority still holds.
             self._outbox.clear()
             self._halt(f"the journal cannot be written: {error}")
+        self._writing = None
+        self._carry_out()
+
+    async def _compact(self) -> None:
+        assert self._fewer is not None
+        try:
+            await self.ports.journal.compact(self._fewer)
+        except OSError as error:
+            # The old records stand, so nothing is lost; it is tried again in this machine's next life.
+            self._fewer = None
+            self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"journal not shortened: {error}")
         self._writing = None
         self._carry_out()
 

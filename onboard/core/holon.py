@@ -13,7 +13,7 @@ from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.journal_state import INTACT, JournalCondition
+from onboard.core.journal_state import INTACT, JournalCondition, reason_of
 from onboard.core.messages import (
     Award,
     Bid,
@@ -34,6 +34,7 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
 from onboard.core.presence import Presence
+from onboard.core.recovery_messages import Halted
 from onboard.core.rights import Rights
 from onboard.core.serial import is_newer
 from onboard.core.site import Machine, Site
@@ -142,12 +143,10 @@ class Holon:
 
     def _without_journal(self) -> list[Effect]:
         """Rights that were given away since would seem to be mine: none is used, and nothing is written."""
-        missing = self.journal.missing
-        told = Diagnostic(self.node_id, Reason.JOURNAL_LOST, 1 if missing is None else max(1, missing))
-        return [
-            Send(told),
-            *self._halt(f"{self.journal.why}; a person must regenerate its rights, or bring its own journal back"),
-        ]
+        # The journal's newest life is not known, so neither is this one: boot 0.
+        said = Halted(self.node_id, self.node_id, reason_of(self.journal), NOBODY, needs_person=True, boot=0)
+        why = f"{self.journal.why}; a person must regenerate its rights, or bring its own journal back"
+        return [Send(said), *self._halt(why)]
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
@@ -385,6 +384,7 @@ class Holon:
             self.presence.review(now_us)
             effects.append(Send(self._heartbeat()))
             effects += self._diagnostics()
+            effects += self.fleet.forgotten()
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
             effects.append(Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)))

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.core.codes import Reason
+
 
 class JournalState(Enum):
     """How a journal was found. Only ``SHORT`` and ``FOREIGN`` take the machine's rights away.
@@ -40,3 +42,10 @@ class JournalCondition:
 
 #: Nothing to tell.
 INTACT = JournalCondition()
+
+
+def reason_of(condition: JournalCondition) -> Reason:
+    """What a machine says of a journal on the bus; NONE where it is reliable."""
+    if condition.is_reliable:
+        return Reason.NONE
+    return Reason.JOURNAL_FOREIGN if condition.state is JournalState.FOREIGN else Reason.JOURNAL_SHORT

@@ -9,7 +9,8 @@ from bus_sim.run import Simulation
 from onboard.core.codes import DeskInput, DoorName, DoorPosition, Reason
 from onboard.core.frame import Frame
 from onboard.core.journal_state import JournalState
-from onboard.core.messages import DeskEvent, Diagnostic, DriveOrder, DriveState, Heartbeat
+from onboard.core.messages import DeskEvent, DriveOrder, DriveState, Heartbeat
+from onboard.core.recovery_messages import Halted
 from onboard.ports.bus import ErrorState
 from tests.faults.world import Seen, watch
 
@@ -160,12 +161,14 @@ def test_a_journal_can_suffer_in_a_crash(journal: str, state: JournalState, lost
     assert found.condition.state is state
 
 
-@pytest.mark.parametrize("journal", ["unsealed", "foreign"])
-def test_a_machine_whose_journal_is_not_reliable_says_so_and_holds(journal: str) -> None:
+@pytest.mark.parametrize(
+    ("journal", "reason"), [("unsealed", Reason.JOURNAL_SHORT), ("foreign", Reason.JOURNAL_FOREIGN)]
+)
+def test_a_machine_whose_journal_is_not_reliable_says_so_and_holds(journal: str, reason: Reason) -> None:
     seen = watch(f"crash:target=MR1,at_s=59,restart_s=1,journal={journal}", seconds=80)
     said = [message for time, message in seen.fleet if message.sender == ROBOT and time > 60_000_000]
-    assert [type(one) for one in said] == [Diagnostic]
-    assert isinstance(said[0], Diagnostic) and said[0].reason is Reason.JOURNAL_LOST
+    assert {type(one) for one in said} == {Halted}
+    assert isinstance(said[0], Halted) and (said[0].machine, said[0].reason) == (ROBOT, reason)
     assert "regenerate its rights" in str(seen.simulation.controllers[ROBOT].holon.halted)
 
 
