@@ -44,6 +44,7 @@ class Controller:
         self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
         self._codecs = (fleet, device)
+        holon.listen(fleet.speakers)
         self._decoders = (Decoder(fleet), Decoder(device))
         self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
         self._outbox: deque[Effect] = deque()

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
@@ -27,6 +28,7 @@ from onboard.core.messages import (
     Itinerary,
     Message,
     Progress,
+    Speakers,
     SyncRequest,
     TaskReport,
 )
@@ -66,6 +68,7 @@ class Holon:
         self.drops: Counter[Reason] = Counter()
         self.wire_drops: Counter[Reason] = Counter()
         self._told_drops: Counter[Reason] = Counter()
+        self.admission = Admission(site)
         self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
         entries = tuple(entries)
@@ -131,14 +134,21 @@ class Holon:
         effects.append(Send(SyncRequest(self.node_id, NOBODY)))
         return self._settle(effects, now_us)
 
+    def listen(self, speakers: Speakers) -> None:
+        """From now on only who may say a message, by the contract of the wire, is heard with it."""
+        self.admission.speakers = speakers
+
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
-        if isinstance(message, BusTime):
-            return self._on_bus_time(message, local_us)
-        now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
             self.drops[Reason.DUPLICATE_NODE_ID] += 1
             return self._halt("another node sends under this node-ID")
+        why = self.admission.why_not(message)
+        if why is not Reason.NONE:
+            return self._pass_over(message, why)
+        if isinstance(message, BusTime):
+            return self._on_bus_time(message, local_us)
+        now_us = self.clock.bus_us(local_us)
         if message.sender in self.presence.foreign and not isinstance(message, _OF_FOREIGNERS):
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
@@ -150,6 +160,13 @@ class Holon:
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
         return self._settle(effects, now_us)
+
+    def _pass_over(self, message: Message, why: Reason) -> list[Effect]:
+        """What its sender may not say is as if it had not been heard; who it is, people are told once."""
+        self.drops[why] += 1
+        if self.halted is not None or not self.admission.is_first(message.sender, why):
+            return []
+        return [Report(f"{type(message).__name__} of node {message.sender} passed over: {why.name}")]
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
@@ -204,8 +221,6 @@ class Holon:
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
-        if message.sender == self.node_id:
-            return self._halt("another node sends under this node-ID")
         if message.sender in self.presence.foreign:
             return []
         if not self._is_time_source(message.sender):
