@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from onboard.core.admission import Admission
+from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import BusTime, Message
 from onboard.core.site import Site
@@ -147,6 +149,8 @@ class Checks:
         self._disturbed = disturbed
         self._codecs = (fleet or fleet_codec(), device or device_codec())
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
+        #: What no machine listens to says nothing about the fleet.
+        self._admission = Admission(site, self._codecs[0].speakers) if site is not None else None
         self.verdict = Verdict(tuple(rule for rule in rules if not self._why_not(rule)))
         self.verdict.left_out = {rule.name: why for rule in rules if (why := self._why_not(rule))}
         self._last_us: int | None = None
@@ -183,6 +187,11 @@ class Checks:
         decoder = fleet if self._codecs[0].name_of(frame) is not None else device
         before = decoder.drops.total()
         message = decoder.feed(frame, time_us)
+        if message is not None and decoder is fleet and self._admission is not None:
+            why = self._admission.why_not(message)
+            if why is not Reason.NONE:
+                self.verdict.unknown[why.name] += 1
+                return
         if message is not None:
             self.feed_message(time_us, message, channel, frame)
         elif decoder.drops.total() != before:
