@@ -1,7 +1,6 @@
 """Frames that are heard, said again with mistakes or late, and a flood."""
 
 from collections import deque
-from dataclasses import replace
 
 from bus_sim.attacks.attack import Attack, Node
 from onboard.core.frame import Frame
@@ -25,7 +24,7 @@ class _Frames(Attack):
 
     def as_mine(self, frame: Frame) -> Frame:
         """The frame under the attacker's number."""
-        return replace(frame, arbitration_id=frame.arbitration_id & ~_NODE_MASK | self.node.node_id)
+        return frame._replace(arbitration_id=frame.arbitration_id & ~_NODE_MASK | self.node.node_id)
 
     def with_bit_off(self, frame: Frame) -> Frame:
         """The frame with one bit of its data turned."""
@@ -34,7 +33,7 @@ class _Frames(Attack):
         bit = self.node.chance.randrange(8 * len(frame.data))
         data = bytearray(frame.data)
         data[bit // 8] ^= 1 << bit % 8
-        return replace(frame, data=bytes(data))
+        return frame._replace(data=bytes(data))
 
 
 class BitOff(_Frames):
@@ -65,7 +64,7 @@ class Mutated(_Frames):
             for _ in range(chance.randint(1, 3)):
                 frame = self.with_bit_off(frame)
             if chance.random() < 0.2:
-                frame = replace(frame, arbitration_id=frame.arbitration_id ^ 1 << chance.randrange(8, 29))
+                frame = frame._replace(arbitration_id=frame.arbitration_id ^ 1 << chance.randrange(8, 29))
             self.node.put(self.as_mine(frame))
 
 

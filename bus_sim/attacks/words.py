@@ -152,7 +152,7 @@ class Orders(_Repeated):
             yield BoxOrder(me, site.desk, self._number, box, station, 0, True)
         elif isinstance(site, FactoryGraph):
             robots = [node for node, one in site.machines.items() if one.kind is KindCode.VEHICLE]
-            stops = chance.sample(sorted(site.graph.neighbours), 2)
+            stops = tuple(chance.sample(sorted(site.graph.neighbours), 2))
             yield VisitList(me, self._number, chance.choice(robots), *five(stops))
         for compartment in getattr(site, "compartments", {}):
             for car in sorted(self._cars):
