@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from bus_sim.attacks.command import add_attack, run_attack_command
 from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.certify.command import add_certify, run_certify
@@ -82,6 +83,7 @@ def build_parser() -> argparse.ArgumentParser:
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     add_compare(commands)
     add_campaign(commands)
+    add_attack(commands)
     add_import(commands)
     add_certify(commands)
     return parser
@@ -266,6 +268,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "dbc": _dbc,
     "compare": run_compare,
     "campaign": run_campaign_command,
+    "attack": run_attack_command,
     "import": run_import,
     "certify": run_certify,
 }

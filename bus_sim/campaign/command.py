@@ -189,7 +189,7 @@ def _trials(
     jobs = args.jobs or os.cpu_count() or 1
     play_all = partial(on_dask, args.dask) if args.dask else partial(on_cores, jobs)
     if args.exhaustive is None:
-        seeds = _seeds(args.seeds)
+        seeds = read_seeds(args.seeds)
         head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
         console.print(f"{head}, {brought(site, plan.arrivals, plan.orders)} each", highlight=False)
         left = seeds if ledger is None else ledger.open_of(seeds)
@@ -240,7 +240,7 @@ def _plan_of_system(args: argparse.Namespace, site: Site) -> Plan:
     if args.faults != "none" and not kinds_for(args.faults, site):
         raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, and only a car park has them")
     orders = usual_orders(site, args.orders, args.apart)
-    with_orders(site, orders, seed=_seeds(args.seeds)[0])
+    with_orders(site, orders, seed=read_seeds(args.seeds)[0])
     return Plan(
         args.site,
         args.faults,
@@ -275,7 +275,8 @@ def _check_seconds(option: str, value: float | None) -> None:
         raise DemandError(f"--{option} {value:g}: must be above 0, and at most {LONGEST_S} seconds")
 
 
-def _seeds(text: str) -> range:
+def read_seeds(text: str) -> range:
+    """``A`` or ``A-B``. Raises ``DemandError`` for anything else."""
     first, dash, last = text.partition("-")
     if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
         raise DemandError(f"--seeds {text}: must be a seed, or the first and the last of several, such as 1-16")

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Final, NamedTuple
 
+from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.faults.journals import HARMS
 
 Value = str | int | float
@@ -138,6 +139,17 @@ KINDS: Final[Mapping[str, Kind]] = {
         Group.BUS,
         "a second board with the same machine file joins the bus",
         _one(for_s=_seconds(5.0)),
+    ),
+    "attack": Kind(
+        Group.BUS,
+        "a node that sees only the bus, under a node-ID that the site does not have, attacks it",
+        {
+            "name": _one_of(*ATTACKS)._replace(default=None),
+            "at_s": _AT,
+            "for_s": _seconds(60.0),
+            "node": _count("a node-ID", 240, 1, 255),
+            "seed": _SEED,
+        },
     ),
     "crash": Kind(
         Group.CONTROLLER,

@@ -48,6 +48,7 @@ class Controller:
         self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
         self._codecs = (fleet, device)
+        holon.listen(fleet.speakers)
         self._decoders = (Decoder(fleet), Decoder(device))
         self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
         self._outbox: deque[Effect] = deque()
@@ -56,6 +57,8 @@ class Controller:
         self._timer_us: int | None = None
         #: Whether its wakes come to rest; a run in simulated time ends with a machine whose wakes do not.
         self.rest = Rest()
+        #: Frames that the fleet bus had taken of me when it last had taken another, and when that was, us.
+        self._taken = (0, 0)
 
     def start(self) -> None:
         """Join both buses and let the holon begin. To be called on the running loop."""
@@ -133,12 +136,22 @@ class Controller:
         if self._writing is not None:
             return
         self.holon.wire_drops = self.wire_drops()
+        self.holon.is_acknowledged = self._is_acknowledged()
         now_us = self._now_us()
         self.rest.woke(now_us)
         self._guarded(lambda: self._outbox.extend(self.holon.wake(now_us)))
         if not self.rest.is_in_doubt:
             self.ports.watchdog.alive()
         self._carry_out()
+
+    def _is_acknowledged(self) -> bool:
+        """Whether the bus has taken a frame of mine within the last two heartbeat periods."""
+        if not self.holon.holding.is_apart:
+            return True
+        sent, now_us = self.ports.fleet_bus.health().sent, self._now_us()
+        if sent != self._taken[0]:
+            self._taken = sent, now_us
+        return now_us - self._taken[1] <= 2 * self.holon.site.timing.heartbeat_us
 
     # --- effects out -------------------------------------------------------------------------------------------
 
@@ -194,7 +207,7 @@ class Controller:
         except OSError as error:
             # What cannot be made durable must not be said: the machine stops where its authority still holds.
             self._outbox.clear()
-            self._halt(f"the journal cannot be written: {error}")
+            self._halt(f"the journal cannot be written: {error}", Reason.JOURNAL_LOST)
         self._writing = None
         self._carry_out()
 
@@ -209,10 +222,12 @@ class Controller:
         self._writing = None
         self._carry_out()
 
-    def _halt(self, why: str) -> None:
-        """Fall silent: the drives brake by themselves, and the tokens stay where they are."""
+    def _halt(self, why: str, reason: Reason = Reason.INVARIANT_BROKEN) -> None:
+        """Say why, and fall silent: the drives brake by themselves, and the tokens stay where they are."""
         self.holon.halted = self.holon.halted or why
         self._inbox.clear()
+        for frame in self._codecs[0].encode(self.holon.last_word(reason)):
+            self.ports.fleet_bus.send(frame)
         self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"halted: {why}")
         self.ports.watchdog.status(f"halted: {why}")
         if self.stopped is not None and not self.stopped.done():
