@@ -43,6 +43,8 @@ class Controller:
         self.ports = ports
         self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
+        #: Why it has halted; None while it has not, or where the journal could not be written.
+        self.halted_for: Reason | None = None
         self._codecs = (fleet, device)
         self._decoders = (Decoder(fleet), Decoder(device))
         self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
@@ -86,6 +88,10 @@ class Controller:
     def wire_drops(self) -> Counter[Reason]:
         """Frames of both buses that came to nothing below the holon, by reason."""
         return self._decoders[0].drops + self._decoders[1].drops + self._queue_drops
+
+    def note(self, reason: Reason) -> None:
+        """Count what befell this controller outside its decisions; it is told with the drops."""
+        self._queue_drops[reason] += 1
 
     def all_drops(self) -> Counter[Reason]:
         """All input that this machine dropped, by reason."""
@@ -139,7 +145,7 @@ class Controller:
             action()
         except Exception as error:  # noqa: BLE001  # whatever it is, going on with a broken belief would be worse
             self._outbox.clear()
-            self._halt(f"{type(error).__name__}: {error}")
+            self._halt(f"{type(error).__name__}: {error}", Reason.INVARIANT_BROKEN)
 
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
@@ -169,8 +175,8 @@ class Controller:
                 self._writing = self._loop.create_task(self._write(effect))
             case Report(text):
                 self.ports.telemetry.event(self._now_us(), self.holon.machine.name, text)
-            case Halt(why):
-                self._halt(why)
+            case Halt(why, reason):
+                self._halt(why, reason)
 
     async def _write(self, record: Record) -> None:
         try:
@@ -178,12 +184,14 @@ class Controller:
         except OSError as error:
             # What cannot be made durable must not be said: the machine stops where its authority still holds.
             self._outbox.clear()
-            self._halt(f"the journal cannot be written: {error}")
+            self._halt(f"the journal cannot be written: {error}", None)
         self._writing = None
         self._carry_out()
 
-    def _halt(self, why: str) -> None:
+    def _halt(self, why: str, reason: Reason | None) -> None:
         """Fall silent: the drives brake by themselves, and the tokens stay where they are."""
+        if self.stopped is not None and not self.stopped.done():
+            self.halted_for = reason
         self.holon.halted = self.holon.halted or why
         self._inbox.clear()
         self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"halted: {why}")

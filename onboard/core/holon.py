@@ -138,7 +138,7 @@ class Holon:
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
             self.drops[Reason.DUPLICATE_NODE_ID] += 1
-            return self._halt("another node sends under this node-ID")
+            return self._halt("another node sends under this node-ID", Reason.DUPLICATE_NODE_ID)
         if message.sender in self.presence.foreign and not isinstance(message, _OF_FOREIGNERS):
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
@@ -205,7 +205,7 @@ class Holon:
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
         if message.sender == self.node_id:
-            return self._halt("another node sends under this node-ID")
+            return self._halt("another node sends under this node-ID", Reason.DUPLICATE_NODE_ID)
         if message.sender in self.presence.foreign:
             return []
         if not self._is_time_source(message.sender):
@@ -300,7 +300,8 @@ class Holon:
         if request.whom == self.node_id and self._has_forgotten(request):
             return self._halt(
                 f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
-                "a person must regenerate its tokens"
+                "a person must regenerate its tokens",
+                Reason.JOURNAL_LOST,
             )
         effects = self.behaviour.statements(now_us) + self._blocked_again()
         known = self.mirror.peers.get(request.sender)
@@ -336,7 +337,7 @@ class Holon:
         return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
-        return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")
+        return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}", Reason.EMERGENCY_STOP)
 
     # --- inner works -------------------------------------------------------------------------------------------
 
@@ -401,11 +402,11 @@ class Holon:
         if self._bus_time_due_us is None:
             self._bus_time_due_us = now_us
 
-    def _halt(self, why: str) -> list[Effect]:
+    def _halt(self, why: str, reason: Reason = Reason.INVARIANT_BROKEN) -> list[Effect]:
         if self.halted is not None:
             return []
         self.halted = why
-        return [Halt(why)]
+        return [Halt(why, reason)]
 
     def _diagnostics(self) -> list[Effect]:
         """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""
