@@ -99,7 +99,7 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
     async with asyncio.timeout(DEADLINE_S):
         message, status, said = await scenario()
     assert isinstance(message, Heartbeat) and message.sender == 11
-    assert status == 1 and "emergency stop from node 251" in said
+    assert status == Ending.WAITS_FOR_PERSON and "emergency stop from node 251" in said
 
 
 def test_the_same_sources_give_the_same_bytes(archive: Path, tmp_path: Path) -> None:
