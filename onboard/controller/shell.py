@@ -47,6 +47,8 @@ class Controller:
         self._fewer = ports.fewer
         self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
+        #: Why it has halted; None while it has not, or where the journal could not be written.
+        self.halted_for: Reason | None = None
         self._codecs = (fleet, device)
         holon.listen(fleet.speakers)
         self._decoders = (Decoder(fleet), Decoder(device))
@@ -95,6 +97,10 @@ class Controller:
     def wire_drops(self) -> Counter[Reason]:
         """Frames of both buses that came to nothing below the holon, by reason."""
         return self._decoders[0].drops + self._decoders[1].drops + self._queue_drops
+
+    def note(self, reason: Reason) -> None:
+        """Count what befell this controller outside its decisions; it is told with the drops."""
+        self._queue_drops[reason] += 1
 
     def all_drops(self) -> Counter[Reason]:
         """All input that this machine dropped, by reason."""
@@ -161,7 +167,7 @@ class Controller:
             action()
         except Exception as error:  # noqa: BLE001  # whatever it is, going on with a broken belief would be worse
             self._outbox.clear()
-            self._halt(f"{type(error).__name__}: {error}")
+            self._halt(f"{type(error).__name__}: {error}", Reason.INVARIANT_BROKEN)
 
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
@@ -198,8 +204,8 @@ class Controller:
                 self._writing = self._loop.create_task(self._write(effect))
             case Report(text):
                 self.ports.telemetry.event(self._now_us(), self.holon.machine.name, text)
-            case Halt(why):
-                self._halt(why)
+            case Halt(why, reason):
+                self._halt(why, reason)
 
     async def _write(self, record: Record) -> None:
         try:
@@ -207,7 +213,7 @@ class Controller:
         except OSError as error:
             # What cannot be made durable must not be said: the machine stops where its authority still holds.
             self._outbox.clear()
-            self._halt(f"the journal cannot be written: {error}", Reason.JOURNAL_LOST)
+            self._halt(f"the journal cannot be written: {error}", None)
         self._writing = None
         self._carry_out()
 
@@ -222,11 +228,13 @@ class Controller:
         self._writing = None
         self._carry_out()
 
-    def _halt(self, why: str, reason: Reason = Reason.INVARIANT_BROKEN) -> None:
+    def _halt(self, why: str, reason: Reason | None) -> None:
         """Say why, and fall silent: the drives brake by themselves, and the tokens stay where they are."""
+        if self.stopped is not None and not self.stopped.done():
+            self.halted_for = reason
         self.holon.halted = self.holon.halted or why
         self._inbox.clear()
-        for frame in self._codecs[0].encode(self.holon.last_word(reason)):
+        for frame in self._codecs[0].encode(self.holon.last_word(reason or Reason.JOURNAL_LOST)):
             self.ports.fleet_bus.send(frame)
         self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"halted: {why}")
         self.ports.watchdog.status(f"halted: {why}")
@@ -240,7 +248,7 @@ class Controller:
             return
         self.rest.due(due_us)
         if self.rest.is_broken:
-            self._halt(self.rest.why)
+            self._halt(self.rest.why, Reason.RUNAWAY)
             return
         if self._timer is not None:
             self._timer.cancel()

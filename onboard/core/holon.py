@@ -522,7 +522,7 @@ class Holon:
             return []
         self.halted = why
         self.holding.halt(reason, cause)
-        return [Halt(why)]
+        return [Halt(why, reason)]
 
     def _diagnostics(self) -> list[Effect]:
         """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""

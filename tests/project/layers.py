@@ -73,7 +73,7 @@ class Layer:
     pure: bool = False
 
 
-#: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli.py`` and ``__main__.py``.
+#: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
     "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
     "onboard.kinds": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
@@ -119,7 +119,7 @@ LAYERS: dict[str, Layer] = {
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+            *("onboard.cli", "onboard.life", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
             *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),
         ),
         not_stdlib=frozenset({"random", "threading", "time"}),
@@ -190,7 +190,7 @@ def layer_of(module: str) -> str:
     """The layer that a module belongs to. Raises ``KeyError`` for a package that has no line in the table."""
     parts = module.split(".")
     if parts[0] == "onboard" and len(parts) > 1 and ".".join(parts[:2]) not in LAYERS:
-        if len(parts) > 2 or parts[1] not in ("cli", "__main__"):
+        if len(parts) > 2 or parts[1] not in ("cli", "life", "__main__"):
             raise KeyError(f"{module}: no layer; add a line to the table and to docs/decisions.md")
         return "onboard"
     for length in range(len(parts), 0, -1):

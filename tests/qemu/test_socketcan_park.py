@@ -129,7 +129,7 @@ def test_cansend_asks_and_is_answered_and_an_emergency_stop_stops_everybody(park
     assert any(isinstance(one, Itinerary) and one.sender == MACHINES["MR1"] for one in order[asked:])
     assert EmergencyStop(PERSON, Reason.OPERATOR) in order
     status = json.loads((park / "found.json").read_text())["status"]
-    assert status == {"plant": 0} | dict.fromkeys(MACHINES, 1)
+    assert status == {"plant": 0} | dict.fromkeys(MACHINES, 3)
     for name in MACHINES:
         assert f"{name}: halted: emergency stop from node {PERSON}: OPERATOR" in (park / f"{name}.txt").read_text()
 
