@@ -41,6 +41,7 @@ ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
     "moved": people.moved,
     "blocked": operators.blocked,
     "emergency_stop": operators.emergency_stop,
+    "operate": operators.operate,
 }
 
 
@@ -53,7 +54,8 @@ def check_targets(faults: Iterable[AnyFault], site: Site) -> None:
         for key in ("target", "members", "receivers"):
             if key in KINDS[fault.kind].settings:
                 for name in fault.text(key).split("|"):
-                    if name not in known:
+                    # A machine that need not be named is the empty word.
+                    if name and name not in known:
                         raise ValueError(
                             f"fault {str(fault)!r}: {key}={name}: no such machine on site {site.name}; "
                             f"{nearest(name, known)}"

@@ -12,14 +12,16 @@ _YES = ("y", "yes")
 
 
 class Asker:
-    """Asks on standard input; ``tell`` is given every line but the question."""
+    """Asks on standard input, but where ``is_agreed``; ``tell`` is given every line but the question."""
 
-    def __init__(self, station: Station, tell: Callable[[str], None], source: TextIO | None = None) -> None:
-        self._station, self._tell = station, tell
-        self._source = sys.stdin if source is None else source
+    def __init__(self, station: Station, tell: Callable[[str], None], *, is_agreed: bool = False) -> None:
+        self._station, self._tell, self._is_agreed = station, tell, is_agreed
+        self._source: TextIO = sys.stdin
 
     async def agrees(self, order: Order) -> bool:
-        """Whether the person says yes, or types the word that the order asks for."""
+        """Whether the person says yes, or types the word that the order asks for; --yes is no such word."""
+        if self._is_agreed and not order.answer:
+            return True
         wanted = f"type {order.answer} to go on" if order.answer else "y/N"
         print(f"{order.question} [{wanted}] ", end="", flush=True)
         line = await self._line()

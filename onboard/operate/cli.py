@@ -10,31 +10,15 @@ from pathlib import Path
 
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
-from onboard.core.codes import NOBODY
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
 from onboard.kinds.registry import system_of
 from onboard.operate.asking import Asker
-from onboard.operate.blocks import Mark
-from onboard.operate.holds import Hold
-from onboard.operate.names import (
-    FIRST_TOOL,
-    OperateError,
-    movable_of,
-    node_of,
-    reason_of,
-    segment_of,
-    tool_of,
-)
-from onboard.operate.order import MISTAKE, NOT_CONFIRMED, Order
-from onboard.operate.park import Park
+from onboard.operate.names import OperateError, tool_of
+from onboard.operate.order import MISTAKE
 from onboard.operate.station import Station
-from onboard.operate.status import Status
-from onboard.operate.stops import GoAgain, Stop
+from onboard.operate.wishes import Maker, Wish, maker_of
 from onboard.wire.codec import codecs
-
-#: Heartbeat periods for which the bus is listened to before anything is said: everybody is heard, and once lost.
-LISTEN_BEATS = 2
 
 EXAMPLES = """\
 exit status: 0 done, and confirmed by those whom it concerns; 1 not confirmed, it says by whom; 2 a person's mistake
@@ -50,8 +34,6 @@ examples:
       the same on a site served by: bus-sim run small --serve
 This bus is no safety channel: machines that can hurt somebody have an emergency stop of their own.
 """
-#: Makes the order from what was heard and the station's node-ID.
-Maker = Callable[[Park, int], Order]
 
 
 def build_parser() -> argparse.ArgumentParser:
@@ -107,7 +89,8 @@ def main(argv: Sequence[str]) -> int:
         site = load_site(args.site)
         if args.node is not None:
             tool_of(args.node)
-        make = maker_of(args, site)
+        # Another life of this station begins elsewhere in the numbers of orders.
+        make = maker_of(site, wish_of(args), seed=time.time_ns() // 1_000_000_000)
         settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
         return asyncio.run(_run(args, site, settings, make))
     except (ConfigError, BusOpenError, OperateError) as error:
@@ -116,25 +99,17 @@ def main(argv: Sequence[str]) -> int:
         return MISTAKE
 
 
-def maker_of(args: argparse.Namespace, site: Site) -> Maker:
-    """What makes the order that a command line names. Raises ``OperateError`` for what the site does not have."""
-    match args.command:
-        case "status":
-            listen_us = _us(args.for_s) or LISTEN_BEATS * site.timing.heartbeat_us
-            return lambda park, node: Status(park, node, listen_us)
-        case "stop":
-            keep_us = _us(args.for_s)
-            return lambda park, node: Stop(park, node, keep_us)
-        case "go":
-            stopper = NOBODY if args.of is None else node_of(site, args.of)
-            return lambda park, node: GoAgain(park, node, stopper)
-        case "block" | "clear":
-            segment, blocks = segment_of(site, args.segment), args.command == "block"
-            reason = reason_of(args.reason if blocks else "operator")
-            return lambda park, node: Mark(park, node, segment, reason, blocks=blocks)
-    machine, holds = movable_of(site, args.machine), args.command == "hold"
-    # Another life of this station begins elsewhere in the numbers of orders.
-    return lambda park, node: Hold(park, node, machine, holds=holds, seed=time.time_ns() // 1_000_000_000)
+def wish_of(args: argparse.Namespace) -> Wish:
+    """What a command line asks for."""
+    seconds = getattr(args, "for_s", None)
+    return Wish(
+        args.command,
+        machine=getattr(args, "machine", ""),
+        segment=getattr(args, "segment", ""),
+        reason=getattr(args, "reason", "operator"),
+        of=getattr(args, "of", None) or "",
+        for_us=None if seconds is None else round(seconds * 1e6),
+    )
 
 
 async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make: Maker) -> int:
@@ -146,36 +121,15 @@ async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make
         loop.add_signal_handler(number, station.interrupt)
     lost = loop.create_task(_watch(bus.wait_lost, station))
     try:
-        return await _operate(args, station, make)
+        asker = Asker(station, _tell, is_agreed=args.yes)
+        return await station.operate(make, args.node, asker.agrees)
     finally:
         lost.cancel()
         await bus.close()
 
 
-async def _operate(args: argparse.Namespace, station: Station, make: Maker) -> int:
-    """Look, show, ask, do."""
-    order = make(station.park, station.node or args.node or FIRST_TOOL)
-    if order.is_urgent:
-        station.node = order.node
-    elif not order.is_silent:
-        beats_us = LISTEN_BEATS * station.park.site.timing.heartbeat_us
-        _tell(f"listening for {beats_us / 1e6:g} s")
-        if not await station.listen(beats_us):
-            return NOT_CONFIRMED
-        order = make(station.park, station.speak_as(args.node))
-    for line in order.preview(station.now_us()):
-        _tell(line)
-    if order.question and not args.yes and not await Asker(station, _tell).agrees(order):
-        return MISTAKE
-    return await station.carry_out(order)
-
-
 async def _watch(wait_lost: Callable[[], Awaitable[str]], station: Station) -> None:
     station.lose(await wait_lost())
-
-
-def _us(seconds: float | None) -> int | None:
-    return None if seconds is None else round(seconds * 1e6)
 
 
 def _tell(line: str) -> None:

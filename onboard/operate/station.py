@@ -1,14 +1,15 @@
 """The shell around an order: one station on one fleet bus, real or simulated, on the running loop."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 
 from onboard.core.frame import Frame
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.operate.names import FIRST_TOOL, LAST_TOOL, OperateError
-from onboard.operate.order import NOT_CONFIRMED, Order
+from onboard.operate.order import MISTAKE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park
+from onboard.operate.wishes import LISTEN_BEATS, Maker
 from onboard.ports.bus import Bus
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
@@ -56,6 +57,26 @@ class Station:
             raise OperateError("all node-IDs of tools, 251 to 255, are heard on this bus; end one of the tools")
         self.node = free[0] if node is None else node
         return self.node
+
+    async def operate(self, make: Maker, node: int | None, agrees: Callable[[Order], Awaitable[bool]]) -> int:
+        """Look, show, ask, do: the exit status. ``node`` as in ``speak_as``. Raises ``OperateError``.
+
+        What is urgent is said at once, under ``node`` or the first of a tool's.
+        """
+        order = make(self.park, FIRST_TOOL if node is None else node)
+        if order.is_urgent:
+            self.node = order.node
+        elif not order.is_silent:
+            beats_us = LISTEN_BEATS * self.park.site.timing.heartbeat_us
+            self._tell(f"listening for {beats_us / 1e6:g} s")
+            if not await self.listen(beats_us):
+                return NOT_CONFIRMED
+            order = make(self.park, self.speak_as(node))
+        for line in order.preview(self.now_us()):
+            self._tell(line)
+        if order.question and not await agrees(order):
+            return MISTAKE
+        return await self.carry_out(order)
 
     async def carry_out(self, order: Order) -> int:
         """Do it; the exit status. Lines are told as they come."""

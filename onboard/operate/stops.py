@@ -6,6 +6,7 @@ A stop counts until 30 s after it was last heard, so it is said as long as it sh
 from onboard.core.codes import NOBODY, MachineState, Reason
 from onboard.core.messages import EmergencyStop, Heartbeat, Message
 from onboard.core.recovery_messages import Go, Halted
+from onboard.core.site import Machine
 from onboard.operate.order import AGAIN_US, DONE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park
 from onboard.operate.words import halted_words, state_words
@@ -63,14 +64,14 @@ class Stop(Order):
     def _answered(self, node: int) -> None:
         if node in self._waited:
             self._waited.discard(node)
-            self.tell(f"{self.park.name(node)} stands")
+            self.tell(f"{self.park.name(node)} holds by it")
 
     def _tell_result(self, now_us: int) -> None:
         self._is_told = True
         for node in sorted(self._waited):
-            self.tell(f"{self.park.name(node)} has NOT said that it stands; it {state_words(self.park, node, now_us)}")
+            self.tell(f"{self.park.name(node)} has NOT said that it holds; it {state_words(self.park, node, now_us)}")
         if self._keep_us is None:
-            self.tell("all stand" if not self._waited else "go and see")
+            self.tell("all hold" if not self._waited else "go and see")
             self.tell("the stop is said on until Ctrl-C, or until another tool says go")
 
     def _finish(self) -> None:
@@ -80,7 +81,7 @@ class Stop(Order):
 
 
 class GoAgain(Order):
-    """Lifts the stop of node ``stopper``, 0 for all; each machine that stood has to be heard going on."""
+    """Lifts the stop of node ``stopper``, 0 for all; each machine that held by it has to be heard without it."""
 
     def __init__(self, park: Park, node: int, stopper: int = NOBODY) -> None:
         super().__init__(park, node)
@@ -108,7 +109,7 @@ class GoAgain(Order):
         """See ``Order``."""
         super().begin(now_us)
         self._waited = self._standing(now_us)
-        self.tell(f"go{self._of()}: said to all under node-ID {self.node}")
+        self.tell(f"go{self._of()}: said under node-ID {self.node}")
 
     def feed(self, message: Message, now_us: int) -> None:
         """Somebody who still says stop undoes it."""
@@ -147,10 +148,25 @@ class GoAgain(Order):
         return self._stopper in (NOBODY, word.cause)
 
     def _goes_on(self, node: int, now_us: int) -> bool:
+        """Whether it was heard since, and does not say any more that it stands by this."""
         known = self.park.machines[node]
-        if known.beat is None or known.beat_us <= self.began_us or self._is_stopped(self.park.halted(node, now_us)):
-            return False
-        return known.beat.state is not MachineState.STOPPED or self.park.halted(node, now_us) is not None
+        return known.beat_us > self.began_us and not self._is_stopped(self.park.halted(node, now_us))
 
     def _of(self) -> str:
         return f" of {self.park.name(self._stopper)}" if self._stopper else ""
+
+
+class LetGo(GoAgain):
+    """Lets one machine go on that holds until a person says so: Go under its own number (docs/contract-2.md)."""
+
+    def __init__(self, park: Park, node: int, machine: Machine) -> None:
+        super().__init__(park, node, machine.node_id)
+
+    @property
+    def question(self) -> str:
+        """See ``Order``."""
+        name = self.park.name(self._stopper)
+        return f"Is what made {name} hold put right, is nobody in its way, and shall it go on?"
+
+    def _is_stopped(self, word: Halted | None) -> bool:
+        return word is not None and word.machine == self._stopper and word.reason is not Reason.EMERGENCY_STOP

@@ -1,15 +1,12 @@
 """An operator's station on a simulated site: what it says to the person, and what it ended with."""
 
 import asyncio
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from bus_sim.run import Simulation
 from onboard.operate.order import Order
-from onboard.operate.park import Park
 from onboard.operate.station import Station
-
-Maker = Callable[[Park, int], Order]
+from onboard.operate.wishes import Maker
 
 
 @dataclass
@@ -19,7 +16,7 @@ class Played:
     lines: list[tuple[int, str]] = field(default_factory=list)
     status: int | None = None
     ended_us: int = 0
-    order: Order | None = None
+    asked: str = ""
 
     @property
     def text(self) -> str:
@@ -27,29 +24,27 @@ class Played:
         return "\n".join(line for _, line in self.lines)
 
 
-def operates(simulation: Simulation, at_s: float, make: Maker, node: int = 251, listen_s: float = 4.0) -> Played:
-    """A person gives a command at ``at_s``; to be called once the simulation runs."""
+def operates(simulation: Simulation, at_s: float, make: Maker, node: int | None = None) -> Played:
+    """A person gives a command at ``at_s`` and agrees; to be called once the simulation runs."""
     played = Played()
-    simulation.loop.create_task(_operate(simulation, played, at_s, make, node, listen_s))
+    task = simulation.loop.create_task(_operate(simulation, played, at_s, make, node))
+    task.add_done_callback(lambda done: None if done.cancelled() else done.result())
     return played
 
 
-async def _operate(
-    simulation: Simulation, played: Played, at_s: float, make: Maker, node: int, listen_s: float
-) -> None:
+async def _operate(simulation: Simulation, played: Played, at_s: float, make: Maker, node: int | None) -> None:
     loop = simulation.loop
     await asyncio.sleep(at_s - loop.now_us() / 1e6)
-    bus = simulation.fleet.attach(f"operator {node} {at_s}", node)
+    bus = simulation.fleet.attach(f"operator {at_s}", None)
 
     def tell(line: str) -> None:
         played.lines.append((loop.now_us(), line))
 
+    async def agrees(order: Order) -> bool:
+        played.asked = order.question
+        return True
+
     station = Station(simulation.site, simulation.codecs.fleet, bus, tell)
-    if listen_s:
-        await station.listen(round(listen_s * 1e6))
-    played.order = make(station.park, station.speak_as(node))
-    for line in played.order.preview(loop.now_us()):
-        tell(line)
-    played.status = await station.carry_out(played.order)
+    played.status = await station.operate(make, node, agrees)
     played.ended_us = loop.now_us()
     await bus.close()

@@ -6,12 +6,13 @@ from itertools import pairwise
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
 from onboard.core.codes import MachineState, ManualMode, Reason
-from onboard.core.messages import Blocked, Clear, Heartbeat, ManualOrder, Progress
+from onboard.core.messages import Blocked, Clear, Heartbeat, ManualOrder
 from onboard.core.site import Segment
 from onboard.operate.blocks import Mark
 from onboard.operate.holds import Hold
 from onboard.operate.status import Status
-from tests.operate.played import Maker, Played, operates
+from onboard.operate.wishes import Maker
+from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
 
 SITE = find_site("small")
@@ -48,15 +49,14 @@ def test_a_machine_is_held_and_released_by_its_own_word() -> None:
     release = partial(Hold, machine=MR1, holds=False, seed=9)
     scene, (held, let_go) = played((21, hold), (90, release))
     assert held.status == 0 and held.lines[-1][1] == "MR1 is held, and stands"
-    assert let_go.lines[0][1] == "MR1 stands, others plan around it", "shown before the question"
+    assert let_go.lines[1][1] == "MR1 stands, others plan around it", "shown before the question"
     assert let_go.status == 0 and let_go.lines[-1][1] == "MR1 goes on by itself"
     states = {
         beat.state for t, beat in scene.all(Heartbeat) if beat.sender == MR1.node_id and held.ended_us < t < 90_000_000
     }
     assert states == {MachineState.OBSTACLE}
-    assert [
-        one for t, one in scene.all(Progress) if one.sender == MR1.node_id and t > let_go.ended_us and one.speed_mm_s
-    ]
+    last = [beat.state for _, beat in scene.all(Heartbeat) if beat.sender == MR1.node_id][-1]
+    assert last is MachineState.IDLE and let_go.asked.startswith("Is nobody in the way of MR1")
     scene.assert_sound()
 
 
