@@ -1,6 +1,6 @@
 """``hold`` and ``release``: a person has a hand in one machine that moves (row M38; onboard/core/manual.py)."""
 
-from onboard.core.messages import Message
+from onboard.core.messages import ManualState, Message
 from onboard.core.site import Machine
 from onboard.gateway.pauses import Pauses
 from onboard.operate.order import DONE, Order
@@ -18,6 +18,7 @@ class Hold(Order):
         super().__init__(park, node)
         self._machine, self._holds = machine, holds
         self._pauses = Pauses(node, seed)
+        self._is_told = False
         self.is_urgent = holds
 
     def preview(self, now_us: int) -> list[str]:
@@ -37,9 +38,19 @@ class Hold(Order):
 
     def feed(self, message: Message, now_us: int) -> None:
         """The machine's word."""
-        if self.status is None and self._pauses.feed(message, now_us):
+        if self.status is not None:
+            return
+        if self._pauses.feed(message, now_us):
             self.tell(f"{self._machine.name} " + ("is held, and stands" if self._holds else "goes on by itself"))
             self.status = DONE
+        elif self._begins_nothing(message):
+            self._is_told = True
+            self.tell(f"{self._machine.name} has answered: it begins nothing more, and comes to rest")
+
+    def _begins_nothing(self, message: Message) -> bool:
+        """Whether it says for the first time that it is held."""
+        is_own = isinstance(message, ManualState) and message.sender == self._machine.node_id
+        return is_own and self._holds and not self._is_told and self.park.machines[message.sender].is_held
 
     def wake(self, now_us: int) -> list[Message]:
         """See ``Order``."""

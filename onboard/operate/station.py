@@ -72,8 +72,8 @@ class Station:
             if not await self.listen(beats_us):
                 return NOT_CONFIRMED
             order = make(self.park, self.speak_as(node))
-        for line in order.preview(self.now_us()):
-            self._tell(line)
+            for line in order.preview(self.now_us()):
+                self._tell(line)
         if order.question and not await agrees(order):
             return MISTAKE
         return await self.carry_out(order)

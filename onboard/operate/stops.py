@@ -162,6 +162,10 @@ class LetGo(GoAgain):
     def __init__(self, park: Park, node: int, machine: Machine) -> None:
         super().__init__(park, node, machine.node_id)
 
+    def preview(self, now_us: int) -> list[str]:
+        """Why it holds."""
+        return [f"{self.park.name(self._stopper)} {state_words(self.park, self._stopper, now_us)}"]
+
     @property
     def question(self) -> str:
         """See ``Order``."""

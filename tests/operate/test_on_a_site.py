@@ -49,6 +49,7 @@ def test_a_machine_is_held_and_released_by_its_own_word() -> None:
     release = partial(Hold, machine=MR1, holds=False, seed=9)
     scene, (held, let_go) = played((21, hold), (90, release))
     assert held.status == 0 and held.lines[-1][1] == "MR1 is held, and stands"
+    assert held.lines[-2][1] == "MR1 has answered: it begins nothing more, and comes to rest"
     assert let_go.lines[1][1] == "MR1 stands, others plan around it", "shown before the question"
     assert let_go.status == 0 and let_go.lines[-1][1] == "MR1 goes on by itself"
     states = {
