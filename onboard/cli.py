@@ -63,6 +63,8 @@ examples:
       publish the site to a broker; see onboard gateway --help
   onboard web -i socketcan -c can0 --site site.toml
       a live picture on a page of this computer; see onboard web --help
+  onboard operate status -i socketcan -c can0 --site site.toml
+      who stands and why; stop, go, block, clear, hold, release; see onboard operate --help
 """
 
 
@@ -169,8 +171,19 @@ def _gateway(words: list[str]) -> int:
     return gateway(words)
 
 
+def _operate(words: list[str]) -> int:
+    from onboard.operate.cli import main as operate  # noqa: PLC0415  # a controller must not carry it
+
+    return operate(words)
+
+
 #: What is not a controller; each takes the words behind its own and returns the exit status.
-COMMANDS: dict[str, Callable[[list[str]], int]] = {"trace": _trace, "web": _web, "gateway": _gateway}
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    "trace": _trace,
+    "web": _web,
+    "gateway": _gateway,
+    "operate": _operate,
+}
 
 
 async def run(

@@ -251,4 +251,16 @@ KINDS: Final[Mapping[str, Kind]] = {
         },
     ),
     "emergency_stop": Kind(Group.PEOPLE, "an operator stops all machines at once", {"at_s": _AT}),
+    "operate": Kind(
+        Group.PEOPLE,
+        "a person gives a command of onboard operate and agrees; target: whom hold, release, go or regenerate name",
+        {
+            "at_s": _AT,
+            "do": _one_of("stop", "go", "block", "clear", "hold", "release", "regenerate")._replace(default=None),
+            "target": _MACHINE._replace(default=""),
+            "track": _count("the number of a track, for block and clear", 1, 1, 254),
+            "index": _count("the index of a segment, for block and clear", 1, 1, 255),
+            "for_s": _seconds(10.0),
+        },
+    ),
 }
