@@ -5,18 +5,21 @@ from me says so, and so does who saw it taken. What is known better elsewhere ta
 until a person has decided (docs/contract-2.md, Restart).
 """
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import SyncRequest, TokenGrant, TokenHeld, TokenRequest
+from onboard.core.messages import Heartbeat, SyncRequest, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.mirror import Mirror
 from onboard.core.recovery_messages import Halted, SyncDone, TokenGiven, TokenSeen
 from onboard.core.serial import is_newer
 
+#: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
+DIGEST_PATIENCE = 2
 #: Who asks within this time of an answer shares the next one, us: at power-up all ask all. Ours.
 ANSWER_PERIOD_US = 250_000
 
@@ -26,8 +29,12 @@ class Doubt(NamedTuple):
 
     reason: Reason
     cause: int
-    key: TokenKey
-    version: int
+    what: str
+
+    @property
+    def text(self) -> str:
+        """One line for a person."""
+        return f"the journal is lost or old: node {self.cause} {self.what}; a person must regenerate its tokens"
 
 
 @dataclass
@@ -42,9 +49,13 @@ class Witness:
     boot: int
     has_past: bool
     statements: Callable[[int], list[Effect]]
+    #: Who has said that it does nothing, as ``Presence`` keeps them.
+    halts: Mapping[int, Halted] = field(default_factory=dict)
     doubt: Doubt | None = None
     #: Machines that have answered since this one started: what they say later is no proof against its journal.
     answered: set[int] = field(default_factory=set)
+    #: How often in a row a peer's mirror has differed from mine.
+    mismatches: Counter[int] = field(default_factory=Counter)
     #: What machines that were started again held by their own word before, until they say so again.
     doubted: dict[int, dict[TokenKey, int]] = field(default_factory=dict)
     _since_us: int | None = None
@@ -63,6 +74,25 @@ class Witness:
     def is_over(self) -> bool:
         """Whether all that live have answered, and nobody knew better than the journal."""
         return self.tokens.is_synced
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a machine that was started again has to wait still; in a first life only rights wait."""
+        return self.has_past and not self.is_over
+
+    def on_heartbeat(self, beat: Heartbeat, *, is_fresh: bool) -> list[Effect]:
+        """Ask who is new or was started again, and whose mirror has differed from mine for a while."""
+        if is_fresh:
+            self._was_started(beat.sender)
+            return self.ask(beat.sender, self.mirror.boots_before[beat.sender])
+        if beat.mirror_digest == self.mirror.digest():
+            del self.mismatches[beat.sender]
+            return []
+        self.mismatches[beat.sender] += 1
+        if self.mismatches[beat.sender] < DIGEST_PATIENCE:
+            return []
+        del self.mismatches[beat.sender]
+        return self.ask(beat.sender)
 
     def begin(self, now_us: int) -> list[Effect]:
         """What the journal says that I hold and gave away, for all to compare, and the question to all."""
@@ -102,11 +132,15 @@ class Witness:
             self.tokens.trust()
 
     def _missing(self, now_us: int) -> set[int]:
-        live = self.mirror.alive(now_us) & self._others
+        live = self._live(now_us)
         if not self.has_past and any(self.mirror.peers[node].boot > 1 for node in live):
             # A first life in a fleet that has a past: whoever is away may know of an earlier one.
             return self._others - self.answered
         return live - self.answered
+
+    def _live(self, now_us: int) -> set[int]:
+        """Who can answer: not who has said that it is halted or held apart."""
+        return (self.mirror.alive(now_us) & self._others) - set(self.halts)
 
     def wake(self, now_us: int) -> list[Effect]:
         """Ask again who has not answered, and answer those who asked meanwhile."""
@@ -114,8 +148,7 @@ class Witness:
         self._review(now_us)
         if not self.is_over and self.doubt is None and self._ask_at_us is not None and self._ask_at_us <= now_us:
             self._ask_at_us = now_us + self.site.timing.heartbeat_us
-            missing = self._missing(now_us)
-            live = self.mirror.alive(now_us)
+            missing, live = self._missing(now_us), self._live(now_us)
             for node in sorted(missing & live):
                 effects += self.ask(node)
             for node in sorted(missing - live):
@@ -131,20 +164,36 @@ class Witness:
 
     # --- answering ---------------------------------------------------------------------------------------------
 
-    def on_fresh(self, node: int) -> None:
+    def _was_started(self, node: int) -> None:
         """A machine was started again: what it held by its own word it has to say again."""
         beliefs = self.tokens.beliefs.verified
         self.doubted[node] = {
             TokenKey(*key): one.version for key, one in beliefs.items() if one.holder == node and one.confirmed
         }
 
-    def on_request(self, sender: int, now_us: int) -> list[Effect]:
+    def on_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         """Answer at once; whoever asks soon after shares one answer with all others who do."""
-        self._askers.add(sender)
+        if request.whom == self.node_id and self._has_forgotten(request):
+            self._doubt(Reason.JOURNAL_LOST, request.sender, f"knew this node under boot {request.boot_before}")
+            return []
+        known = self.mirror.peers.get(request.sender)
+        effects: list[Effect] = []
+        patience_us = self.site.timing.heartbeat_us // 2
+        if request.whom == NOBODY and known is not None and known.since_us + patience_us < now_us:
+            # All are asked at power-up only: I knew it before, even where its counter is the same again.
+            effects = self.ask(request.sender, known.boot)
+        self._askers.add(request.sender)
         if self._quiet_until_us is not None and now_us < self._quiet_until_us:
             self._answer_at_us = self._quiet_until_us
-            return []
-        return self._answer(now_us)
+            return effects
+        return self._answer(now_us) + effects
+
+    def _has_forgotten(self, request: SyncRequest) -> bool:
+        """Whether my journal lacks a life that a peer knew: tokens that I gave away then would seem to be mine."""
+        before = request.boot_before
+        if before == 0 or request.sender not in self._others:
+            return False
+        return not self.has_past or is_newer(before, self.boot, 8)
 
     def _answer(self, now_us: int) -> list[Effect]:
         askers, self._askers = sorted(self._askers), set()
@@ -196,8 +245,11 @@ class Witness:
         if is_better:
             version = word.version_seen if isinstance(word, TokenRequest) else word.version
             reason = Reason.JOURNAL_SHORT if self.has_past else Reason.JOURNAL_LOST
-            self.doubt = Doubt(reason, word.sender, key, version)
-            self.tokens.is_synced = False
+            self._doubt(reason, word.sender, f"knows version {version} of {key.kind.name} {key.number}")
+
+    def _doubt(self, reason: Reason, cause: int, what: str) -> None:
+        self.doubt = Doubt(reason, cause, what)
+        self.tokens.is_synced = False
 
     def _said_again(self, node: int, key: TokenKey, version: int) -> None:
         lost = self.doubted.get(node)
