@@ -174,7 +174,7 @@ class Witness:
         """A machine was started again: what it held by its own word it has to say again, and what it gave me too."""
         self.tokens.drop_disputed(node)
         if not self.starting:
-            self.tokens.gifts.clear()
+            self.tokens.gifts = set(self.tokens.leaving)
         self.starting.add(node)
         beliefs = self.tokens.beliefs.verified
         self.doubted[node] = {
@@ -221,11 +221,13 @@ class Witness:
 
     def _tell_gifts(self, node: int) -> list[Effect]:
         """What a machine gave away by its own word and nobody has said that he has: only I can tell if it forgot it."""
-        return [
-            Send(TokenSeen(self.node_id, *key, one.version, one.holder))
-            for key, one in self.tokens.beliefs.verified.items()
-            if one.giver == node and not one.confirmed
-        ]
+        effects: list[Effect] = []
+        for key, one in self.tokens.beliefs.verified.items():
+            if one.giver == node and not one.confirmed:
+                # It held the token under the version before; it may have forgotten either.
+                effects.append(Send(TokenSeen(self.node_id, *key, one.version - 1, node)))
+                effects.append(Send(TokenSeen(self.node_id, *key, one.version, one.holder)))
+        return effects
 
     def _tell_own_gifts(self, askers: set[int]) -> list[Effect]:
         """What I gave away since: who has it now may have answered before it had it."""
