@@ -184,6 +184,11 @@ class BusRun:
                 return self.devices[machine.node_id].attach(name, None)
         return None
 
+    @property
+    def restless(self) -> list[str]:
+        """Names of machines whose wakes did not come to rest: without a bound time would stand still with them."""
+        return [one.holon.machine.name for one in self.controllers.values() if one.rest.is_broken]
+
     def close(self) -> None:
         """Finish the log."""
         if self.writer is not None:
@@ -250,10 +255,11 @@ async def run_until(
 ) -> bool:
     """Let time pass in steps of ``step_us`` until ``done`` or ``limit_us``; True where it was done.
 
+    A machine whose wakes do not come to rest ends the run: it is among those that are halted, by name.
     ``show`` is called after each step.
     """
     while not done():
-        if simulation.loop.now_us() >= limit_us:
+        if simulation.loop.now_us() >= limit_us or simulation.restless:
             return False
         await asyncio.sleep(step_us / 1_000_000)
         if show is not None:

@@ -38,9 +38,6 @@ FRAME_US = 320
 JOURNAL_LIMIT = 2_000
 #: How often a frame whose sender is drawn as the controller's own node-ID keeps it.
 OWN = 0.05
-#: A controller whose timer strikes more often than this at one moment has come to a state in which nothing moves.
-MOST_WAKES = 1_000
-NO_REST = "the machine's wakes do not come to rest"
 #: The corpus is what was said in so long, s.
 CORPUS_S = 400.0
 
@@ -55,22 +52,6 @@ class Outcome:
     errors: list[str] = field(default_factory=list)
     uncounted: list[str] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
-
-
-class _Watchdog(NoWatchdog):
-    """Stops a controller that wakes again and again at one moment: virtual time would stand still for ever."""
-
-    def __init__(self) -> None:
-        self.holon: Holon | None = None
-        self._last_us, self._wakes = -1, 0
-
-    def alive(self) -> None:
-        """The controller's timer has struck."""
-        now_us = round(asyncio.get_running_loop().time() * 1e6)
-        self._wakes = self._wakes + 1 if now_us == self._last_us else 1
-        self._last_us = now_us
-        if self.holon is not None and self._wakes > MOST_WAKES:
-            self.holon.halted = NO_REST
 
 
 class _Wire:
@@ -204,9 +185,7 @@ class Fuzzer:
         factory = factory_for(self._site, self._machine.kind)
         holon = Holon(self._site, self._machine, factory, boot=next_boot(entries), entries=entries)
         wires = (_Wire(), _Wire())
-        watchdog = _Watchdog()
-        controller = Controller(holon, Ports(*wires, self._journal, EventLog(limit=10), watchdog), *self._codecs)
-        watchdog.holon = holon
+        controller = Controller(holon, Ports(*wires, self._journal, EventLog(limit=10), NoWatchdog()), *self._codecs)
         controller.start()
         return controller, wires
 
