@@ -151,7 +151,11 @@ def test_the_last_give_of_a_token_is_kept_beside_what_came_after() -> None:
 
     records = [token(f"token_{what}", version) for version in range(1, 9) for what in ("held", "given", "gone")]
     assert kept(records, "small") == [token("token_given", 8), token("token_gone", 8)]
-    assert kept([*records, token("token_held", 9)], "small") == [token("token_given", 8), token("token_held", 9)]
+    assert kept([*records, token("token_held", 9)], "small") == [
+        token("token_given", 8),
+        token("token_gone", 8),
+        token("token_held", 9),
+    ]
 
 
 def test_a_car_that_left_is_forgotten_with_all_that_was_about_it() -> None:
