@@ -13,7 +13,8 @@ from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.holding import Hold, Holding
+from onboard.core.holds import Holds
 from onboard.core.messages import (
     Award,
     Bid,
@@ -26,6 +27,7 @@ from onboard.core.messages import (
     EmergencyStop,
     Heartbeat,
     Itinerary,
+    LeftOut,
     Message,
     Progress,
     SyncRequest,
@@ -89,7 +91,8 @@ class Holon:
         self.holding.replay(entries)
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
-        self._own_number = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        own = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
             machine.node_id,
@@ -98,6 +101,7 @@ class Holon:
             estimator,
             boot=boot,
             slot=slot_of(site, machine.node_id),
+            is_obstacle=self.mirror.obstacles.machines.__contains__,
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
@@ -114,14 +118,15 @@ class Holon:
             Bid: self._negotiate,
             Award: self._negotiate,
             TaskReport: self._negotiate,
+            LeftOut: self._negotiate,
             Itinerary: self._on_itinerary,
             Progress: self._on_progress,
             CarAt: self._on_car,
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self._on_emergency_stop,
-            Go: self._on_go,
-            Halted: self._on_halted,
+            Go: self.holds.on_go,
+            Halted: self.holds.on_halted,
             Blocked: self._on_word,
             Clear: self._on_word,
         }
@@ -149,7 +154,7 @@ class Holon:
             return self._on_bus_time(message, local_us)
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
-            return self._on_own_number(message, now_us)
+            return self.holds.on_own_number(message, now_us)
         self.holding.heard(now_us)
         if self.holding.is_apart and not isinstance(message, _WHILE_APART):
             return []
@@ -157,6 +162,7 @@ class Holon:
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
         effects = self._awake(now_us)
+        self.presence.standing.hear(message, now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects += handler(message, now_us) if handler is not None else []
@@ -182,7 +188,7 @@ class Holon:
             self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
         effects = self._awake(now_us)
-        effects += self._apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
         if not self.holding.is_apart:
             effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
@@ -223,7 +229,7 @@ class Holon:
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
         if message.sender == self.node_id:
-            return self._on_own_number(message, self.clock.bus_us(local_us))
+            return self.holds.on_own_number(message, self.clock.bus_us(local_us))
         self.holding.heard(self.clock.bus_us(local_us))
         if message.sender in self.presence.foreign:
             return []
@@ -361,13 +367,6 @@ class Holon:
         why = f"emergency stop from node {stop.sender}: {stop.reason.name}"
         return self._halt(why, Reason.EMERGENCY_STOP, stop.sender)
 
-    def _on_go(self, go: Go, now_us: int) -> list[Effect]:
-        return self._apply(self.holding.go(go.stopper), now_us)
-
-    def _on_halted(self, halted: Halted, now_us: int) -> list[Effect]:
-        self.presence.heard_halted(halted, now_us)
-        return []
-
     # --- holds -------------------------------------------------------------------------------------------------
 
     @property
@@ -375,46 +374,16 @@ class Holon:
         """Whether this machine is an obstacle: it neither moves nor bids."""
         return self.presence.is_held or self.holding.is_held
 
-    def _on_own_number(self, message: Message, now_us: int) -> list[Effect]:
-        """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
-        self.drops[Reason.DUPLICATE_NODE_ID] += 1
-        return self._apply(self.holding.own_frame(now_us, is_right=self._own_number.is_right(message)), now_us)
-
     def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Who is held gives no right away: it may be one that it does not have any more."""
         if self.holding.is_held:
             return self.holding.why.reason
         return self.behaviour.may_grant(key, requester, now_us)
 
-    def _apply(self, outcome: Outcome, now_us: int) -> list[Effect]:
-        """What follows from an event of the holds."""
-        match outcome:
-            case Outcome.HOLDS:
-                reason, cause, needs_person = self.holding.why
-                told = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
-                is_lasting = self.holding.hold is Hold.PERSON
-                effects: list[Effect] = [Record(self.holding.record())] if is_lasting else []
-                return [*effects, Report(told), *self._words()]
-            case Outcome.GOES_ON:
-                self.presence.listen_anew(now_us)
-                return [Report("goes on"), *self._words()]
-            case Outcome.COMES_BACK:
-                return self._come_back(now_us)
-            case _:
-                return []
-
-    def _come_back(self, now_us: int) -> list[Effect]:
-        """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
+    def _new_life(self) -> int:
+        """As after a restart."""
         self.boot = self.boot % 255 + 1
-        self.presence.listen_anew(now_us)
-        records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": self.boot})]
-        ask: Effect = Send(SyncRequest(self.node_id, NOBODY))
-        return [*records, Report("comes back: nobody sends under its number any more"), *self._words(), ask]
-
-    def _words(self) -> list[Effect]:
-        """My sign of life, and why I do not act where I do not."""
-        held: list[Effect] = [Send(self.holding.word(self.boot))] if self.holding.is_held else []
-        return [Send(self._heartbeat()), *held]
+        return self.boot
 
     def last_word(self, reason: Reason) -> Halted:
         """What is said before the process ends: ``reason`` where none was given before."""
@@ -436,7 +405,7 @@ class Holon:
         else:
             if not self._is_still:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
-        self._own_number.note(effects)
+        self.holds.own.note(effects)
         return effects
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
@@ -453,7 +422,7 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects += self._words() + self._diagnostics()
+            effects += self.holds.words() + self._diagnostics()
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
