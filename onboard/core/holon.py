@@ -13,8 +13,10 @@ from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason
+from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.holding import Hold, Holding
+from onboard.core.holds import Holds
 from onboard.core.journal_state import INTACT, JournalCondition, reason_of
 from onboard.core.messages import (
     Award,
@@ -24,10 +26,10 @@ from onboard.core.messages import (
     CallForProposals,
     CarAt,
     Clear,
-    Diagnostic,
     EmergencyStop,
     Heartbeat,
     Itinerary,
+    LeftOut,
     Message,
     Progress,
     Speakers,
@@ -76,7 +78,7 @@ class Holon:
         #: Input dropped here, and below by the shell's decoders and queues, by reason.
         self.drops: Counter[Reason] = Counter()
         self.wire_drops: Counter[Reason] = Counter()
-        self._told_drops: Counter[Reason] = Counter()
+        self._told = ToldDrops()
         self.admission = Admission(site)
         self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
@@ -96,7 +98,8 @@ class Holon:
         self.holding.replay(entries)
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
-        self._own_number = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        own = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
             machine.node_id,
@@ -105,6 +108,7 @@ class Holon:
             estimator,
             boot=boot,
             slot=slot_of(site, machine.node_id),
+            is_obstacle=self.mirror.obstacles.machines.__contains__,
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
@@ -121,14 +125,15 @@ class Holon:
             Bid: self._negotiate,
             Award: self._negotiate,
             TaskReport: self._negotiate,
+            LeftOut: self._negotiate,
             Itinerary: self._on_itinerary,
             Progress: self._on_progress,
             CarAt: self._on_car,
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self._on_emergency_stop,
-            Go: self._on_go,
-            Halted: self._on_halted,
+            Go: self.holds.on_go,
+            Halted: self.holds.on_halted,
             Blocked: self._on_word,
             Clear: self._on_word,
         }
@@ -168,7 +173,7 @@ class Holon:
         """A message of the fleet bus, received at ``local_us``."""
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
-            return self._on_own_number(message, now_us)
+            return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
         if why is not Reason.NONE:
             return self._pass_over(message, why)
@@ -181,6 +186,7 @@ class Holon:
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
         effects = self._awake(now_us)
+        self.presence.standing.hear(message, now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects += handler(message, now_us) if handler is not None else []
@@ -213,7 +219,7 @@ class Holon:
             self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
         effects = self._awake(now_us)
-        effects += self._apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
         if not self.holding.is_apart:
             effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
@@ -387,14 +393,7 @@ class Holon:
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
-        return self._apply(self.holding.stop(stop.sender, now_us), now_us)
-
-    def _on_go(self, go: Go, now_us: int) -> list[Effect]:
-        return self._apply(self.holding.go(go.stopper), now_us)
-
-    def _on_halted(self, halted: Halted, now_us: int) -> list[Effect]:
-        self.presence.heard_halted(halted, now_us)
-        return []
+        return self.holds.apply(self.holding.stop(stop.sender, now_us), now_us)
 
     # --- holds -------------------------------------------------------------------------------------------------
 
@@ -403,46 +402,16 @@ class Holon:
         """Whether this machine is an obstacle: it neither moves nor bids."""
         return self.presence.is_held or self.holding.is_held
 
-    def _on_own_number(self, message: Message, now_us: int) -> list[Effect]:
-        """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
-        self.drops[Reason.DUPLICATE_NODE_ID] += 1
-        return self._apply(self.holding.own_frame(now_us, is_right=self._own_number.is_right(message)), now_us)
-
     def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Who is held gives no right away: it may be one that it does not have any more."""
         if self.holding.is_held:
             return self.holding.why.reason
         return self.behaviour.may_grant(key, requester, now_us)
 
-    def _apply(self, outcome: Outcome, now_us: int) -> list[Effect]:
-        """What follows from an event of the holds."""
-        match outcome:
-            case Outcome.HOLDS:
-                reason, cause, needs_person = self.holding.why
-                told = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
-                is_lasting = self.holding.hold is Hold.PERSON
-                effects: list[Effect] = [Record(self.holding.record())] if is_lasting else []
-                return [*effects, Report(told), *self._words()]
-            case Outcome.GOES_ON:
-                self.presence.listen_anew(now_us)
-                return [Report("goes on"), *self._words()]
-            case Outcome.COMES_BACK:
-                return self._come_back(now_us)
-            case _:
-                return []
-
-    def _come_back(self, now_us: int) -> list[Effect]:
-        """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
+    def _new_life(self) -> int:
+        """As after a restart."""
         self.boot = self.boot % 255 + 1
-        self.presence.listen_anew(now_us)
-        records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": self.boot})]
-        ask: Effect = Send(SyncRequest(self.node_id, NOBODY))
-        return [*records, Report("comes back: nobody sends under its number any more"), *self._words(), ask]
-
-    def _words(self) -> list[Effect]:
-        """My sign of life, and why I do not act where I do not."""
-        held: list[Effect] = [Send(self.holding.word(self.boot))] if self.holding.is_held else []
-        return [Send(self._heartbeat()), *held]
+        return self.boot
 
     def last_word(self, reason: Reason) -> Halted:
         """What is said before the process ends: ``reason`` where none was given before."""
@@ -464,7 +433,7 @@ class Holon:
         else:
             if not self._is_still:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
-        self._own_number.note(effects)
+        self.holds.own.note(effects)
         return effects
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
@@ -481,7 +450,11 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects += self._words() + self._diagnostics() + self.fleet.forgotten()
+            effects += (
+                self.holds.words()
+                + self._told.words(self.node_id, self.drops + self.wire_drops)
+                + self.fleet.forgotten()
+            )
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
@@ -523,10 +496,3 @@ class Holon:
         self.halted = why
         self.holding.halt(reason, cause)
         return [Halt(why, reason)]
-
-    def _diagnostics(self) -> list[Effect]:
-        """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""
-        totals = self.drops + self.wire_drops
-        grown = [reason for reason in sorted(totals) if totals[reason] != self._told_drops[reason]]
-        self._told_drops = totals
-        return [Send(Diagnostic(self.node_id, reason, totals[reason] & 0xFFFFFFFF)) for reason in grown]
