@@ -126,7 +126,7 @@ class Recovery:
         now_us = self._now_us()
         for controller in self._simulation.controllers.values():
             holon = controller.holon
-            if node in holon.mirror.alive(holon.clock.bus_us(now_us)):
+            if node in holon.mirror.alive(holon.bus_us(now_us)):
                 self._at(now_us + LOOK_US, partial(self._look_at_loss, node, since_us))
                 return
         if self._simulation.controllers:
