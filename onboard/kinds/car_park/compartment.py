@@ -247,7 +247,7 @@ class Compartment:
             if requester != self.job.winner:
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
-            if self.phase is not BayPhase.SERVING:
+            if self.phase is not BayPhase.SERVING or not self._is_open_to_machines():
                 return Reason.DOOR_NOT_READY
             self.job.was_granted |= key.kind is TokenKind.STATION
             return Reason.NONE
@@ -490,6 +490,10 @@ class Compartment:
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None
         return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
+
+    def _is_open_to_machines(self) -> bool:
+        """Whether a shuttle can come in and a person cannot, by what the doors say now."""
+        return self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
 
     def _go(self, phase: BayPhase) -> None:
         self.phase = phase
