@@ -4,7 +4,7 @@ All controllers lose their power in the middle of the site's work and get it bac
 A machine takes part once its heartbeat says so; nobody does anything by hand.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bus_sim.campaign.judges import Judges
@@ -52,9 +52,9 @@ class Start:
         return told + late + "".join(f"; {one}" for one in self.wrong)
 
 
-def cold_starts(site: Site, name: str) -> Iterator[Start]:
+def cold_starts(site: Site, name: str, moments_s: Sequence[float] = MOMENTS_S) -> Iterator[Start]:
     """Each moment, with nobody missing and with each machine missing in turn."""
-    for at_s in MOMENTS_S:
+    for at_s in moments_s:
         for missing in (None, *(machine.name for machine in site.machines.values())):
             yield cold_start(site, name, at_s, missing)
 
