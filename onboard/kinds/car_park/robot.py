@@ -126,7 +126,7 @@ class Robot:
         if not self.starting.is_over:
             return MachineState.STARTING
         if self.program.step is None:
-            return MachineState.IDLE
+            return MachineState.WAITING if self.program.unplanned else MachineState.IDLE
         return MachineState.WAITING if self.carriage.blocked is not None else MachineState.WORKING
 
     @property
