@@ -91,6 +91,18 @@ def test_nothing_goes_on_before_the_shuttle_was_seen() -> None:
     assert board.state is MachineState.IDLE
 
 
+def test_a_first_life_too_takes_part_only_with_its_shuttle_seen_at_home() -> None:
+    board = Board()
+    board.stands(6)
+    assert board.holon.behaviour.state is MachineState.STARTING
+    board.shuttle(ShuttleMode.REACHED)
+    assert board.holon.behaviour.state is MachineState.STOPPED
+    board.shuttle(ShuttleMode.HOME)
+    assert board.holon.behaviour.state is MachineState.IDLE
+    board.shuttle(ShuttleMode.MOVING)
+    assert board.holon.behaviour.state is MachineState.STOPPED, "whoever moves it by hand makes it an obstacle"
+
+
 def test_pushed_away_while_it_listens_it_says_where_it_is_then() -> None:
     board = Board(BOOT)
     board.stands(6)

@@ -118,7 +118,8 @@ class Robot:
     @property
     def state(self) -> MachineState:
         """Heartbeat state."""
-        is_held_back = self.starting.stage is Stage.HELD or self.going_around.is_stuck
+        is_astray = self.starting.is_over and self.shuttle.is_astray
+        is_held_back = self.starting.stage is Stage.HELD or self.going_around.is_stuck or is_astray
         if self._fault is not Reason.NONE or is_held_back:
             return MachineState.STOPPED
         if self.holding.is_at_rest:

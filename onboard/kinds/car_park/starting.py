@@ -136,8 +136,7 @@ class Starting:
         self.place = here
         self.body.carriage.go(here)
         if not self.recovery.is_restart:
-            self._enter(Found.FIRST_PLACE)
-            return self._go_on(here, (), now_us)
+            return self._start_first(here, now_us)
         self._enter(Found.PLACE_AGAIN)
         self._due_us = now_us + SETTLING_US
         program, node = self.generation.program, self.fleet.node_id
@@ -145,6 +144,17 @@ class Starting:
         told = standing_itinerary(node, program.version, Stamp(to_bus_ms(now_us), node, 0), here, now_us)
         self.fleet.mirror.on_itinerary(told, now_us)
         return [Send(told), *self.announce()]
+
+    def _start_first(self, here: Segment, now_us: int) -> list[Effect]:
+        """A first life has nothing in hand: it takes part as soon as its shuttle is seen to be home."""
+        shuttle = self.body.shuttle.sensed
+        if shuttle is None or shuttle.mode not in AT_REST:
+            return []
+        why = self.recovery.contradiction(here, shuttle)
+        if why:
+            return self._hold(why)
+        self._enter(Found.FIRST_PLACE)
+        return self._go_on(here, (), now_us)
 
     # --- what is in hand ---------------------------------------------------------------------------------------
 
