@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from bus_sim.campaign import table
+from bus_sim.campaign.cold_start import cold_starts
 from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.ledger import Ledger
 from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count, points, reference
@@ -59,6 +60,7 @@ examples:
   bus-sim campaign small --exhaustive crash --sample 400
   bus-sim campaign small --exhaustive crash --scene overlap --add-to crashes.jsonl
   bus-sim campaign small --seeds 1-2000 --faults two-crashes --apart 30 --no-baseline --add-to crashes.jsonl
+  bus-sim campaign standard --cold-start
   bus-sim campaign standard --seeds 1-2000 --dask tcp://10.0.0.5:8786
 """
 
@@ -82,6 +84,12 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         choices=[str(one) for one in Scene],
         default=str(Scene.ALONE),
         help="with --exhaustive: one car alone, or three that overlap (default: alone)",
+    )
+    parser.add_argument(
+        "--cold-start",
+        action="store_true",
+        help="instead of seeds: cut the power of all machines at work, and see who takes part again within 30 s, with "
+        "nobody missing and with each machine missing in turn",
     )
     parser.add_argument("--sample", type=int, metavar="N", help="with --exhaustive: only so many, spread over all")
     parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
@@ -133,6 +141,8 @@ def run_campaign_command(args: argparse.Namespace) -> int:
     site = find_site(args.site)
     plan = _plan(args, site)
     console = Console()
+    if args.cold_start:
+        return _start_cold(args.site, site, console)
     ledger = _ledger(args, plan)
     trials, total = _trials(args, plan, site, console, ledger)
     results: list[Result] = []
@@ -154,6 +164,15 @@ def run_campaign_command(args: argparse.Namespace) -> int:
             console.print(line, highlight=False, markup=False, soft_wrap=True)
     has_failed = any(result.report.verdict in FAILURES for result in results)
     return 1 if has_failed or (ledger is not None and ledger.has_failed) else 0
+
+
+def _start_cold(name: str, site: Site, console: Console) -> int:
+    """0 where every machine with power took part in time, each time."""
+    is_good = True
+    for start in cold_starts(site, name):
+        console.print(str(start), highlight=False, markup=False, soft_wrap=True)
+        is_good &= start.is_good
+    return 0 if is_good else 1
 
 
 def _why(result: Result) -> str:

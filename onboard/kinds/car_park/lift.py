@@ -117,7 +117,9 @@ class Lift:
     def state(self) -> MachineState:
         """Heartbeat state."""
         if self.phase is LiftPhase.STARTING:
-            return MachineState.STARTING
+            # Who knows where it stands takes part, though it waits for the robot that has its platform to be heard.
+            stands = self.drive is not None and self.drive.mode is DriveMode.STANDING
+            return MachineState.WAITING if stands and self.platform is not None else MachineState.STARTING
         if self._is_stuck:
             return MachineState.STOPPED
         return MachineState.IDLE if self.phase is LiftPhase.FREE else MachineState.WORKING
