@@ -12,7 +12,8 @@ from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
-from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason
+from onboard.core.car_words import CarWords
+from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, MachineState, Reason
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.holding import Hold, Holding, Outcome
 from onboard.core.messages import (
@@ -32,6 +33,8 @@ from onboard.core.messages import (
     Speakers,
     SyncRequest,
     TaskReport,
+    TokenGrant,
+    TokenHeld,
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
@@ -104,6 +107,7 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
         self.rights = Rights(self.fleet, self._may_grant)
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
@@ -173,6 +177,9 @@ class Holon:
         if isinstance(message, Itinerary | Heartbeat):
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
+        if isinstance(message, TokenGrant | TokenHeld):
+            proven = self.car_words.settle(message.token_kind, message.token)
+            effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
 
     def _pass_over(self, message: Message, why: Reason) -> list[Effect]:
@@ -270,10 +277,12 @@ class Holon:
 
     def _is_time_source(self, sender: int) -> bool:
         """Whether bus time from ``sender`` counts: a fixed machine of the site, below me if I am one myself."""
-        machine = self.site.machines.get(sender)
-        if machine is None or machine.kind in MOBILE_KINDS:
-            return False
-        return self.machine.kind in MOBILE_KINDS or sender < self.node_id
+        return self._is_fixed(sender) and (self.machine.kind in MOBILE_KINDS or sender < self.node_id)
+
+    def _is_fixed(self, node: int) -> bool:
+        """Whether a node is a fixed machine, by the site and not by what it says of itself."""
+        machine = self.site.machines.get(node)
+        return machine is not None and machine.kind not in MOBILE_KINDS
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -303,7 +312,7 @@ class Holon:
         return []
 
     def _on_car(self, statement: CarAt, now_us: int) -> list[Effect]:
-        self.mirror.on_car(statement)
+        self.car_words.hear(statement)
         return []
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
@@ -490,11 +499,7 @@ class Holon:
         if self.machine.kind in MOBILE_KINDS:
             return
         now_us = self.clock.bus_us(local_us)
-        lower = [
-            node
-            for node in self.mirror.alive(now_us)
-            if node < self.node_id and self.mirror.peers[node].kind not in (*MOBILE_KINDS, KindCode.OBSERVER)
-        ]
+        lower = [node for node in self.mirror.alive(now_us) if node < self.node_id and self._is_fixed(node)]
         if lower:
             self.clock.follow(local_us)
             self._bus_time_due_us = None
