@@ -24,11 +24,13 @@ from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names, site_text
 from bus_sim.systems.registry import RUNNERS, SystemOptions
+from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError
+from onboard.io.signals import terminated_as_interrupted
 from onboard.web.address import WebError
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.site_dbc import site_dbc
@@ -212,7 +214,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
-        return COMMANDS[args.command](args)
+        with terminated_as_interrupted():
+            return COMMANDS[args.command](args)
     except (
         ConfigError,
         WebError,
@@ -227,8 +230,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
         return 2
+    except (StandstillError, DeadlockError) as error:
+        print(f"bus-sim: {error}", file=sys.stderr)
+        return 1
     except BrokenPipeError:
         return 1
+    except KeyboardInterrupt:
+        return 130
 
 
 def _sites(args: argparse.Namespace) -> int:

@@ -43,6 +43,7 @@ ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
     "moved": people.moved,
     "blocked": operators.blocked,
     "emergency_stop": operators.emergency_stop,
+    "operate": operators.operate,
 }
 #: What is there from power-up on and waits for its time by itself.
 _FROM_POWER_UP: Final = frozenset({"attack"})
@@ -57,7 +58,8 @@ def check_targets(faults: Iterable[AnyFault], site: Site) -> None:
         for key in ("target", "members", "receivers"):
             if key in KINDS[fault.kind].settings:
                 for name in fault.text(key).split("|"):
-                    if name not in known:
+                    # A machine that need not be named is the empty word.
+                    if name and name not in known:
                         raise ValueError(
                             f"fault {str(fault)!r}: {key}={name}: no such machine on site {site.name}; "
                             f"{nearest(name, known)}"

@@ -16,6 +16,7 @@ from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, MachineState, Reason
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.journal_state import INTACT, JournalCondition, reason_of
 from onboard.core.messages import (
     Award,
     Bid,
@@ -66,8 +67,11 @@ class Holon:
         *,
         boot: int = 1,
         entries: Iterable[Mapping[str, str | int]] = (),
+        journal: JournalCondition = INTACT,
     ) -> None:
         self.site = site
+        #: How the journal was found; its ``entries`` are all that there ever were only where it is reliable.
+        self.journal = journal
         self.machine = machine
         self.node_id = machine.node_id
         self.boot = boot
@@ -136,7 +140,12 @@ class Holon:
     # --- events in ---------------------------------------------------------------------------------------------
 
     def start(self, local_us: int) -> list[Effect]:
-        """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
+        """First effects after power-up: the boot counter to the journal, then the first heartbeat.
+
+        Where the journal lacks what was once confirmed, the machine says so and holds: it cannot know its rights.
+        """
+        if not self.journal.is_reliable:
+            return self._without_journal()
         if not self._has_past:
             # A first life, or a lost journal: peers that knew an earlier one have so long to say so.
             self._trust_at_us = local_us + self.site.timing.heartbeat_us
@@ -149,6 +158,11 @@ class Holon:
         effects += self._beat(now_us)
         effects.append(Send(SyncRequest(self.node_id, NOBODY)))
         return self._settle(effects, now_us)
+
+    def _without_journal(self) -> list[Effect]:
+        """Rights that were given away since would seem to be mine: none is used, and nothing is written."""
+        why = f"{self.journal.why}; a person must regenerate its rights, or bring its own journal back"
+        return self._halt(why, reason_of(self.journal))
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
@@ -476,7 +490,7 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects += self._words() + self._diagnostics()
+            effects += self._words() + self._diagnostics() + self.fleet.forgotten()
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
@@ -513,7 +527,7 @@ class Holon:
             return []
         self.halted = why
         self.holding.halt(reason, cause)
-        return [Halt(why)]
+        return [Halt(why, reason)]
 
     def _diagnostics(self) -> list[Effect]:
         """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""
