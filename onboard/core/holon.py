@@ -11,6 +11,7 @@ from typing import Any
 from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
+from onboard.core.blocked_words import BlockedWords
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, MachineState, Reason
@@ -89,11 +90,8 @@ class Holon:
         self.tokens.genesis_counts = self._has_past
         self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
-        for entry in entries:
-            if entry.get("record") in ("blocked", "clear"):
-                word = Blocked if entry["record"] == "blocked" else Clear
-                told = word(machine.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
-                self.mirror.on_word(told, 0)
+        self.blocked_words = BlockedWords(site, machine.node_id, self.mirror)
+        self.blocked_words.replay(entries)
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
         self.holding = Holding(machine.node_id, site.timing.heartbeat_us)
         self.holding.replay(entries)
@@ -133,8 +131,8 @@ class Holon:
             EmergencyStop: self._on_emergency_stop,
             Go: self._on_go,
             Halted: self._on_halted,
-            Blocked: self._on_word,
-            Clear: self._on_word,
+            Blocked: self.blocked_words.hear,
+            Clear: self.blocked_words.hear,
         }
 
     # --- events in ---------------------------------------------------------------------------------------------
@@ -264,10 +262,7 @@ class Holon:
             return []
         if not self._is_time_source(message.sender):
             # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
-            machine = self.site.machines.get(message.sender)
-            if machine is None or machine.kind in MOBILE_KINDS:
-                self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-            elif self.clock.adopt(message.bus_time_us, local_us):
+            if self.clock.adopt(message.bus_time_us, local_us):
                 self._heartbeat_due_us = self._bus_time_due_us = self.clock.bus_us(local_us)
             return []
         if self.machine.kind not in MOBILE_KINDS and self.clock.refutes(message.bus_time_us, local_us):
@@ -361,7 +356,7 @@ class Holon:
                 Reason.JOURNAL_LOST,
                 request.sender,
             )
-        effects = self.behaviour.statements(now_us) + self._blocked_again()
+        effects = self.behaviour.statements(now_us) + self.blocked_words.statements()
         known = self.mirror.peers.get(request.sender)
         if (
             request.whom == NOBODY
@@ -381,18 +376,6 @@ class Holon:
         if before == 0 or request.sender not in self.site.machines:
             return False
         return not self._has_past or is_newer(before, self.boot, 8)
-
-    def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
-        """A segment is blocked, or clear again; what I am steward of is in my journal."""
-        is_mine = self.site.stewards.get(word.track) == self.node_id
-        if not self.mirror.on_word(word, now_us) or not is_mine:
-            return []
-        record = "blocked" if isinstance(word, Blocked) else "clear"
-        return [Record({"record": record, "track": word.track, "index": word.index, "reason": int(word.reason)})]
-
-    def _blocked_again(self) -> list[Effect]:
-        tracks = [track for track, steward in self.site.stewards.items() if steward == self.node_id]
-        return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
