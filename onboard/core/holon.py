@@ -15,8 +15,10 @@ from onboard.core.blocked_words import BlockedWords
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, MachineState, Reason
+from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.holding import Hold, Holding
+from onboard.core.holds import Holds
 from onboard.core.journal_state import INTACT, JournalCondition, reason_of
 from onboard.core.messages import (
     Award,
@@ -26,10 +28,10 @@ from onboard.core.messages import (
     CallForProposals,
     CarAt,
     Clear,
-    Diagnostic,
     EmergencyStop,
     Heartbeat,
     Itinerary,
+    LeftOut,
     Message,
     Progress,
     Speakers,
@@ -44,11 +46,9 @@ from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted
 from onboard.core.rights import Rights
-from onboard.core.serial import is_newer
 from onboard.core.site import Machine, Site
+from onboard.core.witness import Witness
 
-#: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
-DIGEST_PATIENCE = 2
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
@@ -80,15 +80,13 @@ class Holon:
         #: Input dropped here, and below by the shell's decoders and queues, by reason.
         self.drops: Counter[Reason] = Counter()
         self.wire_drops: Counter[Reason] = Counter()
-        self._told_drops: Counter[Reason] = Counter()
+        self._told = ToldDrops()
         self.admission = Admission(site)
         self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
         entries = tuple(entries)
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
-        self.tokens.genesis_counts = self._has_past
-        self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
         self.blocked_words = BlockedWords(site, machine.node_id, self.mirror)
         self.blocked_words.replay(entries)
@@ -97,7 +95,8 @@ class Holon:
         self.holding.replay(entries)
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
-        self._own_number = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        own = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
             machine.node_id,
@@ -106,14 +105,15 @@ class Holon:
             estimator,
             boot=boot,
             slot=slot_of(site, machine.node_id),
+            is_obstacle=self.mirror.obstacles.machines.__contains__,
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
-        self.rights = Rights(self.fleet, self._may_grant)
+        self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
+        self.rights = Rights(self.fleet, self._may_grant, self.witness)
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
-        self._mismatches: Counter[int] = Counter()
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
@@ -123,14 +123,15 @@ class Holon:
             Bid: self._negotiate,
             Award: self._negotiate,
             TaskReport: self._negotiate,
+            LeftOut: self._negotiate,
             Itinerary: self._on_itinerary,
             Progress: self._on_progress,
             CarAt: self._on_car,
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self._on_emergency_stop,
-            Go: self._on_go,
-            Halted: self._on_halted,
+            Go: self.holds.on_go,
+            Halted: self.holds.on_halted,
             Blocked: self.blocked_words.hear,
             Clear: self.blocked_words.hear,
         }
@@ -144,9 +145,6 @@ class Holon:
         """
         if not self.journal.is_reliable:
             return self._without_journal()
-        if not self._has_past:
-            # A first life, or a lost journal: peers that knew an earlier one have so long to say so.
-            self._trust_at_us = local_us + self.site.timing.heartbeat_us
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self._elect_time_source(local_us)
         now_us = self.clock.bus_us(local_us)
@@ -154,7 +152,7 @@ class Holon:
         effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
         effects += self.behaviour.start(now_us)
         effects += self._beat(now_us)
-        effects.append(Send(SyncRequest(self.node_id, NOBODY)))
+        effects += self.witness.begin(now_us)
         return self._settle(effects, now_us)
 
     def _without_journal(self) -> list[Effect]:
@@ -170,7 +168,7 @@ class Holon:
         """A message of the fleet bus, received at ``local_us``."""
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
-            return self._on_own_number(message, now_us)
+            return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
         if why is not Reason.NONE:
             return self._pass_over(message, why)
@@ -183,6 +181,7 @@ class Holon:
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
         effects = self._awake(now_us)
+        self.presence.standing.hear(message, now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects += handler(message, now_us) if handler is not None else []
@@ -213,20 +212,17 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         self._elect_time_source(local_us)
-        if self._trust_at_us is not None and self._trust_at_us <= local_us:
-            self._trust_at_us = None
-            self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
         effects = self._awake(now_us)
-        effects += self._apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
         if not self.holding.is_apart:
-            effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
+            effects += self.witness.wake(now_us) + self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self._heartbeat_due_us = now_us
-        if not self._bus_time_lost and not self._is_still:
+        if not self._bus_time_lost and self._begins:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self._beat(now_us)
         return self._settle(effects, now_us)
@@ -237,15 +233,14 @@ class Holon:
             self._heartbeat_due_us,
             self._bus_time_due_us,
             self.holding.next_wake(),
+            None if self.holding.is_apart else self.witness.next_wake(),
             None if self.holding.is_apart else self.tokens.next_wake(),
             None if self.holding.is_apart else self.rights.petition_due(),
             self.presence.held_until_us,
-            None if self._is_still else self._negotiation_due(),
-            None if self._is_still else self.behaviour.next_wake(),
+            self._negotiation_due() if self._begins else None,
+            self.behaviour.next_wake() if self._begins else None,
         ]
         due = [self.clock.local_us(time) for time in times if time is not None]
-        if self._trust_at_us is not None:
-            due.append(self._trust_at_us)
         return min(due) if due and self.halted is None else None
 
     def _awake(self, now_us: int) -> list[Effect]:
@@ -254,7 +249,7 @@ class Holon:
             return []
         self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
         # One by one: all are asked at power-up only.
-        asked: list[Effect] = [Send(SyncRequest(self.node_id, node)) for node in self.mirror.peers]
+        asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
@@ -262,14 +257,18 @@ class Holon:
             return []
         if not self._is_time_source(message.sender):
             # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
+            before_us = self.clock.bus_us(local_us)
             if self.clock.adopt(message.bus_time_us, local_us):
+                self.witness.shift(self.clock.bus_us(local_us) - before_us)
                 self._heartbeat_due_us = self._bus_time_due_us = self.clock.bus_us(local_us)
             return []
         if self.machine.kind not in MOBILE_KINDS and self.clock.refutes(message.bus_time_us, local_us):
             return [Send(BusTime(self.node_id, self.clock.bus_us(local_us) % BUS_TIME_MODULUS))]
         first = not self.clock.is_set
         self._bus_time_lost = False
+        before_us = self.clock.bus_us(local_us)
         self.clock.heard(message.bus_time_us, local_us)
+        self.witness.shift(self.clock.bus_us(local_us) - before_us)
         effects: list[Effect] = []
         if first:
             now_us = self.clock.bus_us(local_us)
@@ -304,7 +303,7 @@ class Holon:
     def _may_not_bid(self, now_us: int) -> Reason:
         if self.clock.is_lost(self.clock.local_us(now_us)):
             return Reason.BUS_TIME_LOST
-        if self._is_still or self.behaviour.state in (
+        if not self._begins or self.behaviour.state in (
             MachineState.OBSTACLE,
             MachineState.STOPPED,
             MachineState.STARTING,
@@ -335,58 +334,23 @@ class Holon:
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self._elect_time_source(self.clock.local_us(now_us))
-        if fresh:
-            return [Send(SyncRequest(self.node_id, beat.sender, self.mirror.boots_before[beat.sender]))]
-        if beat.mirror_digest == self.mirror.digest():
-            del self._mismatches[beat.sender]
-            return []
-        self._mismatches[beat.sender] += 1
-        if self._mismatches[beat.sender] < DIGEST_PATIENCE:
-            return []
-        del self._mismatches[beat.sender]
-        return [Send(SyncRequest(self.node_id, beat.sender))]
+        return self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
             return []
-        if request.whom == self.node_id and self._has_forgotten(request):
-            return self._halt(
-                f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
-                "a person must regenerate its tokens",
-                Reason.JOURNAL_LOST,
-                request.sender,
-            )
-        effects = self.behaviour.statements(now_us) + self.blocked_words.statements()
-        known = self.mirror.peers.get(request.sender)
-        if (
-            request.whom == NOBODY
-            and known is not None
-            and known.since_us + self.site.timing.heartbeat_us // 2 < now_us
-        ):
-            # All are asked at power-up only: I knew it before, even where its counter is the same again.
-            effects.append(Send(SyncRequest(self.node_id, request.sender, known.boot)))
+        effects = self.witness.on_request(request, now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
             effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
         return effects
 
-    def _has_forgotten(self, request: SyncRequest) -> bool:
-        """Whether my journal lacks a life that a peer knew: tokens that I gave away then would seem to be mine."""
-        before = request.boot_before
-        if before == 0 or request.sender not in self.site.machines:
-            return False
-        return not self._has_past or is_newer(before, self.boot, 8)
+    def _statements(self, now_us: int) -> list[Effect]:
+        return self.behaviour.statements(now_us) + self.blocked_words.statements()
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
-        return self._apply(self.holding.stop(stop.sender, now_us), now_us)
-
-    def _on_go(self, go: Go, now_us: int) -> list[Effect]:
-        return self._apply(self.holding.go(go.stopper), now_us)
-
-    def _on_halted(self, halted: Halted, now_us: int) -> list[Effect]:
-        self.presence.heard_halted(halted, now_us)
-        return []
+        return self.holds.apply(self.holding.stop(stop.sender, now_us), now_us)
 
     # --- holds -------------------------------------------------------------------------------------------------
 
@@ -395,10 +359,10 @@ class Holon:
         """Whether this machine is an obstacle: it neither moves nor bids."""
         return self.presence.is_held or self.holding.is_held
 
-    def _on_own_number(self, message: Message, now_us: int) -> list[Effect]:
-        """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
-        self.drops[Reason.DUPLICATE_NODE_ID] += 1
-        return self._apply(self.holding.own_frame(now_us, is_right=self._own_number.is_right(message)), now_us)
+    @property
+    def _begins(self) -> bool:
+        """Whether this machine may begin anything: whoever was started again waits until all have answered."""
+        return not (self._is_still or self.witness.is_waiting)
 
     def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Who is held gives no right away: it may be one that it does not have any more."""
@@ -406,35 +370,10 @@ class Holon:
             return self.holding.why.reason
         return self.behaviour.may_grant(key, requester, now_us)
 
-    def _apply(self, outcome: Outcome, now_us: int) -> list[Effect]:
-        """What follows from an event of the holds."""
-        match outcome:
-            case Outcome.HOLDS:
-                reason, cause, needs_person = self.holding.why
-                told = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
-                is_lasting = self.holding.hold is Hold.PERSON
-                effects: list[Effect] = [Record(self.holding.record())] if is_lasting else []
-                return [*effects, Report(told), *self._words()]
-            case Outcome.GOES_ON:
-                self.presence.listen_anew(now_us)
-                return [Report("goes on"), *self._words()]
-            case Outcome.COMES_BACK:
-                return self._come_back(now_us)
-            case _:
-                return []
-
-    def _come_back(self, now_us: int) -> list[Effect]:
-        """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
-        self.boot = self.boot % 255 + 1
-        self.presence.listen_anew(now_us)
-        records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": self.boot})]
-        ask: Effect = Send(SyncRequest(self.node_id, NOBODY))
-        return [*records, Report("comes back: nobody sends under its number any more"), *self._words(), ask]
-
-    def _words(self) -> list[Effect]:
-        """My sign of life, and why I do not act where I do not."""
-        held: list[Effect] = [Send(self.holding.word(self.boot))] if self.holding.is_held else []
-        return [Send(self._heartbeat()), *held]
+    def _new_life(self, now_us: int) -> tuple[int, list[Effect]]:
+        """As after a restart: the boot counter, and the question to all what they know."""
+        self.boot = self.witness.boot = self.boot % 255 + 1
+        return self.boot, self.witness.begin(now_us)
 
     def last_word(self, reason: Reason) -> Halted:
         """What is said before the process ends: ``reason`` where none was given before."""
@@ -446,18 +385,24 @@ class Holon:
 
     def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
+        effects = effects + self._doubts()
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
-        for _ in range(0 if self._is_still else MAX_ROUNDS):
+        for _ in range(MAX_ROUNDS if self._begins else 0):
             more = self.behaviour.advance(now_us)
             if not more:
                 break
             effects = effects + more
         else:
-            if not self._is_still:
+            if self._begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
-        self._own_number.note(effects)
+        self.holds.own.note(effects)
         return effects
+
+    def _doubts(self) -> list[Effect]:
+        """Somebody knows that the journal is old: nothing of it is used any more."""
+        doubt = self.witness.doubt
+        return [] if doubt is None else self._halt(doubt.text, doubt.reason, doubt.cause)
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -473,7 +418,11 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects += self._words() + self._diagnostics() + self.fleet.forgotten()
+            effects += (
+                self.holds.words()
+                + self._told.words(self.node_id, self.drops + self.wire_drops)
+                + self.fleet.forgotten()
+            )
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
@@ -511,10 +460,3 @@ class Holon:
         self.halted = why
         self.holding.halt(reason, cause)
         return [Halt(why, reason)]
-
-    def _diagnostics(self) -> list[Effect]:
-        """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""
-        totals = self.drops + self.wire_drops
-        grown = [reason for reason in sorted(totals) if totals[reason] != self._told_drops[reason]]
-        self._told_drops = totals
-        return [Send(Diagnostic(self.node_id, reason, totals[reason] & 0xFFFFFFFF)) for reason in grown]

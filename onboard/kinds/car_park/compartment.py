@@ -12,6 +12,7 @@ from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     ANY_STATION,
+    NOBODY,
     OUTSIDE,
     TASK_VERSION_BITS,
     CallResult,
@@ -157,11 +158,11 @@ class Compartment:
             urgent = message.action is OperatorAction.URGENT_TICKET
             return self._at_desk(DESK_INPUT[message.action], message.car, urgent=urgent)
         if isinstance(message, TaskReport):
-            return self._on_report(message, now_us)
+            return self.stewardship.hear(message, now_us) + self._on_report(message, now_us)
         if isinstance(message, TokenRequest) and self.job is not None:
             wanted = TokenKey(message.token_kind, message.token)
             return self._remind(self.job, message.sender) if wanted == car_token(*self.job.car) else []
-        return self.stewardship.hear(message)
+        return self.stewardship.hear(message, now_us)
 
     def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
         """What its winner, or who has won it once, says of a task of mine; or the custodian of its car."""
@@ -181,6 +182,8 @@ class Compartment:
         """The winner gives the task back, or the custodian of the car has taken the right to it back."""
         record = self.fleet.mirror.cars.get(job.car)
         if job.winner and sender == job.winner:
+            return self._call_again(job, now_us)
+        if not job.winner and self._is_unheard(job, now_us) and record is not None and sender == record.custodian:
             return self._call_again(job, now_us)
         if not job.winner or record is None or sender != record.custodian:
             return []
@@ -265,7 +268,18 @@ class Compartment:
         job = self.job
         if job is not None and job.winner and effects and self.stewardship.is_given_back(job.car):
             effects += self._call_again(job, now_us)
+        elif job is not None and not job.winner and self._is_mine(job.car) and self._is_unheard(job, now_us):
+            # Nobody has a right by the award that was not heard: its car is mine, and goes to the winner only.
+            effects += self._call_again(job, now_us)
         return effects
+
+    def _is_unheard(self, job: BayTask, now_us: int) -> bool:
+        return self.fleet.negotiation.unheard(job.task, now_us) != NOBODY
+
+    def _is_mine(self, car: Reference) -> bool:
+        record = self.fleet.mirror.cars.get(car)
+        is_mine = record is not None and record.custodian == self.fleet.node_id
+        return is_mine and self.fleet.tokens.holds(car_token(*car))
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""

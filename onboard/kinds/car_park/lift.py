@@ -157,7 +157,7 @@ class Lift:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """As steward of alleys: awards tell who may fetch a stored car, and a car given to me is stated anew."""
-        effects = self.stewardship.hear(message)
+        effects = self.stewardship.hear(message, now_us)
         if not isinstance(message, Award) or message.result is not CallResult.AWARDED:
             return effects
         known = self.fleet.negotiation.knows(message.sender, message.call)
