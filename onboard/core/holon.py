@@ -11,7 +11,9 @@ from typing import Any
 from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
+from onboard.core.blocked_words import BlockedWords
 from onboard.core.bus_time import BUS_TIME_MODULUS
+from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Report, Send
@@ -35,6 +37,8 @@ from onboard.core.messages import (
     Speakers,
     SyncRequest,
     TaskReport,
+    TokenGrant,
+    TokenHeld,
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
@@ -84,11 +88,8 @@ class Holon:
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
         self.mirror = Mirror(site, machine.node_id)
-        for entry in entries:
-            if entry.get("record") in ("blocked", "clear"):
-                word = Blocked if entry["record"] == "blocked" else Clear
-                told = word(machine.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
-                self.mirror.on_word(told, 0)
+        self.blocked_words = BlockedWords(site, machine.node_id, self.mirror)
+        self.blocked_words.replay(entries)
         self.time = Timekeeper(site, machine, self.mirror, self.drops)
         self.clock = self.time.clock
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
@@ -110,6 +111,7 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
         self._heartbeat_due_us: int | None = None
@@ -131,8 +133,8 @@ class Holon:
             EmergencyStop: self._on_emergency_stop,
             Go: self.holds.on_go,
             Halted: self.holds.on_halted,
-            Blocked: self._on_word,
-            Clear: self._on_word,
+            Blocked: self.blocked_words.hear,
+            Clear: self.blocked_words.hear,
         }
 
     # --- events in ---------------------------------------------------------------------------------------------
@@ -193,6 +195,9 @@ class Holon:
         if isinstance(message, Itinerary | Heartbeat):
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
+        if isinstance(message, TokenGrant | TokenHeld):
+            proven = self.car_words.settle(message.token_kind, message.token)
+            effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
 
     def _pass_over(self, message: Message, why: Reason) -> list[Effect]:
@@ -324,7 +329,7 @@ class Holon:
         return []
 
     def _on_car(self, statement: CarAt, now_us: int) -> list[Effect]:
-        self.mirror.on_car(statement)
+        self.car_words.hear(statement)
         return []
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
@@ -350,19 +355,7 @@ class Holon:
         return effects
 
     def _statements(self, now_us: int) -> list[Effect]:
-        return self.behaviour.statements(now_us) + self._blocked_again()
-
-    def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
-        """A segment is blocked, or clear again; what I am steward of is in my journal."""
-        is_mine = self.site.stewards.get(word.track) == self.node_id
-        if not self.mirror.on_word(word, now_us) or not is_mine:
-            return []
-        record = "blocked" if isinstance(word, Blocked) else "clear"
-        return [Record({"record": record, "track": word.track, "index": word.index, "reason": int(word.reason)})]
-
-    def _blocked_again(self) -> list[Effect]:
-        tracks = [track for track, steward in self.site.stewards.items() if steward == self.node_id]
-        return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
+        return self.behaviour.statements(now_us) + self.blocked_words.statements()
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""

@@ -68,7 +68,7 @@ class Stewardship:
                 for won in [won for won in self._unheard_us if self.winners.get(won) == message.sender]:
                     if isinstance(message, Itinerary) or self.tasks[won][0] == message.task:
                         del self._unheard_us[won]
-            case CallForProposals() if message.operation in (Operation.PARK, Operation.RETRIEVE):
+            case CallForProposals() if self._is_for_a_car(message):
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
                     del self._cars_of_calls[next(iter(self._cars_of_calls))]
@@ -80,6 +80,12 @@ class Stewardship:
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._state_anew(custody.car_of(message), message.version)
         return []
+
+    def _is_for_a_car(self, call: CallForProposals) -> bool:
+        """Whether its winner may fetch a stored car: only a compartment, or a person's station, calls for that."""
+        machine = self.fleet.site.machines.get(call.sender)
+        is_from_whom = machine is None or call.sender in self.fleet.site.compartments
+        return is_from_whom and call.operation in (Operation.PARK, Operation.RETRIEVE)
 
     def won(self, car: Reference, winner: int, task: Reference, version: int) -> list[Effect]:
         """``winner`` may fetch a car, or with 0 nobody may, for ``task`` under ``version``."""

@@ -172,7 +172,7 @@ class GraphRobot:
         match message:
             case NodeAnswer() if message.robot == self.fleet.node_id:
                 self._on_answer(message, now_us)
-            case Heartbeat(kind=KindCode.NODE):
+            case Heartbeat() if message.sender in self.site.hosts.values():
                 self.has_other_map = message.site_digest != self.fleet.site.digest
             case RobotAt():
                 self.planning.others[message.sender] = message
