@@ -33,6 +33,7 @@ _KERNEL_PARTS = (
     ),
     *("drivers/usb/host", "drivers/usb/dwc2", "drivers/usb/storage", "drivers/usb/core", "drivers/usb/common"),
     *("drivers/usb/gadget/udc", "drivers/usb/roles", "drivers/usb/phy", "drivers/char/hw_random"),
+    *("drivers/rtc", "drivers/i2c/busses"),
     *("fs/squashfs", "fs/ext4", "fs/jbd2", "fs/fat", "fs/nls", "crypto", "lib", "arch/arm64/crypto"),
 )
 _SINGLE_PARTS = (

@@ -19,6 +19,7 @@ PACKAGES = {
     "mkfs.ext4": "e2fsprogs",
     "mcopy": "mtools",
     "dtc": "device-tree-compiler",
+    "fdtoverlay": "device-tree-compiler",
     "fdtget": "device-tree-compiler",
     "fdtput": "device-tree-compiler",
     "openssl": "openssl",
