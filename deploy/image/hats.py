@@ -72,8 +72,26 @@ HATS = {
 }
 
 
+#: The overlay for real-time clocks on I2C1, and the chips that are its parameters: the kernel's name and the address.
+RTC = "i2c-rtc"
+_CLOCKS = {
+    "ds1307": ("dallas,ds1307", 0x68),
+    "ds3231": ("maxim,ds3231", 0x68),
+    "pcf8523": ("nxp,pcf8523", 0x68),
+    "pcf8563": ("nxp,pcf8563", 0x51),
+    "pcf85063": ("nxp,pcf85063", 0x51),
+}
+
+
+def names() -> Sequence[str]:
+    """All overlays that there are."""
+    return [*HATS, RTC]
+
+
 def overlay_source(name: str) -> str:
-    """The overlay of ``HATS`` as source for ``dtc -@``."""
+    """The overlay of this name as source for ``dtc -@``."""
+    if name == RTC:
+        return _clock_source()
     hat = HATS[name]
     used = sorted({place.bus for place in hat.places + hat.choices})
     on = {place.bus for place in hat.places}
@@ -139,6 +157,14 @@ def _controller(chip: Chip, place: Place) -> list[_Fragment]:
 def _clock(chip: str, address: int) -> _Fragment:
     node = f'rtc@{address:x} {{ compatible = "{chip}"; reg = <{address:#x}>; }};'
     return _Fragment(f'target-path = "{_I2C1}"; __overlay__ {{ {_CELLS} {node} }};')
+
+
+def _clock_source() -> str:
+    """Each clock sleeps until its parameter wakes it."""
+    texts = [_clock(*clock).text.replace("__overlay__", "__dormant__") for clock in _CLOCKS.values()]
+    body = "\n".join(f"fragment@{number} {{ {text} }};" for number, text in enumerate(texts))
+    params = "\n".join(f'{name} = <0>, "+{number}";' for number, name in enumerate(_CLOCKS))
+    return f'/dts-v1/;\n/plugin/;\n/ {{\ncompatible = "brcm,bcm2835";\n{body}\n__overrides__ {{\n{params}\n}};\n}};\n'
 
 
 def _overrides(hat: Hat, used: Sequence[int]) -> dict[str, list[str]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from deploy.image.apt import run_tool
 from deploy.image.config_txt import merged
-from deploy.image.hats import HATS, overlay_source
+from deploy.image.hats import names, overlay_source
 
 #: What our overlays name, and where the trees of all boards have it (Linux arch/arm/boot/dts/bcm283x.dtsi).
 _NAME, _PLACE = "gpio", "/soc/gpio@7e200000"
@@ -28,7 +28,7 @@ def write_overlays(to: Path) -> list[Path]:
     """Compile the overlay of every HAT that is known. Raises ``DeployError``."""
     to.mkdir(parents=True, exist_ok=True)
     made = []
-    for name in HATS:
+    for name in names():
         source, overlay = to / f"{name}.dts", to / f"{name}.dtbo"
         source.write_text(overlay_source(name), encoding="utf-8")
         run_tool(["dtc", "-@", "-q", "-I", "dts", "-O", "dtb", "-o", str(overlay), str(source)])

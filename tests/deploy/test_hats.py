@@ -113,6 +113,13 @@ def test_hats_with_two_controllers(lines: str, places: list[tuple[str, int, int]
         assert root.at("/soc/i2c@7e804000/rtc@51").text("compatible") == "nxp,pcf85063"
 
 
+def test_a_real_time_clock_by_its_chip(overlays: Path, tree: Path) -> None:
+    root = merged("dtoverlay=i2c-rtc,ds3231", tree, overlays)
+    bus = root.at("/soc/i2c@7e804000")
+    assert bus.text("status") == "okay"
+    assert {name: node.text("compatible") for name, node in bus.children.items()} == {"rtc@68": "maxim,ds3231"}
+
+
 def test_a_bus_that_nobody_chose_stays_as_it_was(overlays: Path, tree: Path) -> None:
     root = merged("dtoverlay=mcp2515,spi1-0,speed=5000000", tree, overlays)
     assert root.at(SPI0).text("status") == "disabled"
@@ -122,7 +129,7 @@ def test_a_bus_that_nobody_chose_stays_as_it_was(overlays: Path, tree: Path) -> 
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        ("dtoverlay=mcp2515-can2", "no such overlay; known: mcp2515, mcp2515-can0"),
+        ("dtoverlay=mcp2515-can2", "no such overlay; known: i2c-rtc, mcp2515, mcp2515-can0"),
         ("dtoverlay=mcp2515-can0,osc=8000000", "no such parameter; known: interrupt, oscillator, spimaxfrequency"),
         ("dtoverlay=seeed-can-fd-hat-v1,speed=1", "no such parameter; known: none"),
     ],
