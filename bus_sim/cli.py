@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from bus_sim.attacks.command import add_attack, run_attack_command
 from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.certify.command import add_certify, run_certify
@@ -23,6 +24,7 @@ from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names, site_text
 from bus_sim.systems.registry import RUNNERS, SystemOptions
+from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
@@ -81,6 +83,7 @@ def build_parser() -> argparse.ArgumentParser:
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     add_compare(commands)
     add_campaign(commands)
+    add_attack(commands)
     add_import(commands)
     add_certify(commands)
     return parser
@@ -227,6 +230,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
         return 2
+    except (StandstillError, DeadlockError) as error:
+        print(f"bus-sim: {error}", file=sys.stderr)
+        return 1
     except BrokenPipeError:
         return 1
     except KeyboardInterrupt:
@@ -262,6 +268,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "dbc": _dbc,
     "compare": run_compare,
     "campaign": run_campaign_command,
+    "attack": run_attack_command,
     "import": run_import,
     "certify": run_certify,
 }

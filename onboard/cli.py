@@ -14,6 +14,7 @@ from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon
 from onboard.core.serial import next_boot
+from onboard.core.site import journal_owner
 from onboard.gateway.options import add_mqtt_arguments
 from onboard.gateway.settings import GatewayError
 from onboard.io.broker_address import is_mqtt_installed
@@ -23,7 +24,7 @@ from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
 from onboard.io.signals import terminated_as_interrupted
-from onboard.kinds.registry import factory_for, system_of
+from onboard.kinds.registry import compaction_for, factory_for, system_of
 from onboard.life import Life
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
@@ -62,6 +63,8 @@ examples:
       publish the site to a broker; see onboard gateway --help
   onboard web -i socketcan -c can0 --site site.toml
       a live picture on a page of this computer; see onboard web --help
+  onboard operate status -i socketcan -c can0 --site site.toml
+      who stands and why; stop, go, block, clear, hold, release; see onboard operate --help
 """
 
 
@@ -168,8 +171,19 @@ def _gateway(words: list[str]) -> int:
     return gateway(words)
 
 
+def _operate(words: list[str]) -> int:
+    from onboard.operate.cli import main as operate  # noqa: PLC0415  # a controller must not carry it
+
+    return operate(words)
+
+
 #: What is not a controller; each takes the words behind its own and returns the exit status.
-COMMANDS: dict[str, Callable[[list[str]], int]] = {"trace": _trace, "web": _web, "gateway": _gateway}
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    "trace": _trace,
+    "web": _web,
+    "gateway": _gateway,
+    "operate": _operate,
+}
 
 
 async def run(
@@ -178,11 +192,16 @@ async def run(
     """Run until stopped; the exit status (``Ending``)."""
     life = Life(config.machine.name, journal_directory)
     with life.ended_by_signals():
-        journal = FileJournal(journal_directory)
+        journal = FileJournal(journal_directory, journal_owner(config.site, config.machine))
         entries = journal.replay()
         boot = next_boot(entries)
         holon = Holon(
-            config.site, config.machine, factory_for(config.site, config.machine.kind), boot=boot, entries=entries
+            config.site,
+            config.machine,
+            factory_for(config.site, config.machine.kind),
+            boot=boot,
+            entries=entries,
+            journal=journal.condition,
         )
         buses = await life.open_buses(fleet_settings, BusSettings.of(config.device_bus))
         if buses is None:
@@ -198,7 +217,8 @@ async def run(
             telemetry = ManyTelemetry(telemetry, beside)
             published = asyncio.get_running_loop().create_task(beside.run())
             published.add_done_callback(_tell_ended)
-        controller = Controller(holon, Ports(*buses, journal, telemetry, life.watchdog), codec.fleet, codec.device)
+        ports = Ports(*buses, journal, telemetry, life.watchdog, compaction_for(config.site))
+        controller = Controller(holon, ports, codec.fleet, codec.device)
         controller.start()
         life.follow(controller)
         await life.over()

@@ -15,7 +15,7 @@ from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress
-from onboard.io.journal import FileJournal
+from onboard.io.journal import FileJournal, JournalDamagedError
 from onboard.io.mqtt import MqttBroker
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
 from onboard.io.signals import ended_by
@@ -102,9 +102,11 @@ def beside(args: argparse.Namespace, site: Site, machine: Machine) -> Callable[[
 
 async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bus: BusSettings, spool: Path) -> int:
     broker = MqttBroker(address)
-    journal = FileJournal(spool)
+    journal = FileJournal(spool, f"{site.name} gateway")
     try:
         reports = Reports(journal)
+        if not journal.condition.is_reliable:
+            raise JournalDamagedError(f"{journal.condition.why}; move the file away: what waits in it is lost")
         opened = await open_bus(bus)
         try:
             system = system_of(site)

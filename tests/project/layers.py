@@ -14,6 +14,7 @@ from pathlib import Path
 CORE_TYPES = (
     "onboard.core.codes",
     "onboard.core.frame",
+    "onboard.core.journal_state",
     "onboard.core.messages",
     "onboard.core.recovery_messages",
     "onboard.core.serial",
@@ -114,18 +115,36 @@ LAYERS: dict[str, Layer] = {
             "onboard.wire",
         )
     ),
+    # What a person says is decided from the decoded bus alone; the gateway's words for a held machine are its words.
+    "onboard.operate": Layer(
+        (
+            *CORE_TYPES,
+            *SYSTEM_TYPES,
+            "onboard.config.problems",
+            "onboard.gateway.pauses",
+            "onboard.gateway.whereabouts",
+            "onboard.ports",
+            "onboard.wire",
+        ),
+        not_stdlib=frozenset({"random", "socket", "threading", "time"}),
+    ),
+    # Its command line is a composition root: it opens the bus and the site file.
+    "onboard.operate.cli": Layer(
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.operate", "onboard.wire")
+    ),
     "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.life", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+            *("onboard.cli", "onboard.life", "onboard.operate.cli", "onboard.trace.cli"),
+            *("onboard.web.address", "onboard.web.cli"),
             *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),
         ),
         not_stdlib=frozenset({"random", "threading", "time"}),
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
-        ("onboard", "onboard.gateway", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
+        ("onboard", "onboard.gateway", "onboard.operate", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
