@@ -16,6 +16,7 @@ class Verdict(StrEnum):
 
     VIOLATION = "VIOLATION"
     CRASHED = "program error"
+    HUNG = "hung"
     STOPPED = "stopped safely"
     NOT_SERVED = "not served"
     NOT_LIVE = "stood still"
@@ -29,6 +30,7 @@ class Verdict(StrEnum):
 FAILURES = (
     Verdict.VIOLATION,
     Verdict.CRASHED,
+    Verdict.HUNG,
     Verdict.STOPPED,
     Verdict.NOT_SERVED,
     Verdict.NOT_LIVE,

@@ -15,6 +15,7 @@ COLUMNS = (
     Verdict.APART,
     Verdict.NOT_LIVE,
     Verdict.NOT_SERVED,
+    Verdict.HUNG,
     Verdict.CRASHED,
     Verdict.VIOLATION,
 )

@@ -131,6 +131,8 @@ class TokenBook:
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
         for entry in entries:
+            if entry.get("record") == "car_left":
+                self.retire(TokenKey(TokenKind(int(entry["kind"])), int(entry["number"])))
             if entry.get("record") not in ("token_held", "token_given", "token_gone"):
                 continue
             key = TokenKey(TokenKind(int(entry["kind"])), int(entry["number"]))
@@ -169,15 +171,17 @@ class TokenBook:
         self.changes += 1
         return [self._record("token_held", key, 1, self.node_id)]
 
-    def retire(self, key: TokenKey) -> None:
-        """Forget the token of a car that left so long ago that no frame about it can still be under way.
+    def retire(self, key: TokenKey) -> bool:
+        """Forget the token of a car that left so long ago that no frame about it can still be under way; True if so.
 
         Its number comes again after 65,535 others; what was never retired is remembered for good.
         """
-        if key not in self.leaving and key not in self.wanted:
-            for table in (self.seen, self.holder, self.held, self._genesis):
-                table.pop(key, None)
-            self.changes += 1
+        if key in self.leaving or key in self.wanted:
+            return False
+        for table in (self.seen, self.holder, self.held, self._genesis):
+            table.pop(key, None)
+        self.changes += 1
+        return True
 
     def want(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Ask for a token until it is granted or no longer wanted. Nothing happens where it is held or asked for."""

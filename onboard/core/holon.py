@@ -8,11 +8,14 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from onboard.core.authority import TokenBook
+from onboard.core.admission import Admission
+from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
 from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.journal_state import INTACT, JournalCondition, reason_of
 from onboard.core.messages import (
     Award,
     Bid,
@@ -27,12 +30,15 @@ from onboard.core.messages import (
     Itinerary,
     Message,
     Progress,
+    Speakers,
     SyncRequest,
     TaskReport,
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
+from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
+from onboard.core.recovery_messages import Go, Halted
 from onboard.core.rights import Rights
 from onboard.core.serial import is_newer
 from onboard.core.site import Machine, Site
@@ -43,6 +49,8 @@ DIGEST_PATIENCE = 2
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
 _OF_FOREIGNERS = (EmergencyStop, Heartbeat, Progress)
+#: All that a machine hears while it is apart: what may end that, who lives, and why others do not act.
+_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat)
 
 
 class Holon:
@@ -56,8 +64,11 @@ class Holon:
         *,
         boot: int = 1,
         entries: Iterable[Mapping[str, str | int]] = (),
+        journal: JournalCondition = INTACT,
     ) -> None:
         self.site = site
+        #: How the journal was found; its ``entries`` are all that there ever were only where it is reliable.
+        self.journal = journal
         self.machine = machine
         self.node_id = machine.node_id
         self.boot = boot
@@ -66,6 +77,7 @@ class Holon:
         self.drops: Counter[Reason] = Counter()
         self.wire_drops: Counter[Reason] = Counter()
         self._told_drops: Counter[Reason] = Counter()
+        self.admission = Admission(site)
         self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
         entries = tuple(entries)
@@ -80,6 +92,11 @@ class Holon:
                 told = word(machine.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
                 self.mirror.on_word(told, 0)
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
+        self.holding = Holding(machine.node_id, site.timing.heartbeat_us)
+        self.holding.replay(entries)
+        #: Whether the bus has taken my frames of late; the shell knows.
+        self.is_acknowledged = True
+        self._own_number = OwnNumber(machine.node_id, self.tokens, self.mirror)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
             machine.node_id,
@@ -91,7 +108,7 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
-        self.rights = Rights(self.fleet, self.behaviour.may_grant)
+        self.rights = Rights(self.fleet, self._may_grant)
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
         self._mismatches: Counter[int] = Counter()
@@ -110,6 +127,8 @@ class Holon:
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self._on_emergency_stop,
+            Go: self._on_go,
+            Halted: self._on_halted,
             Blocked: self._on_word,
             Clear: self._on_word,
         }
@@ -117,7 +136,12 @@ class Holon:
     # --- events in ---------------------------------------------------------------------------------------------
 
     def start(self, local_us: int) -> list[Effect]:
-        """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
+        """First effects after power-up: the boot counter to the journal, then the first heartbeat.
+
+        Where the journal lacks what was once confirmed, the machine says so and holds: it cannot know its rights.
+        """
+        if not self.journal.is_reliable:
+            return self._without_journal()
         if not self._has_past:
             # A first life, or a lost journal: peers that knew an earlier one have so long to say so.
             self._trust_at_us = local_us + self.site.timing.heartbeat_us
@@ -131,14 +155,28 @@ class Holon:
         effects.append(Send(SyncRequest(self.node_id, NOBODY)))
         return self._settle(effects, now_us)
 
+    def _without_journal(self) -> list[Effect]:
+        """Rights that were given away since would seem to be mine: none is used, and nothing is written."""
+        why = f"{self.journal.why}; a person must regenerate its rights, or bring its own journal back"
+        return self._halt(why, reason_of(self.journal))
+
+    def listen(self, speakers: Speakers) -> None:
+        """From now on only who may say a message, by the contract of the wire, is heard with it."""
+        self.admission.speakers = speakers
+
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
-        if isinstance(message, BusTime):
-            return self._on_bus_time(message, local_us)
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
-            self.drops[Reason.DUPLICATE_NODE_ID] += 1
-            return self._halt("another node sends under this node-ID")
+            return self._on_own_number(message, now_us)
+        why = self.admission.why_not(message)
+        if why is not Reason.NONE:
+            return self._pass_over(message, why)
+        self.holding.heard(now_us)
+        if isinstance(message, BusTime):
+            return self._on_bus_time(message, local_us)
+        if self.holding.is_apart and not isinstance(message, _WHILE_APART):
+            return []
         if message.sender in self.presence.foreign and not isinstance(message, _OF_FOREIGNERS):
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
@@ -150,6 +188,13 @@ class Holon:
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
         return self._settle(effects, now_us)
+
+    def _pass_over(self, message: Message, why: Reason) -> list[Effect]:
+        """What its sender may not say is as if it had not been heard; who it is, people are told once."""
+        self.drops[why] += 1
+        if self.halted is not None or not self.admission.is_first(message.sender, why):
+            return []
+        return [Report(f"{type(message).__name__} of node {message.sender} passed over: {why.name}")]
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
@@ -167,13 +212,16 @@ class Holon:
             self._trust_at_us = None
             self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
-        effects = self._awake(now_us) + self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
+        effects = self._awake(now_us)
+        effects += self._apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        if not self.holding.is_apart:
+            effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self._heartbeat_due_us = now_us
-        if not self._bus_time_lost and not self.presence.is_held:
+        if not self._bus_time_lost and not self._is_still:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self._beat(now_us)
         return self._settle(effects, now_us)
@@ -183,11 +231,12 @@ class Holon:
         times = [
             self._heartbeat_due_us,
             self._bus_time_due_us,
-            self.tokens.next_wake(),
-            self.rights.petition_due(),
+            self.holding.next_wake(),
+            None if self.holding.is_apart else self.tokens.next_wake(),
+            None if self.holding.is_apart else self.rights.petition_due(),
             self.presence.held_until_us,
-            None if self.presence.is_held else self._negotiation_due(),
-            None if self.presence.is_held else self.behaviour.next_wake(),
+            None if self._is_still else self._negotiation_due(),
+            None if self._is_still else self.behaviour.next_wake(),
         ]
         due = [self.clock.local_us(time) for time in times if time is not None]
         if self._trust_at_us is not None:
@@ -204,8 +253,6 @@ class Holon:
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
-        if message.sender == self.node_id:
-            return self._halt("another node sends under this node-ID")
         if message.sender in self.presence.foreign:
             return []
         if not self._is_time_source(message.sender):
@@ -253,7 +300,7 @@ class Holon:
     def _may_not_bid(self, now_us: int) -> Reason:
         if self.clock.is_lost(self.clock.local_us(now_us)):
             return Reason.BUS_TIME_LOST
-        if self.presence.is_held or self.behaviour.state in (
+        if self._is_still or self.behaviour.state in (
             MachineState.OBSTACLE,
             MachineState.STOPPED,
             MachineState.STARTING,
@@ -280,6 +327,7 @@ class Holon:
             self.presence.heard_foreign(beat.sender, reason, now_us)
             return []
         self.presence.foreign.pop(beat.sender, None)
+        self.presence.heard_beat(beat)
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self._elect_time_source(self.clock.local_us(now_us))
@@ -300,7 +348,9 @@ class Holon:
         if request.whom == self.node_id and self._has_forgotten(request):
             return self._halt(
                 f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
-                "a person must regenerate its tokens"
+                "a person must regenerate its tokens",
+                Reason.JOURNAL_LOST,
+                request.sender,
             )
         effects = self.behaviour.statements(now_us) + self._blocked_again()
         known = self.mirror.peers.get(request.sender)
@@ -336,7 +386,69 @@ class Holon:
         return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
-        return self._halt(f"emergency stop from node {stop.sender}: {stop.reason.name}")
+        """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
+        return self._apply(self.holding.stop(stop.sender, now_us), now_us)
+
+    def _on_go(self, go: Go, now_us: int) -> list[Effect]:
+        return self._apply(self.holding.go(go.stopper), now_us)
+
+    def _on_halted(self, halted: Halted, now_us: int) -> list[Effect]:
+        self.presence.heard_halted(halted, now_us)
+        return []
+
+    # --- holds -------------------------------------------------------------------------------------------------
+
+    @property
+    def _is_still(self) -> bool:
+        """Whether this machine is an obstacle: it neither moves nor bids."""
+        return self.presence.is_held or self.holding.is_held
+
+    def _on_own_number(self, message: Message, now_us: int) -> list[Effect]:
+        """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
+        self.drops[Reason.DUPLICATE_NODE_ID] += 1
+        return self._apply(self.holding.own_frame(now_us, is_right=self._own_number.is_right(message)), now_us)
+
+    def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Who is held gives no right away: it may be one that it does not have any more."""
+        if self.holding.is_held:
+            return self.holding.why.reason
+        return self.behaviour.may_grant(key, requester, now_us)
+
+    def _apply(self, outcome: Outcome, now_us: int) -> list[Effect]:
+        """What follows from an event of the holds."""
+        match outcome:
+            case Outcome.HOLDS:
+                reason, cause, needs_person = self.holding.why
+                told = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
+                is_lasting = self.holding.hold is Hold.PERSON
+                effects: list[Effect] = [Record(self.holding.record())] if is_lasting else []
+                return [*effects, Report(told), *self._words()]
+            case Outcome.GOES_ON:
+                self.presence.listen_anew(now_us)
+                return [Report("goes on"), *self._words()]
+            case Outcome.COMES_BACK:
+                return self._come_back(now_us)
+            case _:
+                return []
+
+    def _come_back(self, now_us: int) -> list[Effect]:
+        """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
+        self.boot = self.boot % 255 + 1
+        self.presence.listen_anew(now_us)
+        records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": self.boot})]
+        ask: Effect = Send(SyncRequest(self.node_id, NOBODY))
+        return [*records, Report("comes back: nobody sends under its number any more"), *self._words(), ask]
+
+    def _words(self) -> list[Effect]:
+        """My sign of life, and why I do not act where I do not."""
+        held: list[Effect] = [Send(self.holding.word(self.boot))] if self.holding.is_held else []
+        return [Send(self._heartbeat()), *held]
+
+    def last_word(self, reason: Reason) -> Halted:
+        """What is said before the process ends: ``reason`` where none was given before."""
+        if self.holding.hold is not Hold.HALTED:
+            self.holding.halt(reason)
+        return self.holding.word(self.boot)
 
     # --- inner works -------------------------------------------------------------------------------------------
 
@@ -344,12 +456,16 @@ class Holon:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
-        for _ in range(0 if self.presence.is_held else MAX_ROUNDS):
+        for _ in range(0 if self._is_still else MAX_ROUNDS):
             more = self.behaviour.advance(now_us)
             if not more:
-                return effects
+                break
             effects = effects + more
-        return effects if self.presence.is_held else effects + self._halt("the machine's steps do not come to rest")
+        else:
+            if not self._is_still:
+                effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
+        self._own_number.note(effects)
+        return effects
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -365,8 +481,8 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects.append(Send(self._heartbeat()))
-            effects += self._diagnostics()
+            effects += self._words() + self._diagnostics() + self.fleet.forgotten()
+            effects += [Send(word) for word in self.presence.halted_ones(now_us)]
         if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
             self._bus_time_due_us = now_us + self.site.timing.bus_time_us
             effects.append(Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)))
@@ -380,7 +496,7 @@ class Holon:
             self.mirror.digest(),
             self.boot,
             self.machine.kind,
-            MachineState.OBSTACLE if self.presence.is_held else self.behaviour.state,
+            MachineState.OBSTACLE if self._is_still else self.behaviour.state,
         )
 
     def _elect_time_source(self, local_us: int) -> None:
@@ -401,11 +517,12 @@ class Holon:
         if self._bus_time_due_us is None:
             self._bus_time_due_us = now_us
 
-    def _halt(self, why: str) -> list[Effect]:
+    def _halt(self, why: str, reason: Reason, cause: int = NOBODY) -> list[Effect]:
         if self.halted is not None:
             return []
         self.halted = why
-        return [Halt(why)]
+        self.holding.halt(reason, cause)
+        return [Halt(why, reason)]
 
     def _diagnostics(self) -> list[Effect]:
         """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""

@@ -14,6 +14,7 @@ from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CarAt, Reference, TokenGrant
+from onboard.core.mirror import Mirror
 from onboard.core.serial import successor
 from onboard.core.site import Site, Station
 from onboard.kinds.car_park.bay_memory import car_record
@@ -40,6 +41,11 @@ def state(fleet: Fleet, car: Reference, station: int, wheelbase_mm: int) -> list
     said = CarAt(fleet.node_id, car, station, fleet.tokens.seen[key], wheelbase_mm)
     fleet.mirror.on_car(said)
     return [car_record(said), Send(said)]
+
+
+def others_in(mirror: Mirror, station: Station, car: Reference | None = None) -> list[Reference]:
+    """Cars that stand in a station by their custodians' word, other than ``car``."""
+    return [one for one, record in mirror.cars.items() if record.station == station.number and one != car]
 
 
 def replay(fleet: Fleet, said: Iterable[CarAt]) -> None:

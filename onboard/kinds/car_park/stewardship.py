@@ -14,7 +14,7 @@ from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TaskReport, TokenGrant
 from onboard.core.petitions import UNORDERED
 from onboard.core.serial import is_newer
-from onboard.core.site import Segment
+from onboard.core.site import Segment, Station
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.bay_memory import BayMemory, winner_record
 
@@ -143,7 +143,10 @@ class Stewardship:
         if key.kind is TokenKind.CAR:
             car = Reference(key.number >> 16, key.number & 0xFFFF)
             return Reason.NONE if self.winners.get(car) == requester else Reason.TOKEN_NOT_GRANTABLE_YET
-        return Reason.NONE
+        # Where a car stands nobody may bring another: only who is to fetch it has anything to do there.
+        cars = custody.others_in(self.fleet.mirror, Station.from_number(key.number))
+        may_enter = all(self.winners.get(car) == requester for car in cars)
+        return Reason.NONE if may_enter else Reason.TOKEN_NOT_GRANTABLE_YET
 
     def car_statements(self) -> list[Effect]:
         """Where each car in my custody stands, and which of them have left last: somebody may have missed that."""

@@ -57,6 +57,8 @@ class Carriage:
     _stood: tuple[DriveState | None, int, Segment | None] | None = None
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
     way_on: Callable[[], list[Segment]] = list
+    #: Whether nothing stands out of the carrier, by its sensors: it gets no order to move else (row P32).
+    is_clear: Callable[[], bool] = lambda: True
     whole: AllOrNone = field(init=False)
     stall: Stall = field(default_factory=Stall)
 
@@ -202,6 +204,12 @@ class Carriage:
                 self.whole.end()
             self._face(goal)
 
+    def stay(self) -> None:
+        """Drop the goal: the drive gets no more orders, and brakes by itself where it moves."""
+        self.goal = self.target = self.blocked = self.refresh_at_us = None
+        self.stall.rests()
+        self.whole.end()
+
     def _face(self, goal: Segment) -> None:
         """Take the axis of a goal in hand where that is another one and the carrier is not turned away from it."""
         if self.sensed is None or goal.track == self.track:
@@ -226,11 +234,16 @@ class Carriage:
 
     def _outlook(self) -> tuple[object, ...]:
         """All that decides what is to be done, but the time: each message on the bus asks, and few change anything."""
-        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped
+        clear = self.is_clear()
+        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped, clear
 
     def _go_on(self, now_us: int) -> list[Effect]:
         if self.goal is None or self.sensed is None or self.arrived:
             return self._rest(now_us)
+        if not self.is_clear():
+            self.refresh_at_us = self.target = None
+            self.stall.rests()
+            return []
         ahead = self._ahead()
         effects: list[Effect] = []
         for slot in self.occupied():
