@@ -52,9 +52,7 @@ def test_a_robot_that_cannot_move_is_towed_and_the_other_serves_all_customers() 
     meanwhile = {node for t, node in done if HOLD_S * 1e6 < t < RELEASE_S * 1e6 and node in (MR1, MR2)}
     assert meanwhile == {MR2} and MR1 in {node for t, node in done if t > RELEASE_S * 1e6}
     places = {
-        (one.track, one.index)
-        for t, one in scene.all(Progress)
-        if one.sender == MR1 and PUSH_S <= t / 1e6 < RELEASE_S
+        (one.track, one.index) for t, one in scene.all(Progress) if one.sender == MR1 and PUSH_S <= t / 1e6 < RELEASE_S
     }
     assert places == {(1, 1)}, "it stays where it was pushed"
     states = {one.state for t, one in scene.all(Heartbeat) if one.sender == MR1 and PUSH_S + 3 < t / 1e6 < RELEASE_S}
