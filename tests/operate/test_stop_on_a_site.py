@@ -43,7 +43,9 @@ def test_stop_is_confirmed_by_all_and_holds_until_go() -> None:
     assert_all_served(scene)
     assert (stop.status, go.status) == (0, 0)
     names = [machine.name for machine in SITE.machines.values()]
-    assert [f"{name} holds by it" for name in names] == sorted(line for _, line in stop.lines if "holds by" in line)
+    assert sorted(f"{name} holds by it" for name in names) == sorted(
+        line for _, line in stop.lines if "holds by" in line
+    )
     assert next(t for t, line in stop.lines if line == "all hold") < 46_000_000
     assert moving_s(scene, 44, 45) and not moving_s(scene, 48, 150)
     assert {one.sender for _, one in scene.all(Go)} == {252}, "251 was heard"
