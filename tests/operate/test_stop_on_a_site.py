@@ -46,7 +46,7 @@ def test_stop_is_confirmed_by_all_and_holds_until_go() -> None:
     assert sorted(f"{name} holds by it" for name in names) == sorted(
         line for _, line in stop.lines if "holds by" in line
     )
-    assert next(t for t, line in stop.lines if line == "all hold") < 46_000_000
+    assert next(t for t, line in stop.lines if line == "all hold") <= 46_000_000
     assert moving_s(scene, 44, 45) and not moving_s(scene, 48, 150)
     assert {one.sender for _, one in scene.all(Go)} == {252}, "251 was heard"
     assert stop.lines[-1][1] == "node 252 has lifted this stop"
