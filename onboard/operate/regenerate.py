@@ -105,7 +105,7 @@ class Regenerate(Order):
         if self._who.absent:
             name = self.park.name(self._who.absent)
             return f"Is the power of {name} off and locked with a padlock, so that it CANNOT move?"
-        return f"Is the journal of {self.park.name(self._who.lost)} lost for good, and not to be had from a backup?"
+        return f"Is the journal of {self.park.name(self._who.lost)} lost for good, and shall all stand meanwhile?"
 
     @property
     def answer(self) -> str:
