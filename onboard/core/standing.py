@@ -45,9 +45,11 @@ class Standing:
             known = self._seen.get(message.sender)
             if known is None or known.place != place:
                 self._seen[message.sender] = _Seen(place, now_us, now_us)
-        elif isinstance(message, Itinerary | Waiting | TaskReport) and message.sender in self._seen:
-            if not isinstance(message, Itinerary) or message.grade is Grade.FIRM:
-                self._seen[message.sender].spoke_us = now_us
+            return
+        speaks = isinstance(message, Waiting | TaskReport)
+        speaks = speaks or (isinstance(message, Itinerary) and message.grade is Grade.FIRM)
+        if speaks and message.sender in self._seen:
+            self._seen[message.sender].spoke_us = now_us
 
     def stands(self, node: int, now_us: int) -> bool:
         """Whether a machine has stood for too long where its plan does not leave it; only motion ends that."""
@@ -73,7 +75,9 @@ class Standing:
         return from_bus_ms(runs[0].end_ms, now_us) if runs else None
 
     def _is_at(self, here: Segment, end: Segment | None) -> bool:
-        return end is None or here == end or turned_in(self.site, here) in (end, turned_in(self.site, end))
+        if end is None:
+            return True
+        return bool({here, turned_in(self.site, here)} & {end, turned_in(self.site, end)} - {None})
 
 
 def _goes(leg: Leg) -> bool:
