@@ -20,11 +20,13 @@ from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count,
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
+from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.systems import SYSTEMS, usual_orders, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
+from bus_sim.stranger import Stranger
 from bus_sim.systems.orders import Orders
 from onboard.core.site import Site
 
@@ -127,6 +129,11 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--out", type=Path, default=Path("campaign"), metavar="DIR", help="failures (default: campaign)"
     )
+    parser.add_argument(
+        "--stranger",
+        choices=[one.value for one in Stranger],
+        help="no faults: the first robot bids and does not do what it wins, beside the same seeds without it",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results as JSON too")
     parser.add_argument(
         "--add-to",
@@ -140,6 +147,8 @@ def run_campaign_command(args: argparse.Namespace) -> int:
     """Play it. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for an unknown site."""
     site = find_site(args.site)
     plan = _plan(args, site)
+    if args.stranger is not None:
+        return _strangers(args, plan, site)
     console = Console()
     if args.cold_start:
         return _start_cold(args.site, site, console)
@@ -164,6 +173,20 @@ def run_campaign_command(args: argparse.Namespace) -> int:
             console.print(line, highlight=False, markup=False, soft_wrap=True)
     has_failed = any(result.report.verdict in FAILURES for result in results)
     return 1 if has_failed or (ledger is not None and ledger.has_failed) else 0
+
+
+def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
+    if site.system in SYSTEMS:
+        raise DemandError(f"--stranger {args.stranger}: {site.name} is a {site.system}, and only a car park has it")
+    strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, plan.limit_s or SCENE_LIMIT_S)
+    pairs = sorted(play_pairs(strange, _seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed)
+    for pair in pairs:
+        print(pair.line())
+    bad = [pair for pair in pairs if not pair.is_good]
+    worst = max(pair.longer_s for pair in pairs)
+    told = f"{len(pairs)} seeds with a machine that {strange.how.value}"
+    print(f"{told}: {len(bad)} failed; mean wait at most {worst:+.1f} s longer than without it")
+    return 1 if bad else 0
 
 
 def _start_cold(name: str, site: Site, console: Console) -> int:
