@@ -48,7 +48,9 @@ and that all mirrors become equal.
 
 With --exhaustive one reference scene of a car park (a car in and out, or with --scene overlap three that meet) is
 played again and again, each time with one single fault: every frame lost or doubled at each receiver, or every
-controller killed before each of its frames and around each of its journal writes.
+controller killed before each of its frames and around each of its journal writes, or (journal) at each of its writes
+with the write torn, 1 to 50 records lost, a page zeroed, a bit flipped, the seal gone, another machine's journal, an
+old copy, or no journal at all. A machine that holds because it cannot rely on its journal, and says so, counts as told.
 
 exit status:
   0  every run was safe, and went on once its faults were over
@@ -60,6 +62,7 @@ examples:
   bus-sim campaign standard --seeds 1-8 --cars 300 --apart 90 --faults-an-hour 6 --no-baseline --limit 86400
   bus-sim campaign graph --seeds 1-30 --orders 40
   bus-sim campaign small --exhaustive crash --sample 400
+  bus-sim campaign small --exhaustive journal --sample 400
   bus-sim campaign small --exhaustive crash --scene overlap --add-to crashes.jsonl
   bus-sim campaign small --seeds 1-2000 --faults two-crashes --apart 30 --no-baseline --add-to crashes.jsonl
   bus-sim campaign standard --cold-start
@@ -179,7 +182,9 @@ def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
     if site.system in SYSTEMS:
         raise DemandError(f"--stranger {args.stranger}: {site.name} is a {site.system}, and only a car park has it")
     strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, plan.limit_s or SCENE_LIMIT_S)
-    pairs = sorted(play_pairs(strange, _seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed)
+    pairs = sorted(
+        play_pairs(strange, read_seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed
+    )
     for pair in pairs:
         print(pair.line())
     bad = [pair for pair in pairs if not pair.is_good]

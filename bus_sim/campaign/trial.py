@@ -4,6 +4,7 @@ from collections import Counter
 from pathlib import Path
 
 from bus_sim.campaign.car_park import CarPark
+from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
 from bus_sim.campaign.recovery import Recovery, clocks_right_us
@@ -52,12 +53,14 @@ async def _play(
     right_us = clocks_right_us(scenario.faults)
     if right_us is not None:
         judges.excuse_clocks(right_us)
+    held = Held()
+    stage.run.observers.append(held.hear)
     error, hung, ends = "", "", _End(stage, recovery)
     try:
         stage.run.start()
         await run_until(
             stage.run,
-            lambda: stage.is_broken or judges.is_unsafe or ends(loop.now_us()),
+            lambda: stage.is_broken or judges.is_unsafe or held.is_over(loop.now_us()) or ends(loop.now_us()),
             round(scenario.limit_s * 1e6),
             STEP_US,
             lambda: judges.excuse(recovery.healed_us),
@@ -68,7 +71,7 @@ async def _play(
         error = f"{type(problem).__name__}: {problem}"
     finally:
         stage.run.close()
-    return _judge(stage, scenario, usual_wait_s, (error, hung), judges, recovery)
+    return _judge(stage, scenario, usual_wait_s, (error, hung), judges, recovery, held)
 
 
 class _End:
@@ -97,6 +100,7 @@ def _judge(
     errors: tuple[str, str],
     judges: Judges,
     recovery: Recovery,
+    held: Held,
 ) -> Report:
     (error, hung), tally = errors, stage.tally()
     unsafe, stalls = judges.finish()
@@ -112,6 +116,8 @@ def _judge(
         (bool(violations), Verdict.VIOLATION),
         (bool(error), Verdict.CRASHED),
         (bool(hung or stage.run.restless), Verdict.HUNG),
+        # Whoever waits for it now waits for a person, and has been told so.
+        (bool(held.since_us), Verdict.HELD),
         (bool(tally.waiting and halted), Verdict.STOPPED),
         (bool(tally.waiting), Verdict.NOT_SERVED),
         (bool(stalls), Verdict.NOT_LIVE),
