@@ -7,7 +7,7 @@ from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
-from bus_sim.campaign.recovery import Recovery
+from bus_sim.campaign.recovery import Recovery, clocks_right_us
 from bus_sim.campaign.report import CONVERGED_US, Report, Verdict
 from bus_sim.campaign.stage import Stage, StageMaker
 from bus_sim.campaign.systems import SYSTEMS, SystemStage
@@ -50,6 +50,9 @@ async def _play(
     stage.arm(scenario.faults)
     judges = Judges(stage.run, disturbed=bool(scenario.faults))
     recovery = Recovery(stage.run, scenario.faults)
+    right_us = clocks_right_us(scenario.faults)
+    if right_us is not None:
+        judges.excuse_clocks(right_us)
     held = Held()
     stage.run.observers.append(held.hear)
     error, hung, ends = "", "", _End(stage, recovery)
@@ -81,7 +84,10 @@ class _End:
 
     def __call__(self, now_us: int) -> bool:
         """Everybody is served or told why, all faults are over, and the mirrors agree or had all the time to."""
-        if now_us < self._recovery.healed_us or not self._stage.is_over:
+        if now_us < self._recovery.healed_us:
+            return False
+        self._recovery.look_at_waits(self._stage.waits_since)
+        if not self._stage.is_over:
             return False
         self._over_us = max(self._over_us or now_us, self._recovery.healed_us)
         return self._recovery.mirrors_agree() or now_us - self._over_us >= CONVERGED_US
