@@ -70,7 +70,7 @@ def state(site: Site, node: int, entries: list[Entry]) -> object:
 
 
 #: Tables that are looked up by key and never gone through: their order says when a key was first heard of.
-BY_KEY_ONLY = ("seen", "holder", "tasks")
+BY_KEY_ONLY = ("seen", "given", "verified", "tasks")
 
 
 def plain(value: object, inside: set[int], name: str = "") -> object:
