@@ -9,13 +9,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import NOBODY, KindCode, Reason, TokenKind
+from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, KindCode, Reason, TokenKind
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Segment, Site, Station
 
-_VERSION_BITS = 16
+#: Bits of a version in ``TokenGrant`` and ``TokenHeld``: 163 years of the busiest slot, so that it never wraps.
+_VERSION_BITS = 28
 #: Whoever was refused asks again after this many token repeats: the holder remembers the request. Ours.
 REFUSED_REPEATS = 5
 #: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst. Ours.
@@ -217,7 +218,7 @@ class TokenBook:
         if verdict is Reason.NONE:
             return self.give(key, request.sender, now_us)
         version = self.held.get(key, self.seen.get(key, 0))
-        return [Send(TokenRefusal(self.node_id, key.kind, key.number, version, request.sender, verdict))]
+        return [Send(TokenRefusal(self.node_id, key.kind, key.number, _told(version), request.sender, verdict))]
 
     def on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         """Accept a token only if addressed to me and newer than anything seen; else learn where it went.
@@ -277,7 +278,7 @@ class TokenBook:
             if due_us <= now_us:
                 self.wanted[key] = now_us + repeat_us
                 claim = no_claim(key) if key in self.unordered else self.claim(key)
-                effects.append(Send(TokenRequest(self.node_id, *key, self.seen.get(key, 0), *claim)))
+                effects.append(Send(TokenRequest(self.node_id, *key, _told(self.seen.get(key, 0)), *claim)))
         for key, grant in self.leaving.items():
             if grant.repeat_at_us <= now_us:
                 self.leaving[key] = grant._replace(repeat_at_us=now_us + repeat_us)
@@ -361,3 +362,8 @@ def authorised(state: MotionState, segment: Segment) -> tuple[bool, Reason]:
         return False, state.tokens.refused.get(key, Reason.NOT_AUTHORISED)
     reason = state.proof(segment)
     return reason is Reason.NONE, reason
+
+
+def _told(version: int) -> int:
+    """A version as it fits in a request or a refusal."""
+    return version & ((1 << SEEN_VERSION_BITS) - 1)

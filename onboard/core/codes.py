@@ -2,8 +2,16 @@
 
 from enum import IntEnum
 
-#: What is spoken on the fleet bus; a machine with another number joins as an obstacle and never bids.
-CONTRACT_VERSION = 1
+#: The contract of dbc/fleet.dbc.
+CONTRACT = 2
+#: What heartbeats say of it; a machine with another number joins as an obstacle and never bids. While contract 2 is
+#: open: 128 plus the low 7 bits of a CRC-32 over the DBC (docs/contract-2.md), so that builds of different days are
+#: strangers.
+CONTRACT_VERSION = 0xA2
+#: Bits of ``Award.task_version``, a serial number.
+TASK_VERSION_BITS = 7
+#: Bits of a token's version as ``TokenRequest`` and ``TokenRefusal`` tell it, a serial number.
+SEEN_VERSION_BITS = 20
 #: Nobody: no node carries this node-ID.
 NOBODY = 0
 #: Highest node-ID; 251 to 255 are kept for gateways and tools.
@@ -149,6 +157,33 @@ class Reason(IntEnum):
     IMPOSSIBLE = 29
     PERSON_INSIDE = 30
     NODE_SILENT = 31
+    NOT_OF_SITE = 32
+    NOT_OF_KIND = 33
+    NOT_THE_HOLDER = 34
+    RIGHT_CLAIMED = 35
+    EMERGENCY_STOP = 36
+    LEFT_OUT = 37
+    OTHER_EPOCH = 38
+    JOURNAL_SHORT = 39
+    JOURNAL_FOREIGN = 40
+    NO_FRESH_PROOF = 41
+    RUNAWAY = 42
+    WATCHDOG = 43
+    BUS_LOST = 44
+    CLOCK_JUMPED = 45
+    FALSE_STATEMENT = 46
+    REGENERATION = 47
+
+
+class RegenerationPhase(IntEnum):
+    """How far the regeneration of a lost machine's tokens is (docs/contract-2.md)."""
+
+    NONE = 0
+    FREEZE = 1
+    READ_BACK = 2
+    COMMIT = 3
+    ABORT = 4
+    REFUSED = 5
 
 
 class OperatorAction(IntEnum):

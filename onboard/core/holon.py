@@ -8,10 +8,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from onboard.core.authority import Claim, TokenBook, TokenKey, may_exist
+from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason, TokenKind
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.messages import (
     Award,
@@ -29,22 +29,17 @@ from onboard.core.messages import (
     Progress,
     SyncRequest,
     TaskReport,
-    TokenGrant,
-    TokenHeld,
-    TokenRefusal,
-    TokenRequest,
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
 from onboard.core.presence import Presence
+from onboard.core.rights import Rights
 from onboard.core.serial import is_newer
-from onboard.core.site import Machine, Segment, Site
+from onboard.core.site import Machine, Site
 from onboard.core.timekeeper import Heard, Timekeeper
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
 DIGEST_PATIENCE = 2
-#: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
-ASK_AGAIN_US = 1_000_000
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
@@ -98,18 +93,14 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
-        self.tokens.claim = self._claim
-        self._asked_again_us: dict[int, int] = {}
+        self.rights = Rights(self.fleet, self.behaviour.may_grant)
         self._heartbeat_due_us: int | None = None
         self._mismatches: Counter[int] = Counter()
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
-            TokenRequest: self._on_token_request,
-            TokenGrant: self._on_token_grant,
-            TokenHeld: self._on_token_held,
-            TokenRefusal: self._on_token_refusal,
+            **self.rights.handlers(),
             CallForProposals: self._negotiate,
             Bid: self._negotiate,
             Award: self._negotiate,
@@ -187,7 +178,7 @@ class Holon:
             self._trust_at_us = None
             self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
-        effects += self.tokens.wake(now_us) + self._serve_petitions(now_us)
+        effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
             # What was planned before is old; the first word is that of a machine that takes part.
@@ -204,7 +195,7 @@ class Holon:
             self._heartbeat_due_us,
             self.time.due_us,
             self.tokens.next_wake(),
-            self._petition_due(),
+            self.rights.petition_due(),
             self.presence.held_until_us,
             None if self.presence.is_held else self._negotiation_due(),
             None if self.presence.is_held else self.behaviour.next_wake(),
@@ -263,78 +254,6 @@ class Holon:
         return None if self._bus_time_lost else self.negotiation.next_wake()
 
     # --- handlers ----------------------------------------------------------------------------------------------
-
-    def _on_token_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
-        key = TokenKey(request.token_kind, request.token)
-        petitions = self.fleet.petitions
-        petitions.hear(key, request, now_us)
-        if not self.tokens.holds(key):
-            return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
-        verdict = self.behaviour.may_grant(key, request.sender, now_us)
-        effects = self.tokens.on_request(request, verdict, now_us)
-        if verdict is Reason.MIRROR_BEHIND:
-            effects += self._ask_again(key, request, now_us)
-        return effects
-
-    def _ask_again(self, key: TokenKey, request: TokenRequest, now_us: int) -> list[Effect]:
-        """The requester and I see another order: those whom it is about say again what they plan and where they are."""
-        about = [request.sender, request.predecessor, self._claim(key, request.sender).predecessor]
-        effects: list[Effect] = []
-        for node in dict.fromkeys(about):
-            asked_us = self._asked_again_us.get(node)
-            if node in (NOBODY, self.node_id) or (asked_us is not None and now_us < asked_us + ASK_AGAIN_US):
-                continue
-            self._asked_again_us[node] = now_us
-            effects.append(Send(SyncRequest(self.node_id, node)))
-        return effects
-
-    def _claim(self, key: TokenKey, node: int | None = None) -> Claim:
-        """What a node's plan says about a segment's token as I see it; by default mine."""
-        itinerary = self.mirror.itineraries.get(self.node_id if node is None else node)
-        if itinerary is None or key.kind is not TokenKind.SEGMENT:
-            return Claim(0 if itinerary is None else itinerary.version, NOBODY)
-        segment = Segment(key.number >> 8, key.number & 0xFF)
-        return Claim(itinerary.version, self.mirror.order.predecessor(itinerary.sender, segment) or NOBODY)
-
-    def _serve_petitions(self, now_us: int) -> list[Effect]:
-        """Look again at requests that were refused: what stood against them may be over."""
-        effects: list[Effect] = []
-        for key in list(self.fleet.petitions.open):
-            for requester in self.fleet.petitions.due(key, now_us) if self.tokens.holds(key) else ():
-                if self.tokens.holds(key) and self.behaviour.may_grant(key, requester, now_us) is Reason.NONE:
-                    effects += self.tokens.give(key, requester, now_us)
-        return effects
-
-    def _petition_due(self) -> int | None:
-        waiting = self.fleet.petitions.open.items()
-        return min((one.due_us for key, by in waiting if self.tokens.holds(key) for one in by.values()), default=None)
-
-    def _on_token_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
-        key = TokenKey(grant.token_kind, grant.token)
-        if not may_exist(self.site, key):
-            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-            return []
-        if self.tokens.is_news(key, grant.version):
-            if key.kind is TokenKind.SEGMENT:
-                self.mirror.order.on_return(grant.sender, Segment(key.number >> 8, key.number & 0xFF))
-            self.fleet.petitions.close(key, grant.holder)
-        effects = self.tokens.on_grant(grant, now_us)
-        if self.tokens.holds(key):
-            self.fleet.petitions.returned(key, now_us)
-            effects += self._serve_petitions(now_us)
-        return effects
-
-    def _on_token_held(self, statement: TokenHeld, now_us: int) -> list[Effect]:
-        key = TokenKey(statement.token_kind, statement.token)
-        if not may_exist(self.site, key):
-            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-            return []
-        self.fleet.petitions.close(key, statement.sender)
-        return self.tokens.on_held(statement)
-
-    def _on_token_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
-        self.tokens.on_refusal(refusal, now_us)
-        return []
 
     def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
         if isinstance(message, CallForProposals) and (why := self._may_not_bid(now_us)) is not Reason.NONE:

@@ -168,6 +168,19 @@ class Award(Message):
     reason: Reason
 
 
+@dataclass(frozen=True, slots=True)
+class LeftOut(Message):
+    """Nodes, 0 for nobody, whose bids for the sender's ``call`` do not count. Sent right before the call."""
+
+    call: int
+    node_a: int
+    node_b: int
+    node_c: int
+    node_d: int
+    node_e: int
+    node_f: int
+
+
 class Leg(NamedTuple):
     """One run of segments ``from_index`` to ``to_index`` on ``track``, ending at ``end_ms`` bus time.
 
@@ -323,6 +336,7 @@ class Heartbeat(Message):
     boot: int
     kind: KindCode
     state: MachineState
+    epoch: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,6 +12,7 @@ from operator import attrgetter
 from typing import Any, NamedTuple, cast, get_type_hints
 
 from onboard.core import messages as m
+from onboard.core import recovery_messages
 from onboard.core.codes import Grade, Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import Leg, Message, Reference, Stamp
@@ -64,7 +65,7 @@ class _Layout(NamedTuple):
 #: Messages that travel as one frame, by DBC name.
 _SINGLE: dict[str, type[Message]] = {
     cls.__name__: cls
-    for cls in vars(m).values()
+    for cls in (vars(m) | vars(recovery_messages)).values()
     if isinstance(cls, type) and issubclass(cls, Message) and cls not in (Message, m.CallForProposals, m.Itinerary)
 }
 

@@ -15,6 +15,7 @@ CORE_TYPES = (
     "onboard.core.codes",
     "onboard.core.frame",
     "onboard.core.messages",
+    "onboard.core.recovery_messages",
     "onboard.core.serial",
     "onboard.core.site",
 )

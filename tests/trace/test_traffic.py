@@ -9,8 +9,11 @@ from onboard.trace.response import ANYBODY, Stream, fifo_bounds
 from onboard.trace.traffic import excess, operation, power_up, reasons
 from onboard.wire.dbc_file import fleet_layouts
 
-#: Sent by gateways, or to those who ask for everything again.
-NOT_IN_OPERATION = {"OperatorOrder", "SyncRequest"}
+#: Sent by gateways, to those who ask for everything again, or while rights are disputed, regenerated or stood still.
+NOT_IN_OPERATION = {
+    "Go", "Halted", "LeftOut", "OperatorOrder", "Regeneration", "RegenerationState", "SyncDone", "SyncRequest",
+    "TokenAssigned", "TokenDispute", "TokenGiven", "TokenSeen",
+}  # fmt: skip
 
 
 def test_every_message_of_the_contract_has_its_stream_from_those_who_may_send_it() -> None:

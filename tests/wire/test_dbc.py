@@ -1,6 +1,7 @@
 """The DBC files are complete: another team could build a machine from them alone."""
 
 import re
+import zlib
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -10,7 +11,7 @@ from cantools.database.can import Message
 
 from dbc import device_dbc_text, fleet_dbc_text
 from onboard.config.site import parse_site
-from onboard.core import codes, messages
+from onboard.core import codes, messages, recovery_messages
 from onboard.wire import network_doc
 from onboard.wire.codec import fleet_codec
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts, read_layouts
@@ -20,6 +21,7 @@ from tests.sites import ONE_FLOOR, one_floor
 from tests.wire.samples import judge_of, layouts
 
 TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text()}
+CLASSES = vars(messages) | vars(recovery_messages)
 #: One message of each class of priority, in the order of the design.
 ORDER = [
     "EmergencyStop", "TokenGrant", "BusTime", "Call", "Award", "Bid", "ItineraryHead", "Progress", "Heartbeat",
@@ -62,7 +64,9 @@ def _kinds(layout: MessageLayout) -> dict[str, Any]:
     if layout.name == "ItineraryLeg":
         return get_type_hints(messages.Leg)
     stem = next((one for one in composed if layout.name.startswith(one)), None)
-    return get_type_hints(composed[stem] if stem else getattr(messages, layout.name))
+    return get_type_hints(
+        composed[stem] if stem else getattr(messages, layout.name, None) or getattr(recovery_messages, layout.name)
+    )
 
 
 def test_value_tables_are_the_codes_and_only_they_have_value_tables() -> None:
@@ -101,13 +105,13 @@ def test_periods_and_version_are_those_of_a_site_that_sets_none() -> None:
     assert (order.name, order.cycle_ms * 1000) == ("DriveOrder", timing.drive_refresh_us)
     assert order.timeout_ms > 2 * order.cycle_ms, "one lost order stops no drive"
     for text in TEXTS.values():
-        assert f'BA_ "ContractVersion" {codes.CONTRACT_VERSION};' in text
+        assert f'BA_ "ContractVersion" {codes.CONTRACT};' in text
+    lines = [line for line in TEXTS["fleet"].splitlines() if line.startswith(("BO_ ", " SG_ "))]
+    assert zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80 == codes.CONTRACT_VERSION, "as docs/contract-2.md says"
 
 
 def test_every_message_class_travels_and_nothing_else() -> None:
-    classes = {
-        name for name, kind in vars(messages).items() if isinstance(kind, type) and issubclass(kind, messages.Message)
-    }
+    classes = {name for name, kind in CLASSES.items() if isinstance(kind, type) and issubclass(kind, messages.Message)}
     parts = {"Call", "CallTerms", "CallLoad", "CallParent", "ItineraryHead", "ItineraryLeg"}
     expected = (classes - {"Message", "CallForProposals", "Itinerary"}) | parts
     assert {layout.name for layout in (*fleet_layouts(), *device_layouts())} == expected

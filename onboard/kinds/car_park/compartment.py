@@ -13,6 +13,7 @@ from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     ANY_STATION,
     OUTSIDE,
+    TASK_VERSION_BITS,
     CallResult,
     DeskInput,
     DeskText,
@@ -225,7 +226,7 @@ class Compartment:
         outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
         effects: list[Effect] = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
         job.winner, self._robot_waits = 0, False
-        job.version = successor(job.version, 16)
+        job.version = successor(job.version, TASK_VERSION_BITS)
         effects += self.stewardship.won(job.car, 0, job.task, job.version)
         return effects + self._call_for(job, now_us)
 

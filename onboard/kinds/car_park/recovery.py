@@ -9,11 +9,21 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import CallResult, Criterion, KindCode, LegAction, Operation, Reason, TaskPhase
+from onboard.core.codes import (
+    TASK_VERSION_BITS,
+    CallResult,
+    Criterion,
+    KindCode,
+    LegAction,
+    Operation,
+    Reason,
+    TaskPhase,
+)
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.lift_uses import ride_us
 from onboard.core.lifts import platform_on, sill
 from onboard.core.messages import Award, CallForProposals, CarAt, Reference, TaskReport
+from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, Station
 from onboard.kinds.car_park.bay_memory import cars_at
 from onboard.kinds.car_park.generation import CarParkGeneration
@@ -137,6 +147,10 @@ class Recovery:
         if any(work.call.task == award.task for work in known) or award.task in done:
             return []
         return [Send(TaskReport(fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
+
+    def is_newer(self, award: Award) -> bool:
+        """Whether an award for a task of mine is of a later version than that under which I took it on."""
+        return is_newer(award.task_version, self.versions.get(award.task, 1), TASK_VERSION_BITS)
 
     def forget(self, task: Reference) -> None:
         """A task is another's, or was given back."""

@@ -34,7 +34,7 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import is_newer, to_bus_ms
+from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site, TrackKind
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.asking import AskingGeneration
@@ -176,7 +176,7 @@ class Robot:
         for call in [work.call for work in self._works()]:
             if (call.task, call.sender) != (award.task, award.sender):
                 continue
-            newer = is_newer(award.task_version, self.recovery.versions.get(call.task, 1), 16)
+            newer = self.recovery.is_newer(award)
             is_void = award.result is CallResult.WITHDRAWN or (
                 award.result is CallResult.REJECTED and award.call == call.call
             )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import NOBODY, OUTSIDE, CallResult, Operation, Reason, TaskPhase, TokenKind
+from onboard.core.codes import NOBODY, OUTSIDE, TASK_VERSION_BITS, CallResult, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TaskReport, TokenGrant
 from onboard.core.petitions import UNORDERED
@@ -84,7 +84,7 @@ class Stewardship:
     def _is_news(self, car: Reference, award: Award) -> bool:
         """Whether an award says more than is known; an older version of the same task counts no more."""
         task, version = self.tasks.get(car, (award.task, 0))
-        if task != award.task or is_newer(award.task_version, version, 16):
+        if task != award.task or is_newer(award.task_version, version, TASK_VERSION_BITS):
             return True
         return award.task_version == version and self.winners.get(car) not in (None, award.winner)
 

@@ -1,0 +1,125 @@
+"""What a node does with words about tokens: asks, answers, accepts, disputes; the book beside it keeps who holds what.
+
+Petitions that were refused are looked at again; a requester that sees another order of passing is asked to state its
+own (design, section 5).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from onboard.core.authority import Claim, TokenBook, TokenKey, may_exist
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import NOBODY, Reason, TokenKind
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import (
+    Message,
+    SyncRequest,
+    TokenGrant,
+    TokenHeld,
+    TokenRefusal,
+    TokenRequest,
+)
+from onboard.core.site import Segment
+
+#: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
+ASK_AGAIN_US = 1_000_000
+
+
+@dataclass
+class Rights:
+    """One node's words about tokens; all times are bus time, us.
+
+    ``may_grant`` is its behaviour's verdict on a request: token, requester and time to a reason, NONE for yes.
+    """
+
+    fleet: Fleet
+    may_grant: Callable[[TokenKey, int, int], Reason]
+    _asked_again_us: dict[int, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.site, self.node_id, self.drops = self.fleet.site, self.fleet.node_id, self.fleet.drops
+        self.tokens: TokenBook = self.fleet.tokens
+        self.mirror, self.petitions = self.fleet.mirror, self.fleet.petitions
+        self.tokens.claim = self._claim
+
+    def handlers(self) -> dict[type[Message], Callable[[Any, int], list[Effect]]]:
+        """Handler by message class; each takes the class that it is listed under."""
+        return {
+            TokenRequest: self._on_request,
+            TokenGrant: self._on_grant,
+            TokenHeld: self._on_held,
+            TokenRefusal: self._on_refusal,
+        }
+
+    def _on_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
+        key = TokenKey(request.token_kind, request.token)
+        self.petitions.hear(key, request, now_us)
+        if not self.tokens.holds(key):
+            return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
+        verdict = self.may_grant(key, request.sender, now_us)
+        effects = self.tokens.on_request(request, verdict, now_us)
+        if verdict is Reason.MIRROR_BEHIND:
+            effects += self._ask_again(key, request, now_us)
+        return effects
+
+    def _ask_again(self, key: TokenKey, request: TokenRequest, now_us: int) -> list[Effect]:
+        """The requester and I see another order: those whom it is about say again what they plan and where they are."""
+        about = [request.sender, request.predecessor, self._claim(key, request.sender).predecessor]
+        effects: list[Effect] = []
+        for node in dict.fromkeys(about):
+            asked_us = self._asked_again_us.get(node)
+            if node in (NOBODY, self.node_id) or (asked_us is not None and now_us < asked_us + ASK_AGAIN_US):
+                continue
+            self._asked_again_us[node] = now_us
+            effects.append(Send(SyncRequest(self.node_id, node)))
+        return effects
+
+    def _claim(self, key: TokenKey, node: int | None = None) -> Claim:
+        """What a node's plan says about a segment's token as I see it; by default mine."""
+        itinerary = self.mirror.itineraries.get(self.node_id if node is None else node)
+        if itinerary is None or key.kind is not TokenKind.SEGMENT:
+            return Claim(0 if itinerary is None else itinerary.version, NOBODY)
+        segment = Segment(key.number >> 8, key.number & 0xFF)
+        return Claim(itinerary.version, self.mirror.order.predecessor(itinerary.sender, segment) or NOBODY)
+
+    def serve_petitions(self, now_us: int) -> list[Effect]:
+        """Look again at requests that were refused: what stood against them may be over."""
+        effects: list[Effect] = []
+        for key in list(self.petitions.open):
+            for requester in self.petitions.due(key, now_us) if self.tokens.holds(key) else ():
+                if self.tokens.holds(key) and self.may_grant(key, requester, now_us) is Reason.NONE:
+                    effects += self.tokens.give(key, requester, now_us)
+        return effects
+
+    def petition_due(self) -> int | None:
+        """When the first request for a token held here is to be looked at again, bus time in us; None for never."""
+        waiting = self.petitions.open.items()
+        return min((one.due_us for key, by in waiting if self.tokens.holds(key) for one in by.values()), default=None)
+
+    def _on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
+        key = TokenKey(grant.token_kind, grant.token)
+        if not may_exist(self.site, key):
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
+        if self.tokens.is_news(key, grant.version):
+            if key.kind is TokenKind.SEGMENT:
+                self.mirror.order.on_return(grant.sender, Segment(key.number >> 8, key.number & 0xFF))
+            self.petitions.close(key, grant.holder)
+        effects = self.tokens.on_grant(grant, now_us)
+        if self.tokens.holds(key):
+            self.petitions.returned(key, now_us)
+            effects += self.serve_petitions(now_us)
+        return effects
+
+    def _on_held(self, statement: TokenHeld, now_us: int) -> list[Effect]:
+        key = TokenKey(statement.token_kind, statement.token)
+        if not may_exist(self.site, key):
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
+        self.petitions.close(key, statement.sender)
+        return self.tokens.on_held(statement)
+
+    def _on_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
+        self.tokens.on_refusal(refusal, now_us)
+        return []
