@@ -1,0 +1,42 @@
+"""A plan that is late is told later, but not by time that nobody needs."""
+
+from bus_sim.sites import find_site
+from onboard.core.codes import LegAction
+from onboard.core.messages import Stamp
+from onboard.kinds.car_park.program import Program, Step
+
+SECOND = 1_000_000
+
+
+def step(begin_s: int, end_s: int, action: LegAction = LegAction.TRAVEL) -> Step:
+    return Step(action, 1, 1, 5, begin_s * SECOND, end_s * SECOND)
+
+
+def times(program: Program) -> list[tuple[float, float]]:
+    return [(one.begin_us / SECOND, one.end_us / SECOND) for one in program.remaining]
+
+
+def planned(*steps: Step) -> Program:
+    program = Program(find_site("small"))
+    program.replace(list(steps), Stamp(0, 1, 1))
+    return program
+
+
+def test_what_follows_without_a_gap_is_as_late() -> None:
+    program = planned(step(0, 10), step(10, 20), step(20, 30))
+    program.shift(5 * SECOND)
+    assert times(program) == [(5, 15), (15, 25), (25, 35)]
+
+
+def test_what_was_planned_anew_behind_a_late_run_is_not_late_with_it() -> None:
+    """After a sleep of a day the run in hand is a day late; the rest was planned from now on and stays."""
+    day = 86_400
+    program = planned(step(0, 10), step(day, day + 20), step(day + 20, day + 30))
+    program.shift(day * SECOND)
+    assert times(program) == [(day, day + 10), (day + 10, day + 30), (day + 30, day + 40)]
+
+
+def test_a_wait_takes_up_a_delay_as_far_as_it_can() -> None:
+    program = planned(step(0, 10), step(10, 14, LegAction.STAND), step(14, 20))
+    program.shift(3 * SECOND)
+    assert times(program) == [(3, 13), (13, 14), (14, 20)]
