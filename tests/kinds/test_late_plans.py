@@ -40,3 +40,20 @@ def test_a_wait_takes_up_a_delay_as_far_as_it_can() -> None:
     program = planned(step(0, 10), step(10, 14, LegAction.STAND), step(14, 20))
     program.shift(3 * SECOND)
     assert times(program) == [(3, 13), (13, 14), (14, 20)]
+
+
+def test_a_stamp_from_which_the_plan_cannot_be_told_is_made_anew() -> None:
+    """A leg's end has 24 bits of milliseconds after the stamp: 4.6 hours."""
+    now_us = 100_000 * SECOND
+    for award_s in (100_000 - 17_000, 100_000 + 3_600, 1_900_000):
+        program = planned(step(100_000, 100_010), step(100_010, 100_020))
+        program.stamp = Stamp(award_s * 1000, 7, 3)
+        told = program.itinerary(11, now_us)
+        assert told.stamp == Stamp(100_000_000, 7, 3)
+        assert [leg.end_ms for leg in told.legs] == [100_010_000, 100_020_000]
+
+
+def test_a_stamp_of_hours_ago_keeps_its_rank() -> None:
+    program = planned(step(100_000, 100_010))
+    program.stamp = Stamp(90_000_000, 7, 3)
+    assert program.itinerary(11, 100_000 * SECOND).stamp == program.stamp
