@@ -15,8 +15,9 @@ from onboard.kinds.car_park.site import CarPark
 
 #: Faults begin in this span after power-up, s: all of it while customers come and go, and all end before it is over.
 SPAN_S = (20.0, 900.0)
-#: So many faults a run.
+#: So many faults a run, unless a profile has a number of its own.
 COUNT = (1, 4)
+COUNTS: Final[dict[str, tuple[int, int]]] = {"two-crashes": (2, 2)}
 
 #: At a rate, a fault that names a car names one of so many that came last, or the next. Ours.
 CARS_AROUND = 5
@@ -128,6 +129,7 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "none": {},
     "bus": _BUS,
     "crash": _CRASH,
+    "two-crashes": {"crash": _crash},
     "people": _PEOPLE,
     "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE},
     "clocks": _CLOCKS,
@@ -151,7 +153,7 @@ def draw_faults(profile: str, seed: int, site: Site, span_s: tuple[float, float]
         return ()
     chance = random.Random(f"faults:{profile}:{site.name}:{seed}")
     drawn = []
-    for _ in range(chance.randint(*COUNT)):
+    for _ in range(chance.randint(*COUNTS.get(profile, COUNT))):
         kind = chance.choice(list(kinds))
         at_s = round(chance.uniform(*span_s), 6)
         when: dict[str, Value] = {} if kind in _WITHOUT_TIME else {"at_s": at_s}

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from bus_sim.faults.holon import FROZEN_PPM, FaultyHolon
 from bus_sim.faults.injection import Injection
-from bus_sim.journal import SimulatedJournal
+from bus_sim.faults.journals import hurt
 from bus_sim.run import Simulation
 from onboard.core.frame import Frame
 from onboard.core.site import Machine
@@ -20,7 +20,7 @@ def crash(simulation: Simulation, injection: Injection) -> None:
         if machine.node_id not in simulation.controllers:
             return
         simulation.crash(machine)
-        _hurt_journal(simulation.journals[machine.node_id], injection)
+        hurt(simulation.journals[machine.node_id], injection.text("journal"), injection.count("entries"))
         if injection.text("restart") == "yes":
             restart_later(simulation, machine, simulation.loop.now_us() + round(injection.number("restart_s") * 1e6))
 
@@ -64,16 +64,6 @@ def _at_write(
     journal.on_write = count
 
 
-def _hurt_journal(journal: SimulatedJournal, injection: Injection) -> None:
-    what = injection.text("journal")
-    if what == "lost":
-        journal.entries.clear()
-    elif what == "torn":
-        del journal.entries[-1:]
-    elif what == "rolled_back":
-        del journal.entries[-injection.count("entries") :]
-
-
 def restart_later(simulation: Simulation, machine: Machine, when_us: int) -> None:
     """Power comes back at a loop time, us; nothing happens where it is back already."""
 
@@ -102,7 +92,6 @@ def disk_full(simulation: Simulation, injection: Injection) -> None:
     def room() -> None:
         simulation.journals[machine.node_id].is_full = False
         simulation.crash(machine)
-        simulation.journals[machine.node_id] = replace(simulation.journals[machine.node_id], is_full=False)
         restart_later(simulation, machine, simulation.loop.now_us() + 1_000_000)
 
     simulation.plant.timers.call_at(injection.until_us, room)

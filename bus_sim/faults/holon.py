@@ -77,7 +77,11 @@ class FaultyHolon(Holon):
         way_us = due_us - self._offset_us - self._zero_us
         if self._ppm == FROZEN_PPM:
             return self._zero_us if way_us <= 0 else None
-        return self._zero_us + math.ceil(way_us / (1 + self._ppm / 1e6))
+        at_us = self._zero_us + math.ceil(way_us / (1 + self._ppm / 1e6))
+        # Rounding must not wake it a microsecond early, at which it finds nothing due, for ever.
+        while self._own_us(at_us) < due_us:
+            at_us += 1
+        return at_us
 
     def _own_us(self, loop_us: int) -> int:
         return loop_us + self._offset_us + (loop_us - self._zero_us) * self._ppm // 1_000_000

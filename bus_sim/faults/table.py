@@ -4,6 +4,9 @@ from collections.abc import Callable, Mapping
 from enum import StrEnum
 from typing import Final, NamedTuple
 
+from bus_sim.attacks.catalogue import ATTACKS
+from bus_sim.faults.journals import HARMS
+
 Value = str | int | float
 
 
@@ -144,6 +147,17 @@ KINDS: Final[Mapping[str, Kind]] = {
         "a second board with the same machine file joins the bus",
         _one(for_s=_seconds(5.0)),
     ),
+    "attack": Kind(
+        Group.BUS,
+        "a node that sees only the bus, under a node-ID that the site does not have, attacks it",
+        {
+            "name": _one_of(*ATTACKS)._replace(default=None),
+            "at_s": _AT,
+            "for_s": _seconds(60.0),
+            "node": _count("a node-ID", 240, 1, 255),
+            "seed": _SEED,
+        },
+    ),
     "crash": Kind(
         Group.CONTROLLER,
         "a controller loses power, at a time or (from then on) at its n-th frame or journal write, and starts again",
@@ -153,8 +167,8 @@ KINDS: Final[Mapping[str, Kind]] = {
             frame=_count("a whole number, 0 for none", 0),
             write=_count("a whole number, 0 for none", 0),
             durable=_one_of("no", "yes"),
-            journal=_one_of("kept", "lost", "torn", "rolled_back"),
-            entries=_count("how many journal entries are rolled back", 10, 1),
+            journal=_one_of(*HARMS),
+            entries=_count("how many entries are cut off or rolled back, or which from the end is flipped", 10, 1),
         ),
     ),
     "pause": Kind(
@@ -251,4 +265,17 @@ KINDS: Final[Mapping[str, Kind]] = {
         },
     ),
     "emergency_stop": Kind(Group.PEOPLE, "an operator stops all machines at once", {"at_s": _AT}),
+    "operate": Kind(
+        Group.PEOPLE,
+        "a person gives a command of onboard operate and agrees; target: whom hold, release, go or regenerate name",
+        {
+            "at_s": _AT,
+            "do": _one_of("stop", "go", "block", "clear", "hold", "release", "regenerate")._replace(default=None),
+            "target": _MACHINE._replace(default=""),
+            "track": _count("the number of a track, for block, clear and an absent body", 1, 1, 254),
+            "index": _count("the index of a segment, for block, clear and an absent body", 1, 1, 255),
+            "absent": _one_of("no", "yes"),
+            "for_s": _seconds(10.0),
+        },
+    ),
 }

@@ -6,6 +6,7 @@ are; ``sender`` is the node-ID in the lowest byte of the identifier. A class wit
 2**32; distances are whole millimetres.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -52,6 +53,10 @@ class Message:
     """Base of all messages; ``sender`` is a node-ID."""
 
     sender: int
+
+
+#: By class of message the kinds of machine that may say it; ``KindCode.OBSERVER`` stands for nodes 251 to 255.
+Speakers = Mapping[type[Message], frozenset[KindCode]]
 
 
 # --- fleet bus -----------------------------------------------------------------------------------------------------

@@ -48,10 +48,15 @@ def from_bus_ms(bus_ms: int, near_us: int) -> int:
     return (near_ms + ms_after(bus_ms, near_ms)) * 1000
 
 
-def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
-    """The boot counter after the last one journalled, 1 to 255, going round."""
+def last_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
+    """The boot counter last journalled, 1 to 255; 0 where there is none."""
     last = 0
     for entry in entries:
         if entry.get("record") == "boot":
             last = int(entry["boot"])
-    return successor(last, 8)
+    return last
+
+
+def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
+    """The boot counter after the last one journalled, 1 to 255, going round."""
+    return successor(last_boot(entries), 8)

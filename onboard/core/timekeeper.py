@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.bus_time import BUS_TIME_MODULUS, MAX_SLEW_US, BusClock
-from onboard.core.codes import MOBILE_KINDS, KindCode, Reason
+from onboard.core.codes import MOBILE_KINDS, Reason
 from onboard.core.messages import BusTime
 from onboard.core.mirror import Mirror
 from onboard.core.site import Machine, Site
@@ -62,12 +62,7 @@ class Timekeeper:
         if self.machine.kind in MOBILE_KINDS:
             return
         now_us = self.clock.bus_us(local_us)
-        peers = self.mirror.peers
-        lower = [
-            node
-            for node in self.mirror.alive(now_us)
-            if node < self.machine.node_id and peers[node].kind not in (*MOBILE_KINDS, KindCode.OBSERVER)
-        ]
+        lower = [node for node in self.mirror.alive(now_us) if node < self.machine.node_id and self._is_fixed(node)]
         if lower:
             self.clock.follow(local_us)
             self.due_us = None
@@ -76,10 +71,14 @@ class Timekeeper:
         if self.due_us is None:
             self.due_us = now_us
 
+    def _is_fixed(self, node: int) -> bool:
+        """Whether a node is a fixed machine, by the site and not by what it says of itself."""
+        machine = self.site.machines.get(node)
+        return machine is not None and machine.kind not in MOBILE_KINDS
+
     def hear(self, message: BusTime, local_us: int) -> Heard:
         """Take up a time message of a machine of this site."""
-        machine = self.site.machines.get(message.sender)
-        if message.bus_time_us >= BUS_TIME_MODULUS or machine is None or machine.kind in MOBILE_KINDS:
+        if message.bus_time_us >= BUS_TIME_MODULUS or not self._is_fixed(message.sender):
             self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return Heard.NOTHING
         is_mobile = self.machine.kind in MOBILE_KINDS

@@ -17,6 +17,9 @@ _FRAMES_TO_HEAR = 3
 #: What a controller may take to read a bid, us. Ours.
 _READING_US = 500
 
+#: A finishing time may be this much before the floor, ms: floors are worked out when a call is heard. Ours.
+FLOOR_SLACK_MS = 500
+
 
 def cost_difference(cost: int, other: int, criterion: Criterion) -> int:
     """``cost - other`` in the criterion's unit; finishing times wrap (RFC 1982), money and length do not."""
@@ -29,6 +32,12 @@ def beats(cost: int, node: int, other_cost: int, other_node: int, criterion: Cri
     """Whether a bid is better than another: lower cost, then lower node-ID (decision on flag 10)."""
     difference = cost_difference(cost, other_cost, criterion)
     return difference < 0 or (difference == 0 and node < other_node)
+
+
+def is_below(cost: int, floor: int, criterion: Criterion) -> bool:
+    """Whether a bid is better than anybody could be; finishing times by more than what rounding and clocks make."""
+    slack = FLOOR_SLACK_MS if criterion is Criterion.FINISH_TIME else 0
+    return cost_difference(cost, floor, criterion) < -slack
 
 
 def delay_us(cost: int, floor: int, criterion: Criterion, timing: Timing) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
@@ -26,6 +26,7 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine, Site
@@ -117,7 +118,9 @@ class Lift:
     def state(self) -> MachineState:
         """Heartbeat state."""
         if self.phase is LiftPhase.STARTING:
-            return MachineState.STARTING
+            # Who knows where it stands takes part, though it waits for the robot that has its platform to be heard.
+            stands = self.drive is not None and self.drive.mode is DriveMode.STANDING
+            return MachineState.WAITING if stands and self.platform is not None else MachineState.STARTING
         if self._is_stuck:
             return MachineState.STOPPED
         return MachineState.IDLE if self.phase is LiftPhase.FREE else MachineState.WORKING
@@ -170,7 +173,7 @@ class Lift:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """As steward of alleys: awards tell who may fetch a stored car, and a car given to me is stated anew."""
-        effects = self.stewardship.hear(message)
+        effects = self.stewardship.hear(message, now_us)
         if not isinstance(message, Award) or message.result is not CallResult.AWARDED:
             return effects
         known = self.fleet.negotiation.knows(message.sender, message.call)

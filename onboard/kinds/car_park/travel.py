@@ -12,12 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from onboard.core.all_or_none import AllOrNone
-from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.lifts import MARK_TOLERANCE_MM, gate, platform
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.refuges import refuges
 from onboard.core.serial import successor
 from onboard.core.site import Segment, TrackKind
@@ -56,6 +57,8 @@ class Carriage:
     _stood: tuple[DriveState | None, tuple[int, int], Segment | None] | None = None
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
     way_on: Callable[[], list[Segment]] = list
+    #: Whether nothing stands out of the carrier, by its sensors: it gets no order to move else (row P32).
+    is_clear: Callable[[], bool] = lambda: True
     whole: AllOrNone = field(init=False)
     sill: SillProof = field(init=False)
     stall: Stall = field(default_factory=Stall)
@@ -207,6 +210,12 @@ class Carriage:
                 self.whole.end()
             self._face(goal)
 
+    def stay(self) -> None:
+        """Drop the goal: the drive gets no more orders, and brakes by itself where it moves."""
+        self.goal = self.target = self.blocked = self.refresh_at_us = None
+        self.stall.rests()
+        self.whole.end()
+
     def _face(self, goal: Segment) -> None:
         """Take the axis of a goal in hand where that is another one and the carrier is not turned away from it."""
         if self.sensed is None or goal.track == self.track:
@@ -232,11 +241,16 @@ class Carriage:
     def _outlook(self) -> tuple[object, ...]:
         """All that decides what is to be done, but the time: each message on the bus asks, and few change anything."""
         words = [self.sill.word(lift) for lift in self.axis.lifts]
-        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped, *words
+        clear = self.is_clear()
+        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped, clear, *words
 
     def _go_on(self, now_us: int) -> list[Effect]:
         if self.goal is None or self.sensed is None or self.arrived:
             return self._rest(now_us)
+        if not self.is_clear():
+            self.refresh_at_us = self.target = None
+            self.stall.rests()
+            return []
         ahead = self._ahead()
         effects: list[Effect] = []
         for slot in self.occupied():
@@ -419,7 +433,7 @@ class Carriage:
 
     def _held_segments(self) -> list[TokenKey]:
         tokens = self.fleet.tokens
-        keys = [key for key in tokens.held if key.kind is TokenKind.SEGMENT]
+        keys = [key for key in tokens.mine() if key.kind is TokenKind.SEGMENT]
         home = segment_token(self.fleet.machine.home)
         if home not in tokens.held and tokens.holds(home):
             keys.append(home)
