@@ -3,6 +3,7 @@
 from bus_sim.sites import find_site
 from onboard.core.codes import LegAction
 from onboard.core.messages import Stamp
+from onboard.core.site import Segment
 from onboard.kinds.car_park.program import Program, Step
 
 SECOND = 1_000_000
@@ -18,7 +19,7 @@ def times(program: Program) -> list[tuple[float, float]]:
 
 def planned(*steps: Step) -> Program:
     program = Program(find_site("small"))
-    program.replace(list(steps), Stamp(0, 1, 1))
+    program.begin(Segment(1, 1), list(steps), Stamp(0, 1, 1))
     return program
 
 
