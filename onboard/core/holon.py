@@ -158,6 +158,7 @@ class Holon:
         effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
         effects += self.behaviour.start(now_us)
         effects += self._beat(now_us)
+        self.presence.begins(now_us)
         effects += self.witness.begin(now_us)
         return self._settle(effects, now_us)
 
@@ -258,6 +259,8 @@ class Holon:
         if self._heartbeat_due_us is None or not self.presence.awake(now_us):
             return []
         self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+        self.holding.slept(now_us)
+        self.witness.slept(now_us)
         # One by one: all are asked at power-up only.
         asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
@@ -284,6 +287,7 @@ class Holon:
 
     def _begin(self, now_us: int) -> list[Effect]:
         """Bus time is known: the first word, and what was sensed before."""
+        self.presence.begins(now_us)
         self._heartbeat_due_us = now_us
         effects: list[Effect] = []
         for early in self._sensed_early.values():

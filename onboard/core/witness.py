@@ -109,6 +109,11 @@ class Witness:
         self._answer_at_us = _later(self._answer_at_us, by_us)
         self._quiet_until_us = _later(self._quiet_until_us, by_us)
 
+    def slept(self, now_us: int) -> None:
+        """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
+        if not self.is_over and self._since_us is not None:
+            self._since_us = self._ask_at_us = now_us
+
     def ask(self, node: int, boot_before: int = 0) -> list[Effect]:
         """Ask one machine for all that it vouches for; what it says that it holds is believed until it has done."""
         self.tokens.asked.add(node)

@@ -272,7 +272,7 @@ class Carriage:
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or something is to be done about missing tokens."""
-        asks = self.goal is not None and self.sensed is not None and not self.arrived
+        asks = self.goal is not None and self.sensed is not None and not self.arrived and self.is_clear()
         asking = [self.whole.due_us, self._patience_over_us(), self.sill.next_wake()]
         times = [self.refresh_at_us, *(asking if asks else [])]
         due = [time for time in times if time is not None]
