@@ -74,7 +74,7 @@ class Body(NamedTuple):
 class Starting:
     """One robot's start. ``announce()`` is called once it stands, ``started(planned, calls, now)`` once it is over.
 
-    ``planned`` are the steps behind what was in hand, ``calls`` those of the tasks, both as the program has them then.
+    ``planned`` are the steps behind what was in hand, None where there was no way; ``calls`` are those of the tasks.
     """
 
     fleet: Fleet
@@ -82,7 +82,7 @@ class Starting:
     body: Body
     recovery: Recovery
     announce: Callable[[], list[Effect]]
-    started: Callable[[tuple[Step, ...], list[CallForProposals], int], list[Effect]]
+    started: Callable[[tuple[Step, ...] | None, list[CallForProposals], int], list[Effect]]
     stage: Stage = Stage.UNPLACED
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
@@ -215,7 +215,7 @@ class Starting:
         if calls:
             stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF)
         self.generation.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
-        return self.started(more or (), calls, now_us)
+        return self.started(more, calls, now_us)
 
     def _resume(self, step: Step) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""
