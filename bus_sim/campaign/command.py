@@ -20,11 +20,13 @@ from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count,
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
+from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.systems import SYSTEMS, usual_orders, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
+from bus_sim.stranger import Stranger
 from bus_sim.systems.orders import Orders
 from onboard.core.site import Site
 
@@ -46,7 +48,9 @@ and that all mirrors become equal.
 
 With --exhaustive one reference scene of a car park (a car in and out, or with --scene overlap three that meet) is
 played again and again, each time with one single fault: every frame lost or doubled at each receiver, or every
-controller killed before each of its frames and around each of its journal writes.
+controller killed before each of its frames and around each of its journal writes, or (journal) at each of its writes
+with the write torn, 1 to 50 records lost, a page zeroed, a bit flipped, the seal gone, another machine's journal, an
+old copy, or no journal at all. A machine that holds because it cannot rely on its journal, and says so, counts as told.
 
 exit status:
   0  every run was safe, and went on once its faults were over
@@ -58,6 +62,7 @@ examples:
   bus-sim campaign standard --seeds 1-8 --cars 300 --apart 90 --faults-an-hour 6 --no-baseline --limit 86400
   bus-sim campaign graph --seeds 1-30 --orders 40
   bus-sim campaign small --exhaustive crash --sample 400
+  bus-sim campaign small --exhaustive journal --sample 400
   bus-sim campaign small --exhaustive crash --scene overlap --add-to crashes.jsonl
   bus-sim campaign small --seeds 1-2000 --faults two-crashes --apart 30 --no-baseline --add-to crashes.jsonl
   bus-sim campaign standard --cold-start
@@ -127,6 +132,11 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--out", type=Path, default=Path("campaign"), metavar="DIR", help="failures (default: campaign)"
     )
+    parser.add_argument(
+        "--stranger",
+        choices=[one.value for one in Stranger],
+        help="no faults: the first robot bids and does not do what it wins, beside the same seeds without it",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results as JSON too")
     parser.add_argument(
         "--add-to",
@@ -140,6 +150,8 @@ def run_campaign_command(args: argparse.Namespace) -> int:
     """Play it. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for an unknown site."""
     site = find_site(args.site)
     plan = _plan(args, site)
+    if args.stranger is not None:
+        return _strangers(args, plan, site)
     console = Console()
     if args.cold_start:
         return _start_cold(args.site, site, console)
@@ -164,6 +176,22 @@ def run_campaign_command(args: argparse.Namespace) -> int:
             console.print(line, highlight=False, markup=False, soft_wrap=True)
     has_failed = any(result.report.verdict in FAILURES for result in results)
     return 1 if has_failed or (ledger is not None and ledger.has_failed) else 0
+
+
+def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
+    if site.system in SYSTEMS:
+        raise DemandError(f"--stranger {args.stranger}: {site.name} is a {site.system}, and only a car park has it")
+    strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, plan.limit_s or SCENE_LIMIT_S)
+    pairs = sorted(
+        play_pairs(strange, read_seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed
+    )
+    for pair in pairs:
+        print(pair.line())
+    bad = [pair for pair in pairs if not pair.is_good]
+    worst = max(pair.longer_s for pair in pairs)
+    told = f"{len(pairs)} seeds with a machine that {strange.how.value}"
+    print(f"{told}: {len(bad)} failed; mean wait at most {worst:+.1f} s longer than without it")
+    return 1 if bad else 0
 
 
 def _start_cold(name: str, site: Site, console: Console) -> int:
@@ -208,7 +236,7 @@ def _trials(
     jobs = args.jobs or os.cpu_count() or 1
     play_all = partial(on_dask, args.dask) if args.dask else partial(on_cores, jobs)
     if args.exhaustive is None:
-        seeds = _seeds(args.seeds)
+        seeds = read_seeds(args.seeds)
         head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
         console.print(f"{head}, {brought(site, plan.arrivals, plan.orders)} each", highlight=False)
         left = seeds if ledger is None else ledger.open_of(seeds)
@@ -259,7 +287,7 @@ def _plan_of_system(args: argparse.Namespace, site: Site) -> Plan:
     if args.faults != "none" and not kinds_for(args.faults, site):
         raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, and only a car park has them")
     orders = usual_orders(site, args.orders, args.apart)
-    with_orders(site, orders, seed=_seeds(args.seeds)[0])
+    with_orders(site, orders, seed=read_seeds(args.seeds)[0])
     return Plan(
         args.site,
         args.faults,
@@ -294,7 +322,8 @@ def _check_seconds(option: str, value: float | None) -> None:
         raise DemandError(f"--{option} {value:g}: must be above 0, and at most {LONGEST_S} seconds")
 
 
-def _seeds(text: str) -> range:
+def read_seeds(text: str) -> range:
+    """``A`` or ``A-B``. Raises ``DemandError`` for anything else."""
     first, dash, last = text.partition("-")
     if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
         raise DemandError(f"--seeds {text}: must be a seed, or the first and the last of several, such as 1-16")

@@ -24,6 +24,7 @@ from onboard.controller.shell import Controller, Ports
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
+from onboard.core.serial import next_boot
 from onboard.core.site import Machine, Site
 from onboard.kinds.registry import factory_for, system_of
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
@@ -180,9 +181,9 @@ class Fuzzer:
         entries = self._journal.replay()
         entries = entries if len(entries) < JOURNAL_LIMIT else []
         self._journal = SimulatedJournal(entries=entries)
-        boots = sum(entry.get("record") == "boot" for entry in entries)
+        self._journal.replay()
         factory = factory_for(self._site, self._machine.kind)
-        holon = Holon(self._site, self._machine, factory, boot=boots % 255 + 1, entries=entries)
+        holon = Holon(self._site, self._machine, factory, boot=next_boot(entries), entries=entries)
         wires = (_Wire(), _Wire())
         controller = Controller(holon, Ports(*wires, self._journal, EventLog(limit=10), NoWatchdog()), *self._codecs)
         controller.start()

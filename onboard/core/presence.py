@@ -7,13 +7,16 @@ The same holds for this machine: when it finds that it has slept for longer than
 more machines speak another contract or know another site than speak its own, it is an obstacle first (``is_held``).
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenBook
-from onboard.core.codes import MOBILE_KINDS, MachineState, Reason
+from onboard.core.codes import MOBILE_KINDS, NOBODY, MachineState, Reason
+from onboard.core.messages import Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
 from onboard.core.obstacles import STILL, holder_in
+from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
+from onboard.core.standing import Standing
 
 #: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word. Ours.
 SLEPT_BEATS = 2
@@ -33,8 +36,14 @@ class Presence:
     foreign: dict[int, tuple[Reason, int]] = field(default_factory=dict)
     #: Until when this machine is an obstacle after it woke, and how often it has been admitted since.
     held_until_us: int | None = None
+    #: Last word of machines that say themselves that they do not act.
+    halts: dict[int, Halted] = field(default_factory=dict)
+    standing: Standing = field(init=False)
     _active_us: int | None = None
     _listening_since_us: int | None = None
+
+    def __post_init__(self) -> None:
+        self.standing = Standing(self.site, self.mirror)
 
     @property
     def patience_us(self) -> int:
@@ -54,15 +63,19 @@ class Presence:
         before_us, self._active_us = self._active_us, now_us
         slept = before_us is not None and now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us
         if slept:
-            self._begin_anew(now_us)
-            self.held_until_us = now_us + SETTLING_US
+            self.listen_anew(now_us)
         return slept
 
-    def is_admitted(self, now_us: int) -> bool:
-        """Whether the time as an obstacle has just ended."""
+    def listen_anew(self, now_us: int) -> None:
+        """Be an obstacle until the others have said what they plan by now: I did not hear them for a while."""
+        self._begin_anew(now_us)
+        self.held_until_us = now_us + SETTLING_US
+
+    def is_admitted(self, now_us: int, *, in_time: bool = True) -> bool:
+        """Whether the time as an obstacle has just ended; not before the clock is ``in_time`` again."""
         if self.held_until_us is None or now_us < self.held_until_us:
             return False
-        if self._is_outvoted(now_us):
+        if not in_time or self._is_outvoted(now_us):
             self.held_until_us = now_us + SETTLING_US
             return False
         self.held_until_us = None
@@ -77,11 +90,43 @@ class Presence:
             self.held_until_us = now_us + SETTLING_US
 
     def _is_outvoted(self, now_us: int) -> bool:
-        """Whether more live machines are foreign to me than not; of two halves that with the lowest node-ID counts."""
-        since_us = now_us - self.patience_us
-        others = [node for node, (_, heard_us) in self.foreign.items() if heard_us > since_us]
-        ours = [self.node_id, *(node for node in self.mirror.alive(now_us) if node not in self.foreign)]
+        """Whether more live machines are foreign to me than not; of two halves that with the lowest node-ID counts.
+
+        Only machines of the site have a vote: what else is on the bus can be made up by one node.
+        """
+        since_us, machines = now_us - self.patience_us, self.site.machines
+        others = [node for node, (_, heard_us) in self.foreign.items() if heard_us > since_us and node in machines]
+        alive = self.mirror.alive(now_us)
+        ours = [self.node_id, *(node for node in alive if node not in self.foreign and node in machines)]
         return (len(others), -min(others, default=0)) > (len(ours), -min(ours))
+
+    def heard_halted(self, halted: Halted, now_us: int) -> None:
+        """A machine says why it does not act; of others' words about it only its own word counts."""
+        if halted.sender == halted.machine and halted.machine in self.site.machines:
+            self.halts[halted.machine] = halted
+            self._judge(self.site.machines[halted.machine], now_us)
+
+    def heard_beat(self, beat: Heartbeat) -> None:
+        """A machine that says that it takes part again does not stand by its last word."""
+        word = self.halts.get(beat.sender)
+        if word is not None and (beat.state not in STILL or beat.boot != word.boot):
+            del self.halts[beat.sender]
+
+    def halted_ones(self, now_us: int) -> list[Halted]:
+        """What I say of machines that are silent, as the lowest live machine that is no obstacle itself."""
+        obstacles = self.mirror.obstacles.machines
+        alive = self.mirror.alive(now_us)
+        if self.is_held or min([node for node in alive if node not in obstacles], default=self.node_id) < self.node_id:
+            return []
+        return [self._told_of(node) for node in sorted(obstacles) if node not in alive and node not in self.foreign]
+
+    def _told_of(self, node: int) -> Halted:
+        """Why a silent machine does not act: its own last word, where it had one."""
+        word, peer = self.halts.get(node), self.mirror.peers.get(node)
+        boot = 0 if peer is None else peer.boot
+        if word is None:
+            return Halted(self.node_id, node, Reason.NODE_SILENT, NOBODY, False, boot)
+        return replace(word, sender=self.node_id)
 
     def heard(self, node: int, now_us: int) -> None:
         """A sign of life; whoever was an obstacle may take part again."""
@@ -120,10 +165,15 @@ class Presence:
         if node in self.foreign:
             return self.foreign[node][0]
         peer, known = self.mirror.peers.get(node), self.mirror.obstacles.machines.get(node)
+        word = self.halts.get(node)
+        if word is not None:
+            return word.reason
         heard_us = self._listening_since_us if peer is None else peer.heard_at_us
         if heard_us is None or now_us - heard_us >= self.patience_us:
             return Reason.NONE if heard_us is None else Reason.NODE_SILENT
         if peer is not None and peer.state in STILL:
             return Reason.ACTUATOR_FAULT if peer.state is MachineState.STOPPED else Reason.POSITION_UNKNOWN
+        if self.standing.stands(node, now_us):
+            return Reason.FALSE_STATEMENT
         planless = machine.kind in MOBILE_KINDS and node not in self.mirror.itineraries
         return Reason.NONE if known is None or not planless else known.reason

@@ -448,8 +448,9 @@ class Robot:
             self.carriage.ride_to(floor)
         self._begun = False
         self.program.over()
-        late_us = now_us - step.end_us
-        if self.program.step is not None and abs(late_us) > REPLAN_TOLERANCE_US:
+        following = self.program.step
+        late_us = now_us - (step.end_us if following is None else following.begin_us)
+        if following is not None and abs(late_us) > REPLAN_TOLERANCE_US:
             self.program.shift(late_us)
             effects += self._publish(now_us)
         return effects
