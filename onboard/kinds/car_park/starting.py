@@ -121,6 +121,9 @@ class Starting:
         assert carriage.sensed is not None
         if here is not None and here == carriage.nearest:
             return self._is_placed(here, now_us)
+        out = carriage.way_out
+        if out is not None and carriage.goal is not None and carriage.goal != out:
+            carriage.go(out)
         shuttle = self.body.shuttle.sensed
         rests = carriage.sensed.mode in (DriveMode.STANDING, DriveMode.FAULT)
         if carriage.goal is None and rests and shuttle is not None and shuttle.mode in AT_REST:
@@ -128,7 +131,7 @@ class Starting:
                 return self._hold(self.recovery.contradiction(None, shuttle))
             if not self.generation.is_held:
                 # It asks first for what it is in: it may have been pushed there while it was off.
-                carriage.go(carriage.nearest)
+                carriage.go(out or carriage.nearest)
         return carriage.advance(now_us) if carriage.goal is not None else []
 
     def _is_placed(self, here: Segment, now_us: int) -> list[Effect]:
