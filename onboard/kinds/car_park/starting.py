@@ -74,7 +74,7 @@ class Body(NamedTuple):
 class Starting:
     """One robot's start. ``announce()`` is called once it stands, ``started(planned, calls, now)`` once it is over.
 
-    ``planned`` are the steps behind what was in hand, ``calls`` those of the tasks, both as the program has them then.
+    ``planned`` are the steps behind what was in hand, None where there was no way; ``calls`` are those of the tasks.
     """
 
     fleet: Fleet
@@ -82,7 +82,7 @@ class Starting:
     body: Body
     recovery: Recovery
     announce: Callable[[], list[Effect]]
-    started: Callable[[tuple[Step, ...], list[CallForProposals], int], list[Effect]]
+    started: Callable[[tuple[Step, ...] | None, list[CallForProposals], int], list[Effect]]
     stage: Stage = Stage.UNPLACED
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
@@ -121,6 +121,9 @@ class Starting:
         assert carriage.sensed is not None
         if here is not None and here == carriage.nearest:
             return self._is_placed(here, now_us)
+        out = carriage.way_out
+        if out is not None and carriage.goal is not None and carriage.goal != out:
+            carriage.go(out)
         shuttle = self.body.shuttle.sensed
         rests = carriage.sensed.mode in (DriveMode.STANDING, DriveMode.FAULT)
         if carriage.goal is None and rests and shuttle is not None and shuttle.mode in AT_REST:
@@ -128,7 +131,7 @@ class Starting:
                 return self._hold(self.recovery.contradiction(None, shuttle))
             if not self.generation.is_held:
                 # It asks first for what it is in: it may have been pushed there while it was off.
-                carriage.go(carriage.nearest)
+                carriage.go(out or carriage.nearest)
         return carriage.advance(now_us) if carriage.goal is not None else []
 
     def _is_placed(self, here: Segment, now_us: int) -> list[Effect]:
@@ -215,7 +218,7 @@ class Starting:
         if calls:
             stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF)
         self.generation.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
-        return self.started(more or (), calls, now_us)
+        return self.started(more, calls, now_us)
 
     def _resume(self, step: Step) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""
