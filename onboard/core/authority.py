@@ -464,13 +464,22 @@ class TokenBook:
         )
 
 
+def needs_no_proof(segment: Segment) -> Reason:
+    """The token of a slot that is always there is enough."""
+    return Reason.NONE
+
+
 @dataclass(frozen=True, slots=True)
 class MotionState:
-    """What ``authorised`` looks at: the tokens held and whether the machine may move at all."""
+    """What ``authorised`` looks at: the tokens held and whether the machine may move at all.
+
+    ``proof`` says why a slot whose token is held cannot be entered all the same: a platform that nobody said is there.
+    """
 
     tokens: TokenBook
     position_known: bool
     stopped: bool
+    proof: Callable[[Segment], Reason] = needs_no_proof
 
 
 def authorised(state: MotionState, segment: Segment) -> tuple[bool, Reason]:
@@ -485,7 +494,8 @@ def authorised(state: MotionState, segment: Segment) -> tuple[bool, Reason]:
     key = segment_token(segment)
     if not state.tokens.holds(key):
         return False, state.tokens.refused.get(key, Reason.NOT_AUTHORISED)
-    return True, Reason.NONE
+    reason = state.proof(segment)
+    return reason is Reason.NONE, reason
 
 
 def _told(version: int) -> int:

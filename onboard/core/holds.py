@@ -15,7 +15,7 @@ from onboard.core.recovery_messages import Go, Halted
 
 @dataclass
 class Holds:
-    """One machine's. ``heartbeat`` makes its sign of life; ``new_life`` begins another: boot counter, and what to ask."""
+    """One machine's. ``heartbeat`` makes its sign of life, ``new_life`` begins another: its number, what to ask."""
 
     holding: Holding
     presence: Presence

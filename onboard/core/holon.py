@@ -12,9 +12,9 @@ from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.blocked_words import BlockedWords
-from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
+from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.car_words import CarWords
-from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, MachineState, Reason
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Report, Send
 from onboard.core.holding import Hold, Holding
@@ -47,6 +47,7 @@ from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted
 from onboard.core.rights import Rights
 from onboard.core.site import Machine, Site
+from onboard.core.timekeeper import Heard, Timekeeper
 from onboard.core.witness import Witness
 
 #: Most effects that one event may cause before the holon counts as running away.
@@ -82,7 +83,6 @@ class Holon:
         self.wire_drops: Counter[Reason] = Counter()
         self._told = ToldDrops()
         self.admission = Admission(site)
-        self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
         entries = tuple(entries)
         self.tokens.replay(entries)
@@ -90,6 +90,8 @@ class Holon:
         self.mirror = Mirror(site, machine.node_id)
         self.blocked_words = BlockedWords(site, machine.node_id, self.mirror)
         self.blocked_words.replay(entries)
+        self.time = Timekeeper(site, machine, self.mirror, self.drops)
+        self.clock = self.time.clock
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
         self.holding = Holding(machine.node_id, site.timing.heartbeat_us)
         self.holding.replay(entries)
@@ -113,7 +115,6 @@ class Holon:
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
         self._heartbeat_due_us: int | None = None
-        self._bus_time_due_us: int | None = None
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
@@ -138,6 +139,10 @@ class Holon:
 
     # --- events in ---------------------------------------------------------------------------------------------
 
+    def bus_us(self, local_us: int) -> int:
+        """Bus time as this machine believes it to be at loop time ``local_us``, for who looks from outside."""
+        return self.time.bus_us(local_us)
+
     def start(self, local_us: int) -> list[Effect]:
         """First effects after power-up: the boot counter to the journal, then the first heartbeat.
 
@@ -145,8 +150,9 @@ class Holon:
         """
         if not self.journal.is_reliable:
             return self._without_journal()
+        local_us = self.time.steady(local_us)
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
-        self._elect_time_source(local_us)
+        self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
         self._heartbeat_due_us = now_us
         effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
@@ -166,6 +172,7 @@ class Holon:
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
+        local_us = self.time.steady(local_us)
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
             return self.holds.on_own_number(message, now_us)
@@ -202,6 +209,7 @@ class Holon:
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
+        local_us = self.time.steady(local_us)
         if not self.clock.is_set:
             # Plans made before bus time is known would be told in a time of one's own.
             self._sensed_early[type(message)] = message
@@ -211,14 +219,16 @@ class Holon:
 
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
-        self._elect_time_source(local_us)
+        local_us = self.time.steady(local_us)
+        # Who has slept counts nobody as silent, so that it does not take itself for the time source.
+        effects = self._awake(self.clock.bus_us(local_us))
+        self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
-        effects = self._awake(now_us)
         effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
         if not self.holding.is_apart:
             effects += self.witness.wake(now_us) + self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
-        if self.presence.is_admitted(now_us):
+        if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self._heartbeat_due_us = now_us
@@ -231,7 +241,7 @@ class Holon:
         """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
         times = [
             self._heartbeat_due_us,
-            self._bus_time_due_us,
+            self.time.due_us,
             self.holding.next_wake(),
             None if self.holding.is_apart else self.witness.next_wake(),
             None if self.holding.is_apart else self.tokens.next_wake(),
@@ -240,8 +250,8 @@ class Holon:
             self._negotiation_due() if self._begins else None,
             self.behaviour.next_wake() if self._begins else None,
         ]
-        due = [self.clock.local_us(time) for time in times if time is not None]
-        return min(due) if due and self.halted is None else None
+        due = [time for time in times if time is not None]
+        return self.time.loop_us(min(due)) if due and self.halted is None else None
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
@@ -255,42 +265,41 @@ class Holon:
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
         if message.sender in self.presence.foreign:
             return []
-        if not self._is_time_source(message.sender):
-            # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
-            before_us = self.clock.bus_us(local_us)
-            if self.clock.adopt(message.bus_time_us, local_us):
-                self.witness.shift(self.clock.bus_us(local_us) - before_us)
-                self._heartbeat_due_us = self._bus_time_due_us = self.clock.bus_us(local_us)
+        if message.bus_time_us >= BUS_TIME_MODULUS:
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
-        if self.machine.kind not in MOBILE_KINDS and self.clock.refutes(message.bus_time_us, local_us):
-            return [Send(BusTime(self.node_id, self.clock.bus_us(local_us) % BUS_TIME_MODULUS))]
-        first = not self.clock.is_set
-        self._bus_time_lost = False
         before_us = self.clock.bus_us(local_us)
-        self.clock.heard(message.bus_time_us, local_us)
-        self.witness.shift(self.clock.bus_us(local_us) - before_us)
+        heard = self.time.hear(message, local_us)
+        now_us = self.clock.bus_us(local_us)
+        self.witness.shift(now_us - before_us)
+        self._bus_time_lost &= heard in (Heard.NOTHING, Heard.REFUTED)
+        match heard:
+            case Heard.REFUTED:
+                return [self._bus_time(now_us)]
+            case Heard.FIRST:
+                return self._begin(now_us)
+            case Heard.SET_ANEW:
+                return self._set_anew(now_us)
+        return []
+
+    def _begin(self, now_us: int) -> list[Effect]:
+        """Bus time is known: the first word, and what was sensed before."""
+        self._heartbeat_due_us = now_us
         effects: list[Effect] = []
-        if first:
-            now_us = self.clock.bus_us(local_us)
-            self._heartbeat_due_us = now_us
-            for early in self._sensed_early.values():
-                effects += self._settle(self.behaviour.sense(early, now_us), now_us)
-            self._sensed_early.clear()
+        for early in self._sensed_early.values():
+            effects += self._settle(self.behaviour.sense(early, now_us), now_us)
+        self._sensed_early.clear()
         return effects
+
+    def _set_anew(self, now_us: int) -> list[Effect]:
+        """Bus time was far off, and is set: what was read of plans meanwhile was read in the wrong time."""
+        self.mirror.retime(now_us)
+        return self._awake(now_us)
 
     def _negotiation_due(self) -> int | None:
         """Nothing is due in the negotiation while bus time is lost: its deadlines mean nothing then."""
         # The last loop time is not known here; what ``wake`` found holds until the next time message.
         return None if self._bus_time_lost else self.negotiation.next_wake()
-
-    def _is_time_source(self, sender: int) -> bool:
-        """Whether bus time from ``sender`` counts: a fixed machine of the site, below me if I am one myself."""
-        return self._is_fixed(sender) and (self.machine.kind in MOBILE_KINDS or sender < self.node_id)
-
-    def _is_fixed(self, node: int) -> bool:
-        """Whether a node is a fixed machine, by the site and not by what it says of itself."""
-        machine = self.site.machines.get(node)
-        return machine is not None and machine.kind not in MOBILE_KINDS
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -333,7 +342,7 @@ class Holon:
         self.presence.heard_beat(beat)
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
-            self._elect_time_source(self.clock.local_us(now_us))
+            self.time.elect(self.clock.local_us(now_us))
         return self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
@@ -342,7 +351,7 @@ class Holon:
         effects = self.witness.on_request(request, now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
-            effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
+            effects = [self._bus_time(now_us), *effects]
         return effects
 
     def _statements(self, now_us: int) -> list[Effect]:
@@ -418,16 +427,16 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects += (
-                self.holds.words()
-                + self._told.words(self.node_id, self.drops + self.wire_drops)
-                + self.fleet.forgotten()
-            )
+            effects += self.holds.words() + self.fleet.forgotten()
+            effects += self._told.words(self.node_id, self.drops + self.wire_drops)
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
-        if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
-            self._bus_time_due_us = now_us + self.site.timing.bus_time_us
-            effects.append(Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)))
+        if self.time.due_us is not None and self.time.due_us <= now_us:
+            self.time.due_us = now_us + self.site.timing.bus_time_us
+            effects.append(self._bus_time(now_us))
         return effects
+
+    def _bus_time(self, now_us: int) -> Effect:
+        return Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS))
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(
@@ -439,20 +448,6 @@ class Holon:
             self.machine.kind,
             MachineState.OBSTACLE if self._is_still else self.behaviour.state,
         )
-
-    def _elect_time_source(self, local_us: int) -> None:
-        """The lowest live fixed node sends bus time (design, section 5)."""
-        if self.machine.kind in MOBILE_KINDS:
-            return
-        now_us = self.clock.bus_us(local_us)
-        lower = [node for node in self.mirror.alive(now_us) if node < self.node_id and self._is_fixed(node)]
-        if lower:
-            self.clock.follow(local_us)
-            self._bus_time_due_us = None
-            return
-        self.clock.lead(local_us)
-        if self._bus_time_due_us is None:
-            self._bus_time_due_us = now_us
 
     def _halt(self, why: str, reason: Reason, cause: int = NOBODY) -> list[Effect]:
         if self.halted is not None:

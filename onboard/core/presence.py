@@ -71,11 +71,11 @@ class Presence:
         self._begin_anew(now_us)
         self.held_until_us = now_us + SETTLING_US
 
-    def is_admitted(self, now_us: int) -> bool:
-        """Whether the time as an obstacle has just ended."""
+    def is_admitted(self, now_us: int, *, in_time: bool = True) -> bool:
+        """Whether the time as an obstacle has just ended; not before the clock is ``in_time`` again."""
         if self.held_until_us is None or now_us < self.held_until_us:
             return False
-        if self._is_outvoted(now_us):
+        if not in_time or self._is_outvoted(now_us):
             self.held_until_us = now_us + SETTLING_US
             return False
         self.held_until_us = None

@@ -45,7 +45,10 @@ class Standing:
             known = self._seen.get(message.sender)
             if known is None or known.place != place:
                 self._seen[message.sender] = _Seen(place, now_us, now_us)
-        elif message.sender in self._seen and _is_of_work(message):
+            return
+        speaks = isinstance(message, Waiting | TaskReport)
+        speaks = speaks or (isinstance(message, Itinerary) and message.grade is Grade.FIRM)
+        if speaks and message.sender in self._seen:
             self._seen[message.sender].spoke_us = now_us
 
     def stands(self, node: int, now_us: int) -> bool:
@@ -72,15 +75,10 @@ class Standing:
         return from_bus_ms(runs[0].end_ms, now_us) if runs else None
 
     def _is_at(self, here: Segment, end: Segment | None) -> bool:
-        return end is None or here == end or turned_in(self.site, here) in (end, turned_in(self.site, end))
+        if end is None:
+            return True
+        return bool({here, turned_in(self.site, here)} & {end, turned_in(self.site, end)} - {None})
 
 
 def _goes(leg: Leg) -> bool:
     return leg.action in (LegAction.TRAVEL, LegAction.RIDE) and leg.from_index != leg.to_index
-
-
-def _is_of_work(message: Message) -> bool:
-    """Whether somebody who does something says this."""
-    if isinstance(message, Itinerary):
-        return message.grade is Grade.FIRM
-    return isinstance(message, Waiting | TaskReport)

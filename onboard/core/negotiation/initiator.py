@@ -129,6 +129,7 @@ class Initiator:
     #: Every node's newest bid, and the nodes whose bids for this attempt do not count.
     bids: dict[int, int] = field(default_factory=dict)
     left_out: frozenset[int] = frozenset()
+    floor: int | None = None
     due_us: int | None = None
     awards_sent: int = 0
     awarded_us: int = 0
@@ -165,6 +166,7 @@ class Initiator:
             _in_steps_ms(terms.ready_us - self.due_us, READY_STEP_MS, MAX_READY_MS),
             _in_steps_ms(self.hold_until_us - self.due_us, HOLD_STEP_MS, MAX_HOLD_MS),
         )
+        self.floor = None if terms.floor is None else terms.floor(self.call, now_us)
         last = self.attempt >= self.timing.max_attempts
         self.left_out = self.trust.left_out(terms.task, now_us, last_attempt=last)
         before = [*left_out_words(self.node_id, self.call.call, self.left_out), *self.terms.detail]
@@ -176,7 +178,7 @@ class Initiator:
         if self.state is not State.OPEN or now_us > cut_off_us(self.due_us, self.timing):
             self.counters.late_bids_ignored += 1
             return []
-        if bid.sender in self.left_out or self.is_obstacle(bid.sender) or self._is_below_floor(bid.cost, now_us):
+        if bid.sender in self.left_out or self.is_obstacle(bid.sender) or self._is_below_floor(bid.cost):
             self.counters.bids_of_no_account += 1
             return []
         self.bids[bid.sender] = bid.cost
@@ -193,11 +195,10 @@ class Initiator:
             if self.best is None or beats(cost, node, *self.best, self.call.criterion):
                 self.best = (cost, node)
 
-    def _is_below_floor(self, cost: int, now_us: int) -> bool:
+    def _is_below_floor(self, cost: int) -> bool:
         """Whether a bid is better than anybody could be."""
         assert self.call is not None
-        floor = self.terms.floor
-        return floor is not None and is_below(cost, floor(self.call, now_us), self.call.criterion)
+        return self.floor is not None and is_below(cost, self.floor, self.call.criterion)
 
     def on_itinerary(self, itinerary: Itinerary, now_us: int) -> Outcome:
         """The winner's firm itinerary whose stamp names this call ends the award."""

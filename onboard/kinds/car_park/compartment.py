@@ -55,7 +55,9 @@ from onboard.kinds.car_park.bay_memory import (
     ticket_record,
 )
 from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
+from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.outputs import BayOutputs
+from onboard.kinds.car_park.program import Program
 from onboard.kinds.car_park.site import car_park
 from onboard.kinds.car_park.stewardship import Stewardship
 
@@ -97,6 +99,8 @@ class Compartment:
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
         self.outputs = BayOutputs(self.fleet.node_id)
+        site, machine = self.fleet.site, self.fleet.machine
+        self._robots = CarParkGeneration(site, machine, self.fleet.mirror, Program(site))
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
@@ -247,7 +251,7 @@ class Compartment:
             if requester != self.job.winner:
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
-            if self.phase is not BayPhase.SERVING:
+            if self.phase is not BayPhase.SERVING or not self._is_open_to_machines():
                 return Reason.DOOR_NOT_READY
             self.job.was_granted |= key.kind is TokenKind.STATION
             return Reason.NONE
@@ -485,11 +489,15 @@ class Compartment:
         return effects + self._to_free()
 
     def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
-        return list(self.fleet.negotiation.open(job.terms(source, sink), now_us))
+        return list(self.fleet.negotiation.open(job.terms(source, sink, self._robots.floor), now_us))
 
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None
         return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
+
+    def _is_open_to_machines(self) -> bool:
+        """Whether a shuttle can come in and a person cannot, by what the doors say now."""
+        return self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
 
     def _go(self, phase: BayPhase) -> None:
         self.phase = phase

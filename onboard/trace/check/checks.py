@@ -20,7 +20,7 @@ from onboard.trace.check.lifts import LiftByGate, LiftCrush, PlatformThere
 from onboard.trace.check.liveness import NobodyStarves, SomethingHappens
 from onboard.trace.check.motion import InsideAuthority, OneBody
 from onboard.trace.check.owners import OneOwner
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.picture import SETTLING_US, Picture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Rule
 from onboard.trace.check.shuttles import TornCar
@@ -152,6 +152,7 @@ class Checks:
         self.verdict.left_out = {rule.name: why for rule in rules if (why := self._why_not(rule))}
         self._last_us: int | None = None
         self._excused_us = 0
+        self._clocks_until_us = 0
         self._begin()
 
     def _why_not(self, rule: type[Rule]) -> str:
@@ -163,6 +164,7 @@ class Checks:
         """Another run: nothing is known."""
         self._picture = Picture(self._site, disturbed=self._disturbed)
         self._picture.excused_us = self._excused_us
+        self._picture.clock_settles_us = self._clocks_until_us
         self._rules = [rule(self._picture, self._keep) for rule in self.verdict.rules]
         self._handlers: dict[type[Message], list[tuple[str, Callable[[Any], None]]]] = {}
         for rule in self._rules:
@@ -173,6 +175,10 @@ class Checks:
     def excuse(self, until_us: int) -> None:
         """Until then, us of the log, machines are broken on purpose: rules of liveness begin to count there."""
         self._excused_us = self._picture.excused_us = max(self._excused_us, until_us)
+
+    def excuse_clocks(self, until_us: int) -> None:
+        """Until then, us of the log, clocks are wrong on purpose: a deadline is over when its machine thinks so."""
+        self._clocks_until_us = self._picture.clock_settles_us = until_us + SETTLING_US
 
     def feed(self, time_us: int, channel: str, frame: Frame) -> None:
         """One frame of a log; ``channel`` tells buses apart, and may be any name."""
