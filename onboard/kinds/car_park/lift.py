@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
@@ -26,6 +26,7 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine, Site

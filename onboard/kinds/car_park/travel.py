@@ -12,12 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from onboard.core.all_or_none import AllOrNone
-from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.lifts import MARK_TOLERANCE_MM, gate, platform
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.refuges import refuges
 from onboard.core.serial import successor
 from onboard.core.site import Segment, TrackKind
