@@ -264,7 +264,7 @@ KINDS: Final[Mapping[str, Kind]] = {
             "for_s": _seconds(120.0),
         },
     ),
-    "emergency_stop": Kind(Group.PEOPLE, "an operator stops all machines at once", {"at_s": _AT}),
+    "emergency_stop": Kind(Group.PEOPLE, "an operator holds all machines at once, for half a minute", {"at_s": _AT}),
     "operate": Kind(
         Group.PEOPLE,
         "a person gives a command of onboard operate and agrees; target: whom hold, release, go or regenerate name",
