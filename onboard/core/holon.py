@@ -309,6 +309,8 @@ class Holon:
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self._elect_time_source(self.clock.local_us(now_us))
+        if self.holding.is_apart:
+            return []
         if fresh:
             return [Send(SyncRequest(self.node_id, beat.sender, self.mirror.boots_before[beat.sender]))]
         if beat.mirror_digest == self.mirror.digest():
@@ -383,6 +385,7 @@ class Holon:
     def _new_life(self) -> int:
         """As after a restart."""
         self.boot = self.boot % 255 + 1
+        self._has_past = True
         return self.boot
 
     def last_word(self, reason: Reason) -> Halted:
