@@ -97,7 +97,7 @@ async def measure(part: list[tuple[int, Frame]], folder: Path) -> None:
 
     alone = await fed(part[: len(part) // 4], None)
     reading = asyncio.ensure_future(read(reader.stdout))
-    journal = FileJournal(folder / "spool")
+    journal = FileJournal(folder / "spool", f"{site.name} gateway")
     broker = MqttBroker(BrokerAddress("127.0.0.1", mosquitto.port))
     gateway = Gateway(
         site, codec, broker, GatewaySettings(), reports=Reports(journal), wall_us=lambda: time.time_ns() // 1000

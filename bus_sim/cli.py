@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from bus_sim.attacks.command import add_attack, run_attack_command
 from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.certify.command import add_certify, run_certify
@@ -23,11 +24,13 @@ from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names, site_text
 from bus_sim.systems.registry import RUNNERS, SystemOptions
+from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError
+from onboard.io.signals import terminated_as_interrupted
 from onboard.web.address import WebError
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.site_dbc import site_dbc
@@ -80,6 +83,7 @@ def build_parser() -> argparse.ArgumentParser:
     sites.add_argument("site", nargs="?", help="name of a shipped site, or a site file")
     add_compare(commands)
     add_campaign(commands)
+    add_attack(commands)
     add_import(commands)
     add_certify(commands)
     return parser
@@ -210,7 +214,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
-        return COMMANDS[args.command](args)
+        with terminated_as_interrupted():
+            return COMMANDS[args.command](args)
     except (
         ConfigError,
         WebError,
@@ -225,8 +230,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
         return 2
+    except (StandstillError, DeadlockError) as error:
+        print(f"bus-sim: {error}", file=sys.stderr)
+        return 1
     except BrokenPipeError:
         return 1
+    except KeyboardInterrupt:
+        return 130
 
 
 def _sites(args: argparse.Namespace) -> int:
@@ -258,6 +268,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "dbc": _dbc,
     "compare": run_compare,
     "campaign": run_campaign_command,
+    "attack": run_attack_command,
     "import": run_import,
     "certify": run_certify,
 }

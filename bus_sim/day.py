@@ -25,6 +25,7 @@ from bus_sim.summary import BurstFigures, RunSummary, bus_figures, unserved
 from bus_sim.virtual_time import VirtualTimeLoop
 from bus_sim.window import BURST_US, Window, choose_window, densest
 from onboard.core.site import Site
+from onboard.io.signals import ended_by
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import Indicators
 
@@ -199,11 +200,9 @@ class _Day:
         clock = Clock(self._zero)
         show = TerminalShow(simulation.site, simulation.view, clock, lambda: _figures(simulation), console)
         async with AsyncExitStack() as stack:
+            # A signal ends a run as its end does: with its figures, a log that is whole, and no process left behind.
+            stack.enter_context(ended_by(self._loop, self._interrupt))
             stack.callback(simulation.close)
-            if self._processes is None:
-                # Ctrl-C ends a run as its end does: with its figures, and a log that is whole.
-                self._loop.add_signal_handler(signal.SIGINT, self._interrupt)
-                stack.callback(self._loop.remove_signal_handler, signal.SIGINT)
             if options.web is not None:
                 await stack.enter_async_context(self._page(options.web))
             if self._window is None:
@@ -257,7 +256,9 @@ class _Day:
             lambda: show.update(self._loop.now_us()),
         )
 
-    def _interrupt(self) -> None:
+    def _interrupt(self, number: signal.Signals) -> None:
+        if number is not signal.SIGINT:
+            self._console.print(f"{number.name}: ending", highlight=False)
         self._is_interrupted = True
         self._loop.resume()
 

@@ -5,7 +5,7 @@ Same seed, same options: the same candump log, byte for byte.
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
 
@@ -22,8 +22,9 @@ from onboard.core.codes import KindCode
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.messages import Message
-from onboard.core.site import Machine, Site
-from onboard.kinds.registry import factory_for, system_of
+from onboard.core.serial import next_boot
+from onboard.core.site import Machine, Site, journal_owner
+from onboard.kinds.registry import compaction_for, factory_for, system_of
 from onboard.ports.bus import Bus
 from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
@@ -125,11 +126,15 @@ class BusRun:
 
     def start_controller(self, machine: Machine) -> None:
         """Power up one machine's controller; a second time means a restart, with the same journal."""
-        journal = self.journals.setdefault(machine.node_id, SimulatedJournal())
+        journal = self.journals.setdefault(machine.node_id, SimulatedJournal(journal_owner(self.site, machine)))
         entries = journal.replay()
-        boots = sum(1 for entry in entries if entry.get("record") == "boot")
         holon = self.holon_class(
-            self.site, machine, self.factories(self.site, machine.kind), boot=boots % 255 + 1, entries=entries
+            self.site,
+            machine,
+            self.factories(self.site, machine.kind),
+            boot=next_boot(entries),
+            entries=entries,
+            journal=journal.condition,
         )
         ports = Ports(
             self.fleet.attach(machine.name, machine.node_id),
@@ -137,6 +142,7 @@ class BusRun:
             journal,
             self.log,
             NoWatchdog(),
+            compaction_for(self.site),
         )
         controller = Controller(holon, ports, self.codecs.fleet, self.codecs.device)
         self.controllers[machine.node_id] = controller
@@ -157,8 +163,7 @@ class BusRun:
         for bus in (controller.ports.fleet_bus, controller.ports.device_bus):
             assert isinstance(bus, SimulatedBus)
             bus.power_off()
-        journal = self.journals[machine.node_id]
-        self.journals[machine.node_id] = replace(journal, entries=journal.replay())
+        self.journals[machine.node_id] = self.journals[machine.node_id].after_power_cut()
         for tell in self.after_crash:
             tell(machine)
 
@@ -178,6 +183,11 @@ class BusRun:
             if machine.name == channel:
                 return self.devices[machine.node_id].attach(name, None)
         return None
+
+    @property
+    def restless(self) -> list[str]:
+        """Names of machines whose wakes did not come to rest: without a bound time would stand still with them."""
+        return [one.holon.machine.name for one in self.controllers.values() if one.rest.is_broken]
 
     def close(self) -> None:
         """Finish the log."""
@@ -245,10 +255,11 @@ async def run_until(
 ) -> bool:
     """Let time pass in steps of ``step_us`` until ``done`` or ``limit_us``; True where it was done.
 
+    A machine whose wakes do not come to rest ends the run: it is among those that are halted, by name.
     ``show`` is called after each step.
     """
     while not done():
-        if simulation.loop.now_us() >= limit_us:
+        if simulation.loop.now_us() >= limit_us or simulation.restless:
             return False
         await asyncio.sleep(step_us / 1_000_000)
         if show is not None:

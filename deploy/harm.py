@@ -43,10 +43,10 @@ def _show(what: str) -> str:
 
 
 async def _write() -> None:
-    journal = FileJournal(FOLDER)
+    journal = FileJournal(FOLDER, "test")
     records = len(journal.replay())
     if records:
-        print(f"test: found {records} records, {journal.torn} torn", flush=True)
+        print(f"test: found {records} records, {journal.condition.state.name}", flush=True)
         return
     while True:
         records += 1

@@ -7,8 +7,8 @@ from deploy.image.emulate import Board, personalise
 from deploy.image.image import Image, build_image
 from deploy.image.release import Release
 
-#: Emulated on a busy host.
-LIMIT_S = 700.0
+#: Processor time of the emulator for one thing that is waited for: three times what the slowest takes, a first start.
+LIMIT_S = 450.0
 #: candump's line of MR1's heartbeat (node 11); its sixth byte is the boot counter.
 BEAT = re.compile(r"can0 1250000B#[0-9A-F]{10}([0-9A-F]{2})")
 
@@ -34,8 +34,8 @@ def test_killed_frozen_and_without_power_in_the_middle_of_a_write_it_comes_back(
         board.until("a heartbeat", lambda console: bool(lives(console)), LIMIT_S)
         board.until("the journal", lambda console: "test: found " in console, LIMIT_S)
     assert lives(board.console)[0] == 4
-    found = re.search(r"test: found (\d+) records, (\d+) torn", board.console)
-    assert found is not None and int(found[1]) >= kept and int(found[2]) <= 1
+    found = re.search(r"test: found (\d+) records, (\w+)", board.console)
+    assert found is not None and int(found[1]) >= kept and found[2] in ("INTACT", "TORN", "MENDED")
 
 
 def test_without_a_machine_file_it_is_silent_and_says_why(disk: Path) -> None:

@@ -1,7 +1,6 @@
 """The device under test as a controller in the simulator's process and time: the scenarios are the simulator's too."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from bus_sim.can.node import SimulatedBus
 from bus_sim.journal import SimulatedJournal
@@ -36,7 +35,12 @@ class SimulatedDevice:
         site = parse_site(site_text, "site.toml")
         entries = self._journal.replay()
         holon = Holon(
-            site, machine, factory_for(site, machine.kind), boot=next_boot(entries) if entries else 1, entries=entries
+            site,
+            machine,
+            factory_for(site, machine.kind),
+            boot=next_boot(entries),
+            entries=entries,
+            journal=self._journal.condition,
         )
         self._cables = (
             Cable(lambda: self._attach(simulation.fleet.attach)),
@@ -57,7 +61,7 @@ class SimulatedDevice:
         for cable in self._cables:
             cable.power_off()
         self._former.append(controller)
-        self._journal = replace(self._journal, entries=self._journal.replay())
+        self._journal = self._journal.after_power_cut()
 
     async def unplug(self) -> None:
         """See ``Device``."""

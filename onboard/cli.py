@@ -2,7 +2,7 @@
 
 import argparse
 import asyncio
-import signal
+import errno
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,15 +14,18 @@ from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon
 from onboard.core.serial import next_boot
+from onboard.core.site import journal_owner
 from onboard.gateway.options import add_mqtt_arguments
 from onboard.gateway.settings import GatewayError
 from onboard.io.broker_address import is_mqtt_installed
 from onboard.io.console import ConsoleTelemetry, ManyTelemetry
+from onboard.io.endings import Ending
 from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
-from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
-from onboard.io.watchdog import SystemdWatchdog
-from onboard.kinds.registry import factory_for, system_of
+from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
+from onboard.io.signals import terminated_as_interrupted
+from onboard.kinds.registry import compaction_for, factory_for, system_of
+from onboard.life import Life
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
 from onboard.web.address import is_installed as is_web_installed
@@ -31,14 +34,19 @@ from onboard.wire.codec import Codec, codecs
 if TYPE_CHECKING:
     from onboard.gateway.gateway import Gateway
 
+#: Of the journal's folder; everything else, such as a full disk, may pass.
+_MISTAKES = frozenset({errno.EACCES, errno.EPERM, errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST})
+
 #: Makes a machine's own gateway on the running loop, from its fleet bus and the contract.
 GatewayMaker = Callable[[OpenBus, Codec], "Gateway"]
 
 EXIT_STATUS = """\
 exit status:
   0  the controller was stopped by a person or the supervisor
-  1  the controller stopped itself: a broken invariant, an emergency stop, the journal or the bus failed
+  1  the controller ended, and is to be started again: a broken invariant, the journal or the bus failed
   2  a mistake in the command line, the machine file or the site file; one line for each says where and what to do
+  3  the controller stopped itself and waits for a person, who is told why
+An interface that is not there yet, or not any more, is waited for.
 
 examples:
   onboard --machine mr1.toml
@@ -55,6 +63,8 @@ examples:
       publish the site to a broker; see onboard gateway --help
   onboard web -i socketcan -c can0 --site site.toml
       a live picture on a page of this computer; see onboard web --help
+  onboard operate status -i socketcan -c can0 --site site.toml
+      who stands and why; stop, go, block, clear, hold, release; see onboard operate --help
 """
 
 
@@ -114,7 +124,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     except OSError as error:
         print(f"onboard: journal {args.journal or config.journal}: {error.strerror or error}", file=sys.stderr)
-        return 2
+        return Ending.MISTAKE if error.errno in _MISTAKES else Ending.COMES_BACK
 
 
 def _beside(args: argparse.Namespace, config: MachineConfig) -> GatewayMaker:
@@ -129,7 +139,8 @@ def _beside(args: argparse.Namespace, config: MachineConfig) -> GatewayMaker:
 def _trace(words: list[str]) -> int:
     from onboard.trace.cli import main as trace  # noqa: PLC0415  # a controller must not carry it
 
-    return trace(words)
+    with terminated_as_interrupted():
+        return trace(words)
 
 
 def _networkd(config: MachineConfig, fleet_settings: BusSettings, to: Path) -> int:
@@ -160,76 +171,68 @@ def _gateway(words: list[str]) -> int:
     return gateway(words)
 
 
+def _operate(words: list[str]) -> int:
+    from onboard.operate.cli import main as operate  # noqa: PLC0415  # a controller must not carry it
+
+    return operate(words)
+
+
 #: What is not a controller; each takes the words behind its own and returns the exit status.
-COMMANDS: dict[str, Callable[[list[str]], int]] = {"trace": _trace, "web": _web, "gateway": _gateway}
+COMMANDS: dict[str, Callable[[list[str]], int]] = {
+    "trace": _trace,
+    "web": _web,
+    "gateway": _gateway,
+    "operate": _operate,
+}
 
 
 async def run(
     config: MachineConfig, fleet_settings: BusSettings, journal_directory: Path, gateway: GatewayMaker | None = None
 ) -> int:
-    """Run until stopped: 0 where a signal ended it, 1 where the controller or its bus ended it."""
-    journal = FileJournal(journal_directory)
-    entries = journal.replay()
-    boot = next_boot(entries)
-    holon = Holon(
-        config.site, config.machine, factory_for(config.site, config.machine.kind), boot=boot, entries=entries
-    )
-    fleet_bus = device_bus = await open_bus(fleet_settings)
-    device_settings = BusSettings.of(config.device_bus)
-    if device_settings != fleet_settings:
-        device_bus = await open_bus(device_settings)
-    system = system_of(config.site)
-    codec = codecs(system.name, system.messages)
-    telemetry: Telemetry = ConsoleTelemetry()
-    beside = gateway(fleet_bus, codec.fleet) if gateway is not None else None
-    published: asyncio.Task[None] | None = None
-    if beside is not None:
-        telemetry = ManyTelemetry(telemetry, beside)
-        published = asyncio.get_running_loop().create_task(beside.run())
-        published.add_done_callback(_tell_ended)
-    ports = Ports(fleet_bus, device_bus, journal, telemetry, SystemdWatchdog())
-    controller = Controller(holon, ports, codec.fleet, codec.device)
-    controller.start()
-    status, why = await _until_ended(controller, fleet_bus, device_bus)
-    if why:
-        print(f"onboard: {config.machine.name}: {why}", file=sys.stderr)
-    await controller.stop()
-    if beside is not None and published is not None:
-        beside.stop()
-        await asyncio.wait([published])
-    return status
+    """Run until stopped; the exit status (``Ending``)."""
+    life = Life(config.machine.name, journal_directory)
+    with life.ended_by_signals():
+        journal = FileJournal(journal_directory, journal_owner(config.site, config.machine))
+        entries = journal.replay()
+        boot = next_boot(entries)
+        holon = Holon(
+            config.site,
+            config.machine,
+            factory_for(config.site, config.machine.kind),
+            boot=boot,
+            entries=entries,
+            journal=journal.condition,
+        )
+        buses = await life.open_buses(fleet_settings, BusSettings.of(config.device_bus))
+        if buses is None:
+            await journal.close()
+            return life.end()
+        life.begin()
+        system = system_of(config.site)
+        codec = codecs(system.name, system.messages)
+        telemetry: Telemetry = ConsoleTelemetry()
+        beside = gateway(buses[0], codec.fleet) if gateway is not None else None
+        published: asyncio.Task[None] | None = None
+        if beside is not None:
+            telemetry = ManyTelemetry(telemetry, beside)
+            published = asyncio.get_running_loop().create_task(beside.run())
+            published.add_done_callback(_tell_ended)
+        ports = Ports(*buses, journal, telemetry, life.watchdog, compaction_for(config.site))
+        controller = Controller(holon, ports, codec.fleet, codec.device)
+        controller.start()
+        life.follow(controller)
+        await life.over()
+        await controller.stop()
+        if beside is not None and published is not None:
+            beside.stop()
+            await asyncio.wait([published])
+    return life.end()
 
 
 def _tell_ended(published: "asyncio.Task[None]") -> None:
     """A gateway that has failed is told of; the controller goes on without it."""
     if not published.cancelled() and published.exception() is not None:
         print(f"onboard: the gateway has failed: {published.exception()!r}; the controller goes on", file=sys.stderr)
-
-
-async def _until_ended(controller: Controller, fleet_bus: OpenBus, device_bus: OpenBus) -> tuple[int, str]:
-    """Exit status and reason of whatever happens first: a signal, a halt, or a bus that is gone for good."""
-    loop = asyncio.get_running_loop()
-    ended: asyncio.Future[tuple[int, str]] = loop.create_future()
-
-    def end(status: int, why: str) -> None:
-        if not ended.done():
-            ended.set_result((status, why))
-
-    async def watch(bus: OpenBus, name: str) -> None:
-        end(1, f"the {name} bus is gone: {await bus.wait_lost()}")
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, end, 0, "")
-    assert controller.stopped is not None
-    controller.stopped.add_done_callback(lambda halted: end(1, f"halted: {halted.result()}"))
-    watching = [loop.create_task(watch(fleet_bus, "fleet"))]
-    if device_bus is not fleet_bus:
-        watching.append(loop.create_task(watch(device_bus, "device")))
-    try:
-        return await ended
-    finally:
-        for task in watching:
-            task.cancel()
 
 
 if __name__ == "__main__":

@@ -13,8 +13,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from bus_sim.campaign import table
+from bus_sim.campaign.cold_start import cold_starts
 from bus_sim.campaign.engine import on_cores, on_dask
-from bus_sim.campaign.points import SCENE, SCENE_LIMIT_S, Single, count, points, reference
+from bus_sim.campaign.ledger import Ledger
+from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
@@ -44,9 +46,11 @@ FILE) and its trace are kept. Every run is judged by the plant's oracle and by t
 safety at any time, and when all faults are over also that everything goes on, that everybody is served or told why,
 and that all mirrors become equal.
 
-With --exhaustive one reference scene of a car park (a car in and out) is played again and again, each time with one
-single fault: every frame lost or doubled at each receiver, or every controller killed before each of its frames and
-around each of its journal writes.
+With --exhaustive one reference scene of a car park (a car in and out, or with --scene overlap three that meet) is
+played again and again, each time with one single fault: every frame lost or doubled at each receiver, or every
+controller killed before each of its frames and around each of its journal writes, or (journal) at each of its writes
+with the write torn, 1 to 50 records lost, a page zeroed, a bit flipped, the seal gone, another machine's journal, an
+old copy, or no journal at all. A machine that holds because it cannot rely on its journal, and says so, counts as told.
 
 exit status:
   0  every run was safe, and went on once its faults were over
@@ -58,6 +62,10 @@ examples:
   bus-sim campaign standard --seeds 1-8 --cars 300 --apart 90 --faults-an-hour 6 --no-baseline --limit 86400
   bus-sim campaign graph --seeds 1-30 --orders 40
   bus-sim campaign small --exhaustive crash --sample 400
+  bus-sim campaign small --exhaustive journal --sample 400
+  bus-sim campaign small --exhaustive crash --scene overlap --add-to crashes.jsonl
+  bus-sim campaign small --seeds 1-2000 --faults two-crashes --apart 30 --no-baseline --add-to crashes.jsonl
+  bus-sim campaign standard --cold-start
   bus-sim campaign standard --seeds 1-2000 --dask tcp://10.0.0.5:8786
 """
 
@@ -75,6 +83,18 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument("--faults", default="all", metavar="PROFILE", help=f"{', '.join(PROFILES)} (default: all)")
     parser.add_argument(
         "--exhaustive", choices=[str(one) for one in Single], help="every single fault of a kind in one reference scene"
+    )
+    parser.add_argument(
+        "--scene",
+        choices=[str(one) for one in Scene],
+        default=str(Scene.ALONE),
+        help="with --exhaustive: one car alone, or three that overlap (default: alone)",
+    )
+    parser.add_argument(
+        "--cold-start",
+        action="store_true",
+        help="instead of seeds: cut the power of all machines at work, and see who takes part again within 30 s, with "
+        "nobody missing and with each machine missing in turn",
     )
     parser.add_argument("--sample", type=int, metavar="N", help="with --exhaustive: only so many, spread over all")
     parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
@@ -118,6 +138,12 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="no faults: the first robot bids and does not do what it wins, beside the same seeds without it",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results as JSON too")
+    parser.add_argument(
+        "--add-to",
+        type=Path,
+        metavar="FILE",
+        help="add each result to this file, and leave out what it has of the same state of the program",
+    )
 
 
 def run_campaign_command(args: argparse.Namespace) -> int:
@@ -127,27 +153,38 @@ def run_campaign_command(args: argparse.Namespace) -> int:
     if args.stranger is not None:
         return _strangers(args, plan, site)
     console = Console()
-    trials, total = _trials(args, plan, site, console)
+    if args.cold_start:
+        return _start_cold(args.site, site, console)
+    ledger = _ledger(args, plan)
+    trials, total = _trials(args, plan, site, console, ledger)
     results: list[Result] = []
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("runs", total=total)
         for result in trials:
             results.append(result)
+            if ledger is not None:
+                ledger.add(result.seed, result.report.verdict, _why(result))
             progress.advance(task)
     results.sort(key=lambda result: result.seed)
     for line in table.lines(results):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
     if args.json is not None:
         args.json.write_text(json.dumps(table.to_json(plan, results), indent=2) + "\n", encoding="utf-8")
-    return 1 if any(result.report.verdict in FAILURES for result in results) else 0
+    if ledger is not None:
+        for line in ledger.lines():
+            console.print(line, highlight=False, markup=False, soft_wrap=True)
+    has_failed = any(result.report.verdict in FAILURES for result in results)
+    return 1 if has_failed or (ledger is not None and ledger.has_failed) else 0
 
 
 def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
     if site.system in SYSTEMS:
         raise DemandError(f"--stranger {args.stranger}: {site.name} is a {site.system}, and only a car park has it")
     strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, plan.limit_s or SCENE_LIMIT_S)
-    pairs = sorted(play_pairs(strange, _seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed)
+    pairs = sorted(
+        play_pairs(strange, read_seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed
+    )
     for pair in pairs:
         print(pair.line())
     bad = [pair for pair in pairs if not pair.is_good]
@@ -157,20 +194,59 @@ def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
     return 1 if bad else 0
 
 
-def _trials(args: argparse.Namespace, plan: Plan, site: Site, console: Console) -> tuple[Iterator[Result], int]:
+def _start_cold(name: str, site: Site, console: Console) -> int:
+    """0 where every machine with power took part in time, each time."""
+    is_good = True
+    for start in cold_starts(site, name):
+        console.print(str(start), highlight=False, markup=False, soft_wrap=True)
+        is_good &= start.is_good
+    return 0 if is_good else 1
+
+
+def _why(result: Result) -> str:
+    """Of a failure, why and with which faults."""
+    if result.report.verdict not in FAILURES:
+        return ""
+    least = result.shrunk or result.report.scenario
+    return "; ".join([result.report.why(), *(str(fault) for fault in least.faults)])
+
+
+def _ledger(args: argparse.Namespace, plan: Plan) -> Ledger | None:
+    """The results so far, where there is a file for them; it knows a campaign by all that its trials have in common."""
+    if args.add_to is None:
+        return None
+    arrivals = plan.arrivals
+    demand = f"{arrivals.cars} cars, {arrivals.mean_s:g} s, {arrivals.sigma_s:g} s, {arrivals.min_stay_s:g} s"
+    what = [
+        plan.site,
+        plan.profile,
+        str(plan.scene),
+        demand,
+        str(plan.orders),
+        f"{plan.faults_an_hour}",
+        f"{plan.limit_s}",
+    ]
+    return Ledger.read(args.add_to, "; ".join(what))
+
+
+def _trials(
+    args: argparse.Namespace, plan: Plan, site: Site, console: Console, ledger: Ledger | None
+) -> tuple[Iterator[Result], int]:
     """What is to be played, as an iterator over results, and how many they will be."""
     jobs = args.jobs or os.cpu_count() or 1
     play_all = partial(on_dask, args.dask) if args.dask else partial(on_cores, jobs)
     if args.exhaustive is None:
-        seeds = _seeds(args.seeds)
+        seeds = read_seeds(args.seeds)
         head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
         console.print(f"{head}, {brought(site, plan.arrivals, plan.orders)} each", highlight=False)
-        return play_all(partial(run_seed, plan), seeds), len(seeds)
-    counts = count(site, reference(plan.site, plan.limit_s or SCENE_LIMIT_S))
+        left = seeds if ledger is None else ledger.open_of(seeds)
+        return play_all(partial(run_seed, plan), left), len(left)
+    counts = count(site, reference(plan.site, plan.limit_s or SCENE_LIMIT_S, plan.scene))
     plan = replace(plan, usual_wait_s=counts.longest_wait_s)
     every = [Point(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)]
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
     console.print(f"{args.exhaustive}s on {site.name}: {len(chosen)} of {len(every)} points", highlight=False)
+    chosen = chosen if ledger is None else [one for one in chosen if one.number not in ledger.done]
     return play_all(partial(run_point, plan), chosen), len(chosen)
 
 
@@ -189,7 +265,8 @@ def _plan(args: argparse.Namespace, site: Site) -> Plan:
         raise DemandError(f"--orders {args.orders}: {site.name} is a car park; write --cars")
     limit_s = SCENE_LIMIT_S if args.limit is None else args.limit
     if args.exhaustive is not None:
-        return Plan(args.site, args.exhaustive, limit_s, SCENE, out=args.out)
+        scene = Scene(args.scene)
+        return Plan(args.site, args.exhaustive, limit_s, SCENES[scene], out=args.out, scene=scene)
     apart_s = APART_S if args.apart is None else args.apart
     return Plan(
         args.site,
@@ -210,7 +287,7 @@ def _plan_of_system(args: argparse.Namespace, site: Site) -> Plan:
     if args.faults != "none" and not kinds_for(args.faults, site):
         raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, and only a car park has them")
     orders = usual_orders(site, args.orders, args.apart)
-    with_orders(site, orders, seed=_seeds(args.seeds)[0])
+    with_orders(site, orders, seed=read_seeds(args.seeds)[0])
     return Plan(
         args.site,
         args.faults,
@@ -245,7 +322,8 @@ def _check_seconds(option: str, value: float | None) -> None:
         raise DemandError(f"--{option} {value:g}: must be above 0, and at most {LONGEST_S} seconds")
 
 
-def _seeds(text: str) -> range:
+def read_seeds(text: str) -> range:
+    """``A`` or ``A-B``. Raises ``DemandError`` for anything else."""
     first, dash, last = text.partition("-")
     if not first.isdecimal() or (dash and not last.isdecimal()) or int(last or first) < int(first):
         raise DemandError(f"--seeds {text}: must be a seed, or the first and the last of several, such as 1-16")

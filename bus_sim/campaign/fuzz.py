@@ -24,6 +24,7 @@ from onboard.controller.shell import Controller, Ports
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
+from onboard.core.serial import next_boot
 from onboard.core.site import Machine, Site
 from onboard.kinds.registry import factory_for, system_of
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
@@ -37,9 +38,6 @@ FRAME_US = 320
 JOURNAL_LIMIT = 2_000
 #: How often a frame whose sender is drawn as the controller's own node-ID keeps it.
 OWN = 0.05
-#: A controller whose timer strikes more often than this at one moment has come to a state in which nothing moves.
-MOST_WAKES = 1_000
-NO_REST = "the machine's wakes do not come to rest"
 #: The corpus is what was said in so long, s.
 CORPUS_S = 400.0
 
@@ -54,22 +52,6 @@ class Outcome:
     errors: list[str] = field(default_factory=list)
     uncounted: list[str] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
-
-
-class _Watchdog(NoWatchdog):
-    """Stops a controller that wakes again and again at one moment: virtual time would stand still for ever."""
-
-    def __init__(self) -> None:
-        self.holon: Holon | None = None
-        self._last_us, self._wakes = -1, 0
-
-    def alive(self) -> None:
-        """The controller's timer has struck."""
-        now_us = round(asyncio.get_running_loop().time() * 1e6)
-        self._wakes = self._wakes + 1 if now_us == self._last_us else 1
-        self._last_us = now_us
-        if self.holon is not None and self._wakes > MOST_WAKES:
-            self.holon.halted = NO_REST
 
 
 class _Wire:
@@ -199,13 +181,11 @@ class Fuzzer:
         entries = self._journal.replay()
         entries = entries if len(entries) < JOURNAL_LIMIT else []
         self._journal = SimulatedJournal(entries=entries)
-        boots = sum(entry.get("record") == "boot" for entry in entries)
+        self._journal.replay()
         factory = factory_for(self._site, self._machine.kind)
-        holon = Holon(self._site, self._machine, factory, boot=boots % 255 + 1, entries=entries)
+        holon = Holon(self._site, self._machine, factory, boot=next_boot(entries), entries=entries)
         wires = (_Wire(), _Wire())
-        watchdog = _Watchdog()
-        controller = Controller(holon, Ports(*wires, self._journal, EventLog(limit=10), watchdog), *self._codecs)
-        watchdog.holon = holon
+        controller = Controller(holon, Ports(*wires, self._journal, EventLog(limit=10), NoWatchdog()), *self._codecs)
         controller.start()
         return controller, wires
 

@@ -1,4 +1,4 @@
-"""Every single fault of one kind in one reference scene: one car in and out, and one omission, duplicate or crash.
+"""Every single fault of one kind in one reference scene: an omission, a duplicate or a crash.
 
 The scene is played once without faults and everything is counted that a fault could strike; then each point is a
 trial of its own. A point is named by its number, so that any part of the whole can be played anywhere, again and alone.
@@ -8,8 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
+from typing import Final
 
 from bus_sim.campaign.car_park import ORIGIN_US, is_over
+from bus_sim.campaign.journal_points import journal_faults
 from bus_sim.campaign.trial import STEP_US
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
@@ -31,11 +33,22 @@ class Single(StrEnum):
     OMISSION = "omission"
     DUPLICATE = "duplicate"
     CRASH = "crash"
+    JOURNAL = "journal"
 
 
-#: One car, fetched two minutes later.
-SCENE = Arrivals(cars=1, mean_s=5.0, sigma_s=1.0, min_stay_s=120.0)
+class Scene(StrEnum):
+    """Who comes in the reference scene."""
 
+    ALONE = "alone"
+    OVERLAP = "overlap"
+
+
+SCENES: Final[dict[Scene, Arrivals]] = {
+    # One car, fetched two minutes later.
+    Scene.ALONE: Arrivals(cars=1, mean_s=5.0, sigma_s=1.0, min_stay_s=120.0),
+    # Three so close that two robots carry at the same time, and that some are fetched while others come.
+    Scene.OVERLAP: Arrivals(cars=3, mean_s=30.0, sigma_s=10.0, min_stay_s=60.0),
+}
 
 #: The longest that it may take under a fault, s, unless another limit is asked for. Ours.
 SCENE_LIMIT_S = 7_200.0
@@ -51,9 +64,9 @@ class Counts:
     longest_wait_s: float
 
 
-def reference(site_name: str, limit_s: float) -> Scenario:
+def reference(site_name: str, limit_s: float, scene: Scene = Scene.ALONE) -> Scenario:
     """The scene without a fault."""
-    return Scenario(site_name, 1, limit_s, SCENE)
+    return Scenario(site_name, 1, limit_s, SCENES[scene])
 
 
 def count(site: Site, scenario: Scenario) -> Counts:
@@ -121,4 +134,5 @@ _POINTS: dict[Single, Callable[[Site, Counts], list[AnyFault]]] = {
     Single.OMISSION: partial(_frames, FaultKind.OMISSION, 0),
     Single.DUPLICATE: partial(_frames, FaultKind.DUPLICATE, AGAIN_US),
     Single.CRASH: _crashes,
+    Single.JOURNAL: lambda _, counts: journal_faults(counts.written),
 }

@@ -16,7 +16,9 @@ class Verdict(StrEnum):
 
     VIOLATION = "VIOLATION"
     CRASHED = "program error"
+    HUNG = "hung"
     STOPPED = "stopped safely"
+    HELD = "held, told"
     NOT_SERVED = "not served"
     NOT_LIVE = "stood still"
     APART = "not converged"
@@ -29,6 +31,7 @@ class Verdict(StrEnum):
 FAILURES = (
     Verdict.VIOLATION,
     Verdict.CRASHED,
+    Verdict.HUNG,
     Verdict.STOPPED,
     Verdict.NOT_SERVED,
     Verdict.NOT_LIVE,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from bus_sim.campaign.car_park import ORIGIN_US
 from bus_sim.campaign.engine import on_cores
-from bus_sim.campaign.points import SCENE_LIMIT_S, reference
+from bus_sim.campaign.points import SCENE_LIMIT_S, Scene, reference
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults
 from bus_sim.campaign.report import FAILURES, Report, Verdict
 from bus_sim.campaign.shrink import shrink
@@ -41,6 +41,8 @@ class Plan:
     has_baseline: bool = True
     #: What each seed brings to a site that is no car park.
     orders: Orders | None = None
+    #: Of single faults, in which scene.
+    scene: Scene = Scene.ALONE
 
 
 #: Verdicts with which a run breaks off; it is played again only until so long after that, s (ours).
@@ -119,7 +121,7 @@ def _faults(plan: Plan, bare: Scenario, site: Site) -> tuple[AnyFault, ...]:
 def run_point(plan: Plan, point: Point) -> Result:
     """Play the reference scene with one single fault; there is nothing to shrink."""
     site = find_site(plan.site)
-    scenario = reference(plan.site, plan.limit_s or SCENE_LIMIT_S).with_faults([point.fault])
+    scenario = reference(plan.site, plan.limit_s or SCENE_LIMIT_S, plan.scene).with_faults([point.fault])
     report = play(site, scenario, usual_wait_s=plan.usual_wait_s)
     if report.verdict not in FAILURES:
         return Result(point.number, report)

@@ -10,11 +10,13 @@ from bus_sim.campaign.runner import Plan, Result
 COLUMNS = (
     Verdict.SERVED,
     Verdict.TOLD,
+    Verdict.HELD,
     Verdict.DELAYED,
     Verdict.STOPPED,
     Verdict.APART,
     Verdict.NOT_LIVE,
     Verdict.NOT_SERVED,
+    Verdict.HUNG,
     Verdict.CRASHED,
     Verdict.VIOLATION,
 )

@@ -4,19 +4,23 @@ from collections import Counter
 from pathlib import Path
 
 from bus_sim.campaign.car_park import CarPark
+from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
-from bus_sim.campaign.recovery import Recovery
+from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
+from bus_sim.campaign.recovery import Recovery, clocks_right_us
 from bus_sim.campaign.report import CONVERGED_US, Report, Verdict
 from bus_sim.campaign.stage import Stage, StageMaker
 from bus_sim.campaign.systems import SYSTEMS, SystemStage
 from bus_sim.faults.arm import frame_faults
 from bus_sim.faults.scenario import Scenario
 from bus_sim.run import BusRun, RunOptions, run_until
-from bus_sim.virtual_time import VirtualTimeLoop, run_on
+from bus_sim.virtual_time import EventLimitError, StandstillError, VirtualTimeLoop, run_on
 from onboard.core.site import Site
 
 #: Looks whether it is over, us.
 STEP_US = 1_000_000
+#: What the loop raises where virtual time does not go on, or not in time.
+_HANGS = (StandstillError, EventLimitError)
 #: A wait that is longer than the same run's longest without faults by this counts as delayed, us (ours).
 DELAY_US = 60_000_000
 
@@ -29,7 +33,13 @@ def stage_maker(site: Site) -> StageMaker:
 def play(site: Site, scenario: Scenario, *, usual_wait_s: float | None = None, trace: Path | None = None) -> Report:
     """Play a scenario; ``usual_wait_s`` is the longest wait without its faults, where it is known."""
     loop = VirtualTimeLoop()
-    return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop))
+    loop.event_limit = event_limit(scenario.limit_s)
+    try:
+        with wall_limit(wall_limit_s(scenario.limit_s)):
+            return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop))
+    except (WallLimitError, *_HANGS) as hang:
+        # Whatever ran was torn out of it: nothing more can be asked of that run.
+        return Report(scenario, Verdict.HUNG, simulated_s=loop.now_us() / 1e6, error=str(hang))
 
 
 async def _play(
@@ -40,21 +50,28 @@ async def _play(
     stage.arm(scenario.faults)
     judges = Judges(stage.run, disturbed=bool(scenario.faults))
     recovery = Recovery(stage.run, scenario.faults)
-    error, ends = "", _End(stage, recovery)
+    right_us = clocks_right_us(scenario.faults)
+    if right_us is not None:
+        judges.excuse_clocks(right_us)
+    held = Held()
+    stage.run.observers.append(held.hear)
+    error, hung, ends = "", "", _End(stage, recovery)
     try:
         stage.run.start()
         await run_until(
             stage.run,
-            lambda: stage.is_broken or judges.is_unsafe or ends(loop.now_us()),
+            lambda: stage.is_broken or judges.is_unsafe or held.is_over(loop.now_us()) or ends(loop.now_us()),
             round(scenario.limit_s * 1e6),
             STEP_US,
             lambda: judges.excuse(recovery.healed_us),
         )
+    except _HANGS as hang:
+        hung = str(hang)
     except Exception as problem:  # noqa: BLE001  # a program error in one seed must not end the campaign: it is a result
         error = f"{type(problem).__name__}: {problem}"
     finally:
         stage.run.close()
-    return _judge(stage, scenario, usual_wait_s, error, judges, recovery)
+    return _judge(stage, scenario, usual_wait_s, (error, hung), judges, recovery, held)
 
 
 class _End:
@@ -67,7 +84,10 @@ class _End:
 
     def __call__(self, now_us: int) -> bool:
         """Everybody is served or told why, all faults are over, and the mirrors agree or had all the time to."""
-        if now_us < self._recovery.healed_us or not self._stage.is_over:
+        if now_us < self._recovery.healed_us:
+            return False
+        self._recovery.look_at_waits(self._stage.waits_since)
+        if not self._stage.is_over:
             return False
         self._over_us = max(self._over_us or now_us, self._recovery.healed_us)
         return self._recovery.mirrors_agree() or now_us - self._over_us >= CONVERGED_US
@@ -77,11 +97,12 @@ def _judge(
     stage: Stage,
     scenario: Scenario,
     usual_wait_s: float | None,
-    error: str,
+    errors: tuple[str, str],
     judges: Judges,
     recovery: Recovery,
+    held: Held,
 ) -> Report:
-    tally = stage.tally()
+    (error, hung), tally = errors, stage.tally()
     unsafe, stalls = judges.finish()
     violations = (*stage.violations(), *unsafe)
     is_apart = stage.is_over and not recovery.mirrors_agree()
@@ -94,6 +115,9 @@ def _judge(
     verdicts = (
         (bool(violations), Verdict.VIOLATION),
         (bool(error), Verdict.CRASHED),
+        (bool(hung or stage.run.restless), Verdict.HUNG),
+        # Whoever waits for it now waits for a person, and has been told so.
+        (bool(held.since_us), Verdict.HELD),
         (bool(tally.waiting and halted), Verdict.STOPPED),
         (bool(tally.waiting), Verdict.NOT_SERVED),
         (bool(stalls), Verdict.NOT_LIVE),
@@ -117,7 +141,7 @@ def _judge(
         _struck(stage.run),
         tuple((measure.value, us) for measure, us in sorted(recovery.longest_us.items())),
         is_apart,
-        error,
+        error or hung,
         stage.who,
     )
 

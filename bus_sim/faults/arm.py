@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Final
 
+from bus_sim.attacks.launch import attack
 from bus_sim.can.faults import Fault
 from bus_sim.faults import bus, controllers, devices, operators, people
 from bus_sim.faults.holon import FaultyHolon
@@ -18,12 +19,14 @@ ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
     "overflow": controllers.overflow,
     "babble": bus.babble,
     "double_id": bus.double_id,
+    "attack": attack,
     "crash": controllers.crash,
     "pause": controllers.pause,
     "slow_node": controllers.slow_node,
     "disk_full": controllers.disk_full,
     "power_cut": controllers.power_cut,
     "drift": controllers.drift,
+    "clock_frozen": controllers.clock_frozen,
     "clock_jump": controllers.clock_jump,
     "sensor_off": devices.sensor_off,
     "sensor_stuck": devices.sensor_stuck,
@@ -41,7 +44,10 @@ ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
     "moved": people.moved,
     "blocked": operators.blocked,
     "emergency_stop": operators.emergency_stop,
+    "operate": operators.operate,
 }
+#: What is there from power-up on and waits for its time by itself.
+_FROM_POWER_UP: Final = frozenset({"attack"})
 
 
 def check_targets(faults: Iterable[AnyFault], site: Site) -> None:
@@ -53,7 +59,8 @@ def check_targets(faults: Iterable[AnyFault], site: Site) -> None:
         for key in ("target", "members", "receivers"):
             if key in KINDS[fault.kind].settings:
                 for name in fault.text(key).split("|"):
-                    if name not in known:
+                    # A machine that need not be named is the empty word.
+                    if name and name not in known:
                         raise ValueError(
                             f"fault {str(fault)!r}: {key}={name}: no such machine on site {site.name}; "
                             f"{nearest(name, known)}"
@@ -81,7 +88,7 @@ def arm(simulation: Simulation, faults: Iterable[AnyFault]) -> None:
         action = ACTIONS.get(injection.kind)
         if action is None:
             continue
-        if "at_s" in KINDS[injection.kind].settings:
+        if "at_s" in KINDS[injection.kind].settings and injection.kind not in _FROM_POWER_UP:
             simulation.plant.timers.call_at(injection.at_us, partial(action, simulation, injection))
         else:
             action(simulation, injection)

@@ -4,9 +4,9 @@ import random
 from collections.abc import Callable
 from dataclasses import replace
 
-from bus_sim.faults.holon import FaultyHolon
+from bus_sim.faults.holon import FROZEN_PPM, FaultyHolon
 from bus_sim.faults.injection import Injection
-from bus_sim.journal import SimulatedJournal
+from bus_sim.faults.journals import hurt
 from bus_sim.run import Simulation
 from onboard.core.frame import Frame
 from onboard.core.site import Machine
@@ -20,7 +20,7 @@ def crash(simulation: Simulation, injection: Injection) -> None:
         if machine.node_id not in simulation.controllers:
             return
         simulation.crash(machine)
-        _hurt_journal(simulation.journals[machine.node_id], injection)
+        hurt(simulation.journals[machine.node_id], injection.text("journal"), injection.count("entries"))
         if injection.text("restart") == "yes":
             restart_later(simulation, machine, simulation.loop.now_us() + round(injection.number("restart_s") * 1e6))
 
@@ -64,16 +64,6 @@ def _at_write(
     journal.on_write = count
 
 
-def _hurt_journal(journal: SimulatedJournal, injection: Injection) -> None:
-    what = injection.text("journal")
-    if what == "lost":
-        journal.entries.clear()
-    elif what == "torn":
-        del journal.entries[-1:]
-    elif what == "rolled_back":
-        del journal.entries[-injection.count("entries") :]
-
-
 def restart_later(simulation: Simulation, machine: Machine, when_us: int) -> None:
     """Power comes back at a loop time, us; nothing happens where it is back already."""
 
@@ -102,7 +92,6 @@ def disk_full(simulation: Simulation, injection: Injection) -> None:
     def room() -> None:
         simulation.journals[machine.node_id].is_full = False
         simulation.crash(machine)
-        simulation.journals[machine.node_id] = replace(simulation.journals[machine.node_id], is_full=False)
         restart_later(simulation, machine, simulation.loop.now_us() + 1_000_000)
 
     simulation.plant.timers.call_at(injection.until_us, room)
@@ -116,17 +105,34 @@ def pause(simulation: Simulation, injection: Injection) -> None:
 
 
 def drift(simulation: Simulation, injection: Injection) -> None:
-    """The clock is too fast or too slow from now on, until the controller is restarted."""
-    holon = _holon(simulation, injection)
-    if holon is not None:
-        holon.set_clock(simulation.loop.now_us(), ppm=injection.count("ppm"))
+    """The clocks are too fast or too slow from now on, until it is over or the controller is restarted."""
+    _set_rate(simulation, injection, injection.count("ppm"))
+
+
+def clock_frozen(simulation: Simulation, injection: Injection) -> None:
+    """The clocks stand still: what was due in a moment is not due, and what comes from outside comes at one time."""
+    _set_rate(simulation, injection, FROZEN_PPM)
 
 
 def clock_jump(simulation: Simulation, injection: Injection) -> None:
-    """The clock jumps, forwards or backwards."""
-    holon = _holon(simulation, injection)
-    if holon is not None:
-        holon.set_clock(simulation.loop.now_us(), jump_us=injection.count("by_ms") * 1000)
+    """The clocks jump, forwards or backwards."""
+    _set_clocks(simulation, injection, jump_us=injection.count("by_ms") * 1000)
+
+
+def _set_rate(simulation: Simulation, injection: Injection, ppm: int) -> None:
+    _set_clocks(simulation, injection, ppm=ppm)
+    if injection.number("for_s"):
+        # At its rate again, whatever it shows.
+        simulation.plant.timers.call_at(injection.until_us, lambda: _set_clocks(simulation, injection, ppm=0))
+
+
+def _set_clocks(simulation: Simulation, injection: Injection, *, jump_us: int = 0, ppm: int | None = None) -> None:
+    for name in injection.target.split("|"):
+        controller = simulation.controllers.get(machine_named(simulation, name).node_id)
+        if controller is not None:
+            assert isinstance(controller.holon, FaultyHolon)
+            controller.holon.set_clock(simulation.loop.now_us(), jump_us=jump_us, ppm=ppm)
+            controller.look_at_clock()
 
 
 def slow_node(simulation: Simulation, injection: Injection) -> None:

@@ -7,6 +7,10 @@ from bus_sim.run import Simulation
 from onboard.core.codes import Reason
 from onboard.core.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment
+from onboard.operate.names import OperateError
+from onboard.operate.order import Order
+from onboard.operate.station import Station
+from onboard.operate.wishes import Wish, maker_of
 from onboard.wire.codec import fleet_codec
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
@@ -25,6 +29,51 @@ def blocked(simulation: Simulation, injection: Injection) -> None:
 def emergency_stop(simulation: Simulation, _: Injection) -> None:
     """Somebody presses the button: every machine stops until it is switched on again."""
     _say(simulation, EmergencyStop(STATION, Reason.OPERATOR))
+
+
+def operate(simulation: Simulation, injection: Injection) -> None:
+    """A person gives a command of ``onboard operate`` and answers yes; what it says is in the run's telemetry."""
+    task = simulation.loop.create_task(_operate(simulation, injection))
+    # An exception in it is a mistake of this program: it ends the run.
+    task.add_done_callback(lambda done: None if done.cancelled() else done.result())
+
+
+async def _operate(simulation: Simulation, injection: Injection) -> None:
+    loop, site = simulation.loop, simulation.site
+    who = f"operator {injection.text('do')} {loop.now_us()}"
+    bus = simulation.fleet.attach(who, None)
+
+    def tell(line: str) -> None:
+        simulation.log.event(loop.now_us(), "operator", line)
+
+    station = Station(site, simulation.codecs.fleet, bus, tell)
+    try:
+        make = maker_of(site, wish_of(injection), seed=loop.now_us() // 1_000_000)
+        await station.operate(make, None, _agrees)
+    except OperateError as error:
+        tell(str(error))
+    finally:
+        await bus.close()
+
+
+async def _agrees(_: Order) -> bool:
+    return True
+
+
+def wish_of(injection: Injection) -> Wish:
+    """The command that a fault of kind ``operate`` means."""
+    do, seconds = injection.text("do"), injection.number("for_s")
+    segment = f"p({injection.count('track')},{injection.count('index')})"
+    is_absent = injection.text("absent") == "yes"
+    return Wish(
+        do,
+        machine=injection.text("target"),
+        segment=segment,
+        of=injection.text("target") if do == "go" else "",
+        absent=injection.text("target") if is_absent else "",
+        body=(segment,) if is_absent else None,
+        for_us=round(seconds * 1e6) if do == "stop" else None,
+    )
 
 
 def _say(simulation: Simulation, message: Message) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from bus_sim.plant.link import DeviceLink
 from bus_sim.plant.motion import Motion, braking, driving, standing
+from bus_sim.plant.rules import Rule
 from bus_sim.plant.shaft import PlatformBody
 from bus_sim.plant.timers import Timer, Timers
 from bus_sim.plant.world import Change, RobotBody, World
@@ -126,6 +127,8 @@ class Carrier:
         self._order = order
         if self._turn_timer is not None:
             return
+        if not self._shuttle_home() and self._would_move(order, now_us):
+            self._world.hazard(Rule.ORDER_TO_TEAR, f"robot {self.node_id}")
         refusal = self._refusal(order)
         if refusal:
             self._fail(refusal, now_us)
@@ -136,6 +139,10 @@ class Carrier:
         if self._order is None or now_us >= self._fresh_until_us:
             return False
         return order.sequence != self._order.sequence and not is_newer(order.sequence, self._order.sequence, 8)
+
+    def _would_move(self, order: DriveOrder, now_us: int) -> bool:
+        off_mm = abs(order.target_mm - self._body.motion.at(now_us)[0])
+        return order.across is not self._is_across or off_mm > AT_TARGET_MM
 
     def _refusal(self, order: DriveOrder) -> str:
         if not self._shuttle_home():

@@ -1,7 +1,8 @@
 """The oracle: invariants judged on the ground truth alone, never on anybody's tables, messages or sensors.
 
 It looks after every change of the world, and at whole motions afterwards, so that nothing between two events escapes.
-A run with any violation has failed.
+An order that would tear a car counts where it is given, though the drive's interlock refuses it: a run that only an
+interlock has saved is no good run. A run with any violation has failed.
 """
 
 from collections.abc import Iterator
@@ -37,6 +38,7 @@ class Oracle:
         self._has_spurs = bool(world.site.spurs)
         self._judge_pairs(now_us)
         world.watch(self._on_change)
+        world.on_hazard.append(self._once)
 
     def take_stock(self) -> None:
         """Take the cars as they are now for the stock that the run began with."""

@@ -19,6 +19,7 @@ class Rule(Enum):
     NO_PERSON_TO_MACHINES = "a person is inside while the output door is not locked"
     PERSON_BY_OPEN_DOOR = "a person passes a door that is not open"
     BAY_BY_OPEN_DOOR = "a shuttle is in a bay whose output door is not open"
+    ORDER_TO_TEAR = "a carrier is ordered away while its shuttle is out"
     NO_WALL = "a shuttle reaches where there is no station"
     ONE_CAR = "two cars are in one place"
     CARS_CONSERVED = "a car is lost or doubled"

@@ -11,6 +11,7 @@ from enum import Enum
 
 from bus_sim.plant.bodies import Aboard, CarBody, Location
 from bus_sim.plant.motion import Motion, standing
+from bus_sim.plant.rules import Rule
 from bus_sim.plant.shaft import PlatformBody, Sill, sills_of
 from bus_sim.plant.timers import Timers
 from onboard.core.codes import DoorName, DoorPosition, KindCode, Side
@@ -84,6 +85,8 @@ class World:
         self.cars: dict[str, CarBody] = {}
         self.where: dict[str, Location] = {}
         self._watchers: list[Watcher] = []
+        #: Told of orders that would do harm, though the device that was given them refused: who judges is told why.
+        self.on_hazard: list[Callable[[Rule, str], None]] = []
         now_us = timers.now_us()
         for machine in site.machines.values():
             if machine.kind is KindCode.ROBOT:
@@ -357,6 +360,11 @@ class World:
         self.bays[node_id].crossing = False
         self.where[car.name] = None
         self._tell(Change.CAR, node_id)
+
+    def hazard(self, rule: Rule, text: str) -> None:
+        """A device was given an order that only its interlock kept from breaking a rule."""
+        for tell in self.on_hazard:
+            tell(rule, text)
 
     def _tell(self, change: Change, node_id: int) -> None:
         now_us = self.timers.now_us()

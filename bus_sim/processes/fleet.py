@@ -34,8 +34,7 @@ class ProcessFleet:
     """The controllers of a simulated site in processes of their own, for the time of a run.
 
     Each has a machine file, a journal and a log in one directory. A process that ends without having been told to is
-    told in ``failures`` with its last words, and ends the run: ``is_over``. So do the signals INT and TERM. Entering
-    raises ``ProcessesError``.
+    told in ``failures`` with its last words, and ends the run: ``is_over``. Entering raises ``ProcessesError``.
     """
 
     def __init__(self, simulation: Simulation, plan: ProcessPlan, outside: frozenset[str], console: Console) -> None:
@@ -63,14 +62,11 @@ class ProcessFleet:
             medium.attach("process host", None)
         loop = asyncio.get_running_loop()
         self._begin_s = loop.time()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.add_signal_handler(number, self._interrupt, number)
         self._lives = [loop.create_task(self._live(name, spans)) for name, spans in self._spans.items()]
         self._console.print(f"{len(self._lives)} machines in processes of their own", highlight=False)
 
     async def stop(self) -> None:
         """End all processes, politely first, and forget their files unless a directory was named."""
-        loop = asyncio.get_running_loop()
         span_s = self._since_s()
         for life in self._lives:
             life.cancel()
@@ -78,8 +74,6 @@ class ProcessFleet:
             if isinstance(ended, Exception):
                 raise ended
         await asyncio.gather(*(self._end(name, signal.SIGTERM) for name in list(self._running)))
-        for number in (signal.SIGINT, signal.SIGTERM):
-            loop.remove_signal_handler(number)
         if self._temporary is not None:
             self._temporary.cleanup()
         if self._started and span_s > 0:
@@ -138,10 +132,6 @@ class ProcessFleet:
         self.is_over = True
 
     # --- all of them -------------------------------------------------------------------------------------------
-
-    def _interrupt(self, number: signal.Signals) -> None:
-        self._tell(f"{number.name}: ending")
-        self.is_over = True
 
     def _tell(self, what: str) -> None:
         self._console.print(f"{self._since_s():7.1f} s  {what}", highlight=False, soft_wrap=True)

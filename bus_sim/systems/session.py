@@ -36,7 +36,7 @@ STEP_US = 500_000
 #: Kinds of fault that need nothing of the plant but its timers; beside them all faults of single frames.
 FAULTS = frozenset(
     {
-        *("burst", "bit_errors", "lossy", "reorder", "bus_off", "partition", "overflow", "babble"),
+        *("burst", "bit_errors", "lossy", "reorder", "bus_off", "partition", "overflow", "babble", "attack"),
         *("crash", "pause", "slow_node", "disk_full", "power_cut", "drift", "clock_jump"),
     }
 )

@@ -3,7 +3,6 @@
 import os
 import select
 import subprocess
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -11,6 +10,7 @@ from typing import Self
 
 from deploy.image.boot import add_files
 from deploy.wheels import DeployError
+from hil.guest.effort import LOOK_S, Effort
 
 QEMU = "qemu-system-aarch64"
 #: Of Debian's package qemu-efi-aarch64.
@@ -34,7 +34,10 @@ class Board:
     """A running board with its disk, and with sticks in it. Leaving cuts its power, whatever it was writing."""
 
     def __init__(self, disk: Path, sticks: Sequence[Path] = ()) -> None:
+        #: What was said on the console so far, in whole lines only: half a line says something else, or nothing.
         self.console = ""
+        self._half = b""
+        self._said = 0
         self._words = [
             *(QEMU, "-M", "virt", "-cpu", "cortex-a53", "-accel", "tcg", "-icount", _ICOUNT, "-rtc", "clock=vm"),
             *("-smp", "1", "-m", str(MEMORY_MB), "-nographic", "-nic", "none", "-monitor", "none"),
@@ -57,12 +60,24 @@ class Board:
         self._process.communicate()
 
     def until(self, what: str, is_there: Callable[[str], bool], limit_s: float) -> None:
-        """Read the console until ``is_there`` in all of it. Raises ``DeployError`` after so long, with its end."""
+        """Read the console until ``is_there`` in all of its whole lines.
+
+        ``limit_s`` is processor time of the emulator from now on, so that a busy host changes nothing. Raises
+        ``DeployError`` with the console's end when it is over, or the board has ended or is stuck (``Effort``).
+        """
         assert self._process.stdout is not None
-        end_s = time.monotonic() + limit_s
+        effort = Effort(self._process.pid, limit_s)
         while not is_there(self.console):
-            ready, _, _ = select.select([self._process.stdout], [], [], max(0.0, end_s - time.monotonic()))
-            news = os.read(self._process.stdout.fileno(), 65536) if ready else b""
-            if not news:
-                raise DeployError(f"not on the console: {what}\n{self.console[-2000:]}")
-            self.console += news.decode(errors="replace").replace("\r", "")
+            over = effort.why_over(self._said)
+            if over is None and select.select([self._process.stdout], [], [], LOOK_S)[0]:
+                news = os.read(self._process.stdout.fileno(), 65536)
+                over = None if news else "it has ended"
+                self._take(news)
+            if over is not None:
+                rest = self._half.decode(errors="replace")
+                raise DeployError(f"not on the console: {what}; {over}\n{self.console[-2000:]}{rest}")
+
+    def _take(self, news: bytes) -> None:
+        self._said += len(news)
+        whole, newline, self._half = (self._half + news).rpartition(b"\n")
+        self.console += (whole + newline).decode(errors="replace").replace("\r", "")

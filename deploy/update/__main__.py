@@ -16,6 +16,8 @@ from deploy.update.slots import Phase
 
 #: From the start of the controller's service until a system on trial has shown that it works.
 HEALTH_LIMIT_S = 180.0
+#: A controller on trial that was started again more often than this does not work.
+RESTARTS_LIMIT = 3
 SUFFIX = ".update"
 _LOCK = Path("/run/onboard-update.lock")
 HELP = """\
@@ -104,8 +106,10 @@ def _judge(place: Place) -> int:
 
 
 def _has_failed() -> bool:
-    """Whether the supervisor has given the controller up."""
-    return subprocess.run(["systemctl", "is-failed", "--quiet", "onboard.service"], check=False).returncode == 0
+    """Whether the supervisor has given the controller up, or starts it again and again."""
+    words = ["systemctl", "show", "--value", "--property", "ActiveState,NRestarts", "onboard.service"]
+    said = subprocess.run(words, capture_output=True, text=True, check=False).stdout.split()
+    return "failed" in said or any(word.isdecimal() and int(word) > RESTARTS_LIMIT for word in said)
 
 
 if __name__ == "__main__":

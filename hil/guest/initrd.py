@@ -36,21 +36,26 @@ $b mount -t tmpfs run /new/run
 $b mkdir -p @SHARE@ /new@SHARE@ /new/run/netns /new@WORK@
 $b mount -t 9p -o $options share /new@SHARE@ || echo "guest: no share"
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=@WORK@ LANG=C.UTF-8
-$b chroot /new /bin/sh -c 'cd @WORK@ && exec /bin/sh @SHARE@/script' > /new@SHARE@/output 2>&1 < /dev/null
+in_time="$b timeout -k 5 @LIMIT_S@"
+$in_time $b chroot /new /bin/sh -c 'cd @WORK@ && exec /bin/sh @SHARE@/script' > /new@SHARE@/output 2>&1 < /dev/null
 $b echo $? > /new@SHARE@/status
 $b sync
 $b reboot -f
 """
 
 
-def build_initrd(kernel: Kernel, to: Path) -> Path:
-    """Write the archive for ``-initrd`` (format "newc", Linux Documentation/driver-api/early-userspace)."""
+def build_initrd(kernel: Kernel, to: Path, limit_s: float) -> Path:
+    """Write the archive for ``-initrd`` (format "newc", Linux Documentation/driver-api/early-userspace).
+
+    The guest ends its script after ``limit_s`` of its own time; all else in it ends with the guest.
+    """
+    init = _INIT.replace("@SHARE@", SHARE).replace("@WORK@", WORK).replace("@LIMIT_S@", f"{limit_s:.0f}")
     order = kernel.load_order()
     files: list[tuple[str, int, bytes]] = [
         ("bin", 0o040755, b""),
         ("modules", 0o040755, b""),
         ("bin/busybox", 0o100755, BUSYBOX.read_bytes()),
-        ("init", 0o100755, _INIT.replace("@SHARE@", SHARE).replace("@WORK@", WORK).encode()),
+        ("init", 0o100755, init.encode()),
         ("modules/order", 0o100644, "".join(f"{file.name}\n" for file in order).encode()),
         *((f"modules/{file.name}", 0o100644, file.read_bytes()) for file in order),
     ]

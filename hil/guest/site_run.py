@@ -92,10 +92,12 @@ class SiteRun:
             words += ["--without", name, "--bus", f"{name}=socketcan:{device_channel(name)}"]
         self._fork(PLANT, bus_sim, [*words, *self.order.begin])
 
-    def start_machines(self) -> None:
-        """Every machine runs the ordinary program with its own file."""
+    def start_machines(self, *, files_only: bool = False) -> None:
+        """Every machine runs the ordinary program with its own file; or only gets that file."""
         for name in self.order.machines:
             (self.share / f"{name}.toml").write_text(_machine_file(name), encoding="utf-8")
+            if files_only:
+                continue
             self._fork(name, onboard, ["--machine", f"{name}.toml", "--journal", f"{JOURNALS}/{name}"])
 
     def _fork(self, name: str, main: Main, words: Sequence[str]) -> None:
@@ -123,7 +125,11 @@ class SiteRun:
 
     def tell(self, what: str) -> None:
         """A line of the scene's story, with its seconds."""
-        print(f"{time.monotonic() - self.begin_s:6.1f} s  {what}", flush=True)
+        print(f"{self.now_s():6.1f} s  {what}", flush=True)
+
+    def now_s(self) -> float:
+        """Since the scene's beginning, in the guest's time."""
+        return time.monotonic() - self.begin_s
 
     def end(self, names: Sequence[str], limit_s: float = 20.0) -> dict[str, int]:
         """Tell these processes to end, and wait; their exit statuses."""

@@ -9,12 +9,13 @@ from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onboard.core.codes import Reason
+from onboard.controller.rest import Rest
+from onboard.core.codes import MachineState, Reason
 from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.ports.bus import Bus
-from onboard.ports.journal import Journal
+from onboard.ports.journal import Compaction, Journal
 from onboard.ports.telemetry import Telemetry
 from onboard.ports.watchdog import Watchdog
 from onboard.wire.codec import Codec
@@ -33,6 +34,8 @@ class Ports:
     journal: Journal
     telemetry: Telemetry
     watchdog: Watchdog
+    #: What the journal may leave out when it has grown; None: nothing ever.
+    fewer: Compaction | None = None
 
 
 class Controller:
@@ -41,15 +44,21 @@ class Controller:
     def __init__(self, holon: Holon, ports: Ports, fleet: Codec, device: Codec) -> None:
         self.holon = holon
         self.ports = ports
+        self._fewer = ports.fewer
         self._queue_drops: Counter[Reason] = Counter()
         self.stopped: asyncio.Future[str] | None = None
+        #: Why it has halted; None while it has not, or where the journal could not be written.
+        self.halted_for: Reason | None = None
         self._codecs = (fleet, device)
+        holon.listen(fleet.speakers)
         self._decoders = (Decoder(fleet), Decoder(device))
         self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
         self._outbox: deque[Effect] = deque()
         self._writing: asyncio.Task[None] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._timer_us: int | None = None
+        #: Whether its wakes come to rest; a run in simulated time ends with a machine whose wakes do not.
+        self.rest = Rest()
         #: Frames that the fleet bus had taken of me when it last had taken another, and when that was, us.
         self._taken = (0, 0)
 
@@ -85,9 +94,18 @@ class Controller:
         """Whether no journal write is under way, so that a frame is taken up at once."""
         return self._writing is None and not self._inbox
 
+    def look_at_clock(self) -> None:
+        """The holon's clock was set from outside: its next wish may come sooner than it was."""
+        if self._writing is None:
+            self._set_timer()
+
     def wire_drops(self) -> Counter[Reason]:
         """Frames of both buses that came to nothing below the holon, by reason."""
         return self._decoders[0].drops + self._decoders[1].drops + self._queue_drops
+
+    def note(self, reason: Reason) -> None:
+        """Count what befell this controller outside its decisions; it is told with the drops."""
+        self._queue_drops[reason] += 1
 
     def all_drops(self) -> Counter[Reason]:
         """All input that this machine dropped, by reason."""
@@ -130,8 +148,11 @@ class Controller:
             return
         self.holon.wire_drops = self.wire_drops()
         self.holon.is_acknowledged = self._is_acknowledged()
-        self._guarded(lambda: self._outbox.extend(self.holon.wake(self._now_us())))
-        self.ports.watchdog.alive()
+        now_us = self._now_us()
+        self.rest.woke(now_us)
+        self._guarded(lambda: self._outbox.extend(self.holon.wake(now_us)))
+        if not self.rest.is_in_doubt:
+            self.ports.watchdog.alive()
         self._carry_out()
 
     def _is_acknowledged(self) -> bool:
@@ -151,13 +172,20 @@ class Controller:
             action()
         except Exception as error:  # noqa: BLE001  # whatever it is, going on with a broken belief would be worse
             self._outbox.clear()
-            self._halt(f"{type(error).__name__}: {error}")
+            self._halt(f"{type(error).__name__}: {error}", Reason.INVARIANT_BROKEN)
 
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
         self._guarded(self._work_off)
+        if self._writing is None and self._may_compact():
+            self._writing = self._loop.create_task(self._compact())
         if self._writing is None:
             self._set_timer()
+
+    def _may_compact(self) -> bool:
+        """Nothing waits and nothing moves: whoever needs this machine's word meanwhile waits so long."""
+        is_idle = self.holon.halted is None and self.holon.behaviour.state is MachineState.IDLE
+        return self._fewer is not None and is_idle and self.ports.journal.has_grown
 
     def _work_off(self) -> None:
         while self._writing is None:
@@ -181,8 +209,8 @@ class Controller:
                 self._writing = self._loop.create_task(self._write(effect))
             case Report(text):
                 self.ports.telemetry.event(self._now_us(), self.holon.machine.name, text)
-            case Halt(why):
-                self._halt(why)
+            case Halt(why, reason):
+                self._halt(why, reason)
 
     async def _write(self, record: Record) -> None:
         try:
@@ -190,15 +218,28 @@ class Controller:
         except OSError as error:
             # What cannot be made durable must not be said: the machine stops where its authority still holds.
             self._outbox.clear()
-            self._halt(f"the journal cannot be written: {error}", Reason.JOURNAL_LOST)
+            self._halt(f"the journal cannot be written: {error}", None)
         self._writing = None
         self._carry_out()
 
-    def _halt(self, why: str, reason: Reason = Reason.INVARIANT_BROKEN) -> None:
+    async def _compact(self) -> None:
+        assert self._fewer is not None
+        try:
+            await self.ports.journal.compact(self._fewer)
+        except OSError as error:
+            # The old records stand, so nothing is lost; it is tried again in this machine's next life.
+            self._fewer = None
+            self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"journal not shortened: {error}")
+        self._writing = None
+        self._carry_out()
+
+    def _halt(self, why: str, reason: Reason | None) -> None:
         """Say why, and fall silent: the drives brake by themselves, and the tokens stay where they are."""
+        if self.stopped is not None and not self.stopped.done():
+            self.halted_for = reason
         self.holon.halted = self.holon.halted or why
         self._inbox.clear()
-        for frame in self._codecs[0].encode(self.holon.last_word(reason)):
+        for frame in self._codecs[0].encode(self.holon.last_word(reason or Reason.JOURNAL_LOST)):
             self.ports.fleet_bus.send(frame)
         self.ports.telemetry.event(self._now_us(), self.holon.machine.name, f"halted: {why}")
         self.ports.watchdog.status(f"halted: {why}")
@@ -209,6 +250,10 @@ class Controller:
         """One timer for the holon's next wish; a later wish leaves an earlier timer in place."""
         due_us = self.holon.next_wake()
         if due_us is None or (self._timer_us is not None and self._timer_us <= due_us):
+            return
+        self.rest.due(due_us)
+        if self.rest.is_broken:
+            self._halt(self.rest.why, Reason.RUNAWAY)
             return
         if self._timer is not None:
             self._timer.cancel()

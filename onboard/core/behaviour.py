@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from onboard.core.authority import TokenBook, TokenKey, car_token
-from onboard.core.codes import KindCode, MachineState, Reason
-from onboard.core.effects import Effect
-from onboard.core.messages import CallForProposals, Message
+from onboard.core.codes import KindCode, MachineState, Reason, TokenKind
+from onboard.core.effects import Effect, Record
+from onboard.core.messages import CallForProposals, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.petitions import Petitions
@@ -34,10 +34,31 @@ class Fleet:
     petitions: Petitions = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
     admissions: int = 0
+    _left: list[Reference] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)
-        self.mirror.on_forgotten.append(lambda car: self.tokens.retire(car_token(*car)))
+        self.mirror.on_forgotten.append(self._retire)
+
+    def _retire(self, car: Reference) -> None:
+        if self.tokens.retire(car_token(*car)):
+            self._left.append(car)
+
+    def forgotten(self) -> list[Effect]:
+        """Cars that left long ago, for the journal: what it has of them may go."""
+        left, self._left = self._left, []
+        return [
+            Record(
+                {
+                    "record": "car_left",
+                    "kind": int(TokenKind.CAR),
+                    "number": car_token(*car).number,
+                    "car_origin": car.origin,
+                    "car": car.number,
+                }
+            )
+            for car in left
+        ]
 
     @property
     def node_id(self) -> int:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from onboard.core.codes import Reason
 from onboard.core.messages import Message
 
 
@@ -36,9 +37,10 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class Halt:
-    """A broken invariant: stop the machine safely and say why."""
+    """Stop the machine safely and say why; ``reason`` decides who brings it back (onboard/io/endings.py)."""
 
     why: str
+    reason: Reason = Reason.INVARIANT_BROKEN
 
 
 Effect = Send | Actuate | Record | Report | Halt

@@ -4,10 +4,10 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onboard.core.codes import NOBODY, Reason
+from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.holding import Hold, Holding, Outcome
-from onboard.core.messages import Heartbeat, Message, SyncRequest
+from onboard.core.messages import Heartbeat, Message
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted
@@ -15,14 +15,14 @@ from onboard.core.recovery_messages import Go, Halted
 
 @dataclass
 class Holds:
-    """One machine's. ``heartbeat`` makes its sign of life; ``new_life`` counts its boot counter up and tells it."""
+    """One machine's. ``heartbeat`` makes its sign of life, ``new_life`` begins another: its number, what to ask."""
 
     holding: Holding
     presence: Presence
     own: OwnNumber
     drops: Counter[Reason]
     heartbeat: Callable[[], Heartbeat]
-    new_life: Callable[[], int]
+    new_life: Callable[[int], tuple[int, list[Effect]]]
 
     def on_own_number(self, message: Message, now_us: int) -> list[Effect]:
         """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
@@ -63,8 +63,7 @@ class Holds:
 
     def _come_back(self, now_us: int) -> list[Effect]:
         """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
-        boot = self.new_life()
+        boot, ask = self.new_life(now_us)
         self.presence.listen_anew(now_us)
         records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": boot})]
-        ask: Effect = Send(SyncRequest(self.holding.node_id, NOBODY))
-        return [*records, Report("comes back: nobody sends under its number any more"), *self.words(), ask]
+        return [*records, Report("comes back: nobody sends under its number any more"), *self.words(), *ask]

@@ -6,6 +6,7 @@ are; ``sender`` is the node-ID in the lowest byte of the identifier. A class wit
 2**32; distances are whole millimetres.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -33,6 +34,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
+from onboard.core.serial import ms_after
 
 
 class Reference(NamedTuple):
@@ -51,6 +53,10 @@ class Message:
     """Base of all messages; ``sender`` is a node-ID."""
 
     sender: int
+
+
+#: By class of message the kinds of machine that may say it; ``KindCode.OBSERVER`` stands for nodes 251 to 255.
+Speakers = Mapping[type[Message], frozenset[KindCode]]
 
 
 # --- fleet bus -----------------------------------------------------------------------------------------------------
@@ -201,6 +207,14 @@ class Stamp(NamedTuple):
     award_ms: int
     initiator: int
     call: int
+
+    def ranks_before(self, other: "Stamp") -> bool:
+        """Whether this plan keeps its windows before the other's; of two stamps that differ always exactly one does."""
+        after_ms = ms_after(self.award_ms, other.award_ms)
+        if after_ms == ms_after(other.award_ms, self.award_ms):
+            # The same time, or half the way round, where nobody can say which came first.
+            return self < other
+        return after_ms < 0
 
 
 @dataclass(frozen=True, slots=True)

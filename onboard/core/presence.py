@@ -71,11 +71,11 @@ class Presence:
         self._begin_anew(now_us)
         self.held_until_us = now_us + SETTLING_US
 
-    def is_admitted(self, now_us: int) -> bool:
-        """Whether the time as an obstacle has just ended."""
+    def is_admitted(self, now_us: int, *, in_time: bool = True) -> bool:
+        """Whether the time as an obstacle has just ended; not before the clock is ``in_time`` again."""
         if self.held_until_us is None or now_us < self.held_until_us:
             return False
-        if self._is_outvoted(now_us):
+        if not in_time or self._is_outvoted(now_us):
             self.held_until_us = now_us + SETTLING_US
             return False
         self.held_until_us = None
@@ -90,10 +90,14 @@ class Presence:
             self.held_until_us = now_us + SETTLING_US
 
     def _is_outvoted(self, now_us: int) -> bool:
-        """Whether more live machines are foreign to me than not; of two halves that with the lowest node-ID counts."""
-        since_us = now_us - self.patience_us
-        others = [node for node, (_, heard_us) in self.foreign.items() if heard_us > since_us]
-        ours = [self.node_id, *(node for node in self.mirror.alive(now_us) if node not in self.foreign)]
+        """Whether more live machines are foreign to me than not; of two halves that with the lowest node-ID counts.
+
+        Only machines of the site have a vote: what else is on the bus can be made up by one node.
+        """
+        since_us, machines = now_us - self.patience_us, self.site.machines
+        others = [node for node, (_, heard_us) in self.foreign.items() if heard_us > since_us and node in machines]
+        alive = self.mirror.alive(now_us)
+        ours = [self.node_id, *(node for node in alive if node not in self.foreign and node in machines)]
         return (len(others), -min(others, default=0)) > (len(ours), -min(ours))
 
     def heard_halted(self, halted: Halted, now_us: int) -> None:

@@ -192,3 +192,8 @@ class Site:
     def position_mm(self, segment: Segment) -> int:
         """Centre of a segment along its track, in mm from that of index 1."""
         return (segment.index - 1) * self.tracks[segment.track].pitch_mm
+
+
+def journal_owner(site: Site, machine: Machine) -> str:
+    """Whose journal a machine's is: another board with the same machine file may go on with it, nobody else."""
+    return f"{site.name} node {machine.node_id}"

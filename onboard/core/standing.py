@@ -72,7 +72,16 @@ class Standing:
         if itinerary is None or self._is_at(here, final_position(self.site, itinerary)):
             return None
         runs = [leg for leg in itinerary.legs if _goes(leg)]
-        return from_bus_ms(runs[0].end_ms, now_us) if runs else None
+        # The last run that begins or passes here: before it the machine may work here, or come here again.
+        away = [leg for leg in runs if self._begins_or_passes(leg, here)] or runs
+        return from_bus_ms(away[-1].end_ms, now_us) if away else None
+
+    def _begins_or_passes(self, leg: Leg, here: Segment) -> bool:
+        places = {one for one in (here, turned_in(self.site, here)) if one is not None}
+        ends = sorted((leg.from_index, leg.to_index))
+        return any(
+            leg.track == one.track and one.index != leg.to_index and ends[0] <= one.index <= ends[1] for one in places
+        )
 
     def _is_at(self, here: Segment, end: Segment | None) -> bool:
         if end is None:

@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -16,15 +15,16 @@ from onboard.gateway.options import add_mqtt_arguments, broker_address, gateway_
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress
-from onboard.io.journal import FileJournal
+from onboard.io.journal import FileJournal, JournalDamagedError
 from onboard.io.mqtt import MqttBroker
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
+from onboard.io.signals import ended_by
 from onboard.kinds.registry import system_of
 from onboard.ports.broker import BrokerError
 from onboard.wire.codec import Codec, codecs
 
 EXAMPLES = """\
-exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the command line or in a file
+exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mistake in the command line or in a file
 
 examples:
   onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1
@@ -80,7 +80,7 @@ def main(argv: Sequence[str]) -> int:
     except (ConfigError, BusOpenError, GatewayError, BrokerError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard gateway: {line}", file=sys.stderr)
-        return 2
+        return 1 if isinstance(error, BusOpenError) and error.may_come else 2
     except OSError as error:
         print(f"onboard gateway: --spool {args.spool}: {error.strerror or error}", file=sys.stderr)
         return 2
@@ -102,9 +102,11 @@ def beside(args: argparse.Namespace, site: Site, machine: Machine) -> Callable[[
 
 async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bus: BusSettings, spool: Path) -> int:
     broker = MqttBroker(address)
-    journal = FileJournal(spool)
+    journal = FileJournal(spool, f"{site.name} gateway")
     try:
         reports = Reports(journal)
+        if not journal.condition.is_reliable:
+            raise JournalDamagedError(f"{journal.condition.why}; move the file away: what waits in it is lost")
         opened = await open_bus(bus)
         try:
             system = system_of(site)
@@ -125,8 +127,6 @@ async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bu
 async def _until_ended(gateway: Gateway, bus: OpenBus) -> int:
     """Until a signal ends it, or the bus is gone for good."""
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, gateway.stop)
     status = 0
 
     def on_lost(task: "asyncio.Task[str]") -> None:
@@ -140,7 +140,8 @@ async def _until_ended(gateway: Gateway, bus: OpenBus) -> int:
     lost.add_done_callback(on_lost)
     news = loop.create_task(_tell_news(gateway))
     try:
-        await gateway.run()
+        with ended_by(loop, lambda _: gateway.stop()):
+            await gateway.run()
     finally:
         lost.cancel()
         news.cancel()

@@ -8,7 +8,6 @@ without a word (MQTT's QoS 1: at least once).
 import base64
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator
-from typing import Protocol
 
 from onboard.ports.broker import Publication
 from onboard.ports.journal import Entry, Journal
@@ -21,17 +20,10 @@ MOST_KNOWN = 4_096
 SLACK_RECORDS = 2_000
 
 
-class CompactJournal(Journal, Protocol):
-    """A journal that can be written anew."""
-
-    async def compact(self, entries: Iterable[Entry]) -> None:
-        """Replace all records by ``entries``, which must mean the same."""
-
-
 class Reports:
     """The reports of one gateway. ``journal`` is replayed here; other records in it are ``others``, oldest first."""
 
-    def __init__(self, journal: CompactJournal) -> None:
+    def __init__(self, journal: Journal) -> None:
         self.given_up = 0
         #: Records of others in the journal as they were found, oldest first.
         self.others: list[Entry] = []
@@ -77,7 +69,7 @@ class Reports:
         self._records += 1
         if self._records > SLACK_RECORDS + 2 * self._kept:
             kept = list(self.entries())
-            await self._journal.compact(kept)
+            await self._journal.compact(lambda _: kept)
             self._records = self._kept = len(kept)
 
     def entries(self) -> Iterator[Entry]:

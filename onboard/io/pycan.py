@@ -2,8 +2,10 @@
 
 import asyncio
 import errno
+import fcntl
 import logging
 import socket
+import struct
 from collections import Counter
 from difflib import get_close_matches
 from typing import Any
@@ -31,6 +33,9 @@ CONNECT_TIMEOUT_S = 3.0
 # Error classes and bits of linux/can/error.h, as SocketCAN puts them into an error frame's identifier and data.
 _ERR_CRTL, _ERR_BUSOFF, _ERR_RESTARTED, _ERR_CNT = 0x004, 0x040, 0x100, 0x200
 _CRTL_PASSIVE, _CRTL_ACTIVE = 0x30, 0x40
+
+# Linux netdevice(7).
+_SIOCGIFFLAGS, _IFF_UP = 0x8913, 0x1
 
 _log = logging.getLogger("onboard.io.pycan")
 
@@ -248,14 +253,45 @@ def _open(settings: BusSettings) -> can.BusABC:
         if settings.interface == "socketcand" and {"host", "port"} <= keywords.keys():
             # python-can would try again in a busy loop for ten seconds, with a warning each time.
             socket.create_connection((str(keywords["host"]), int(keywords["port"])), CONNECT_TIMEOUT_S).close()
-        return can.Bus(interface=settings.interface, channel=settings.channel, ignore_config=True, **keywords)
+        bus = can.Bus(interface=settings.interface, channel=settings.channel, ignore_config=True, **keywords)
     except Exception as error:  # a driver may raise anything; it becomes one line for a person
         where = f'interface "{settings.interface}", channel "{settings.channel}"'
-        raise BusOpenError(f"{where}: {_first_line(error)}; {_remedy(settings, error)}") from error
+        text = f"{where}: {_first_line(error)}; {_remedy(settings, error)}"
+        raise BusOpenError(text, may_come=_may_come(error)) from error
+    if settings.interface == "socketcan" and not _is_up(settings.channel):
+        bus.shutdown()
+        text = f'interface "socketcan", channel "{settings.channel}": it is down; `ip link set {settings.channel} up`'
+        raise BusOpenError(text, may_come=True)
+    return bus
+
+
+def _is_up(channel: str) -> bool:
+    """Whether an interface of this network namespace is switched on (netdevice(7), SIOCGIFFLAGS).
+
+    A controller on one that is down would take the silence for an empty site. ``can.Bus`` has opened it, so it was
+    there; what cannot be asked is not in the way.
+    """
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as asking:
+        try:
+            answer = fcntl.ioctl(asking, _SIOCGIFFLAGS, struct.pack("16sH14x", channel.encode(), 0))
+        except OSError:
+            return True
+    return bool(struct.unpack("16sH14x", answer)[1] & _IFF_UP)
+
+
+def _errno_of(error: Exception) -> int | None:
+    return getattr(error, "errno", None) or getattr(error, "error_code", None)
+
+
+def _may_come(error: Exception) -> bool:
+    """Whether time alone may heal it: no adapter yet, no server yet. A missing driver and a wrong word it does not."""
+    if isinstance(error, ImportError | TypeError | ValueError) or "import" in str(error):
+        return False
+    return _errno_of(error) not in (errno.EAFNOSUPPORT, errno.EPROTONOSUPPORT, errno.EACCES, errno.EPERM)
 
 
 def _remedy(settings: BusSettings, error: Exception) -> str:
-    number = getattr(error, "errno", None) or getattr(error, "error_code", None)
+    number = _errno_of(error)
     if isinstance(error, ImportError) or "import" in str(error):
         return "install the driver's Python package"
     if isinstance(error, TypeError):

@@ -5,7 +5,14 @@ from typing import Any, Protocol, Self
 
 
 class BusOpenError(Exception):
-    """A bus that could not be opened. ``str`` is one line for a person: which bus, what is wrong, what to do."""
+    """A bus that could not be opened. ``str`` is one line for a person: which bus, what is wrong, what to do.
+
+    ``may_come`` tells what time alone may heal, such as an adapter that is not plugged in yet, from a mistake.
+    """
+
+    def __init__(self, text: str, *, may_come: bool = False) -> None:
+        super().__init__(text)
+        self.may_come = may_come
 
 
 class Interface(Protocol):

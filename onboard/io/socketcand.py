@@ -49,7 +49,8 @@ class SocketcandBus:
         except (OSError, TimeoutError) as error:
             why = "no answer" if isinstance(error, TimeoutError) else error.strerror or str(error)
             raise BusOpenError(
-                f"{self.name}: {why}; is the server running, on this host and port, and does it have this channel?"
+                f"{self.name}: {why}; is the server running, on this host and port, and does it have this channel?",
+                may_come=True,
             ) from error
 
     def subscribe(self, on_frame: FrameHandler, on_sent: FrameHandler | None = None) -> None:

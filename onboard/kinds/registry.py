@@ -3,37 +3,45 @@
 docs/new-kind.md shows how.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
 
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
+from onboard.core.compaction import Entry, Rules, compact
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.kinds.car_park.compartment import CompartmentFactory
 from onboard.kinds.car_park.lift import LiftFactory
+from onboard.kinds.car_park.records import RECORDS as CAR_PARK_RECORDS
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.car_park.site import CarPark
 from onboard.kinds.cell.desk import DeskFactory as GoalDeskFactory
 from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
+from onboard.kinds.cell.records import RECORDS as CELL_RECORDS
 from onboard.kinds.cell.robot import ArmFactory
 from onboard.kinds.cell.site import Cell
 from onboard.kinds.graph.agents import HostFactory
 from onboard.kinds.graph.desk import DeskFactory as VisitDeskFactory
 from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
+from onboard.kinds.graph.records import RECORDS as GRAPH_RECORDS
 from onboard.kinds.graph.robot import RobotFactory as GraphRobotFactory
 from onboard.kinds.graph.site import FactoryGraph
 from onboard.kinds.mapd.factories import OrderDeskFactory as CallDeskFactory
 from onboard.kinds.mapd.factories import UnitRobotFactory
 from onboard.kinds.mapd.messages import MESSAGES as MAPD_MESSAGES
+from onboard.kinds.mapd.records import RECORDS as MAPD_RECORDS
 from onboard.kinds.mapd.site import Mapd
 from onboard.kinds.terminal.desk import DeskFactory as MissionDeskFactory
 from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
+from onboard.kinds.terminal.records import RECORDS as TERMINAL_RECORDS
 from onboard.kinds.terminal.site import Terminal
 from onboard.kinds.terminal.vehicle import VehicleFactory
 from onboard.kinds.turning.desk import DeskFactory as OrderDeskFactory
 from onboard.kinds.turning.machine import LatheFactory
 from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
+from onboard.kinds.turning.records import RECORDS as TURNING_RECORDS
 from onboard.kinds.turning.site import Turning
 
 
@@ -44,6 +52,8 @@ class System:
     name: str
     factories: Mapping[KindCode, BehaviourFactory]
     messages: tuple[type[Message], ...] = ()
+    #: What of its journal records outlives compaction, beside the core's own; what is not named is kept for good.
+    records: Rules = field(default_factory=dict)
 
 
 _SYSTEMS: dict[str, System] = {
@@ -52,6 +62,7 @@ _SYSTEMS: dict[str, System] = {
         System(
             CarPark.system,
             {KindCode.ROBOT: RobotFactory(), KindCode.COMPARTMENT: CompartmentFactory(), KindCode.LIFT: LiftFactory()},
+            records=CAR_PARK_RECORDS,
         ),
         System(
             FactoryGraph.system,
@@ -61,19 +72,29 @@ _SYSTEMS: dict[str, System] = {
                 KindCode.DESK: VisitDeskFactory(),
             },
             GRAPH_MESSAGES,
+            GRAPH_RECORDS,
         ),
         System(
             Terminal.system,
             {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: MissionDeskFactory()},
             TERMINAL_MESSAGES,
+            TERMINAL_RECORDS,
         ),
-        System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: GoalDeskFactory()}, CELL_MESSAGES),
+        System(
+            Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: GoalDeskFactory()}, CELL_MESSAGES, CELL_RECORDS
+        ),
         System(
             Turning.system,
             {KindCode.LATHE: LatheFactory(), KindCode.DESK: OrderDeskFactory()},
             TURNING_MESSAGES,
+            TURNING_RECORDS,
         ),
-        System(Mapd.system, {KindCode.VEHICLE: UnitRobotFactory(), KindCode.DESK: CallDeskFactory()}, MAPD_MESSAGES),
+        System(
+            Mapd.system,
+            {KindCode.VEHICLE: UnitRobotFactory(), KindCode.DESK: CallDeskFactory()},
+            MAPD_MESSAGES,
+            MAPD_RECORDS,
+        ),
     )
 }
 
@@ -98,3 +119,8 @@ def system_of(site: Site) -> System:
 def factory_for(site: Site, kind: KindCode) -> BehaviourFactory:
     """The factory of one kind of machine. Raises ``KeyError`` for a kind that this image cannot drive there."""
     return system_of(site).factories[kind]
+
+
+def compaction_for(site: Site) -> Callable[[list[Entry]], list[Entry]]:
+    """What a journal of this site may leave out: entries in, those that still mean something out."""
+    return partial(compact, system_of(site).records)

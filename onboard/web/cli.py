@@ -2,7 +2,6 @@
 
 import argparse
 import asyncio
-import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.io.signals import ended_by
 from onboard.kinds.registry import system_of
 from onboard.trace.readers.open_log import Log, LogOpenError
 from onboard.web.address import DEFAULT_PORT, WebError
@@ -21,7 +21,7 @@ from onboard.web.serve import WebServer
 from onboard.wire.codec import Codecs, codecs
 
 EXAMPLES = """\
-exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the command line or in a file
+exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mistake in the command line or in a file
 
 examples:
   onboard web -i socketcan -c can0 -b 500000 --site mysite.toml     a real bus: listened to, never spoken on
@@ -71,7 +71,7 @@ def main(argv: Sequence[str]) -> int:
     except (ConfigError, BusOpenError, LogOpenError, WebError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard web: {line}", file=sys.stderr)
-        return 2
+        return 1 if isinstance(error, BusOpenError) and error.may_come else 2
 
 
 def _read(film: Film, name: str) -> None:
@@ -109,9 +109,6 @@ async def _show_bus(site: Site, codec: Codecs, settings: BusSettings, where: str
 async def _serve(source: Source, where: str, lost: asyncio.Task[str] | None) -> int:
     """Until a signal ends it, or the bus is gone."""
     server = WebServer(source, where)
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, server.stop)
     status = 0
 
     def on_lost(task: asyncio.Task[str]) -> None:
@@ -124,5 +121,6 @@ async def _serve(source: Source, where: str, lost: asyncio.Task[str] | None) -> 
     if lost is not None:
         lost.add_done_callback(on_lost)
     print(f"picture at {server.address}", flush=True)
-    await server.run()
+    with ended_by(asyncio.get_running_loop(), lambda _: server.stop()):
+        await server.run()
     return status

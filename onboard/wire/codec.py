@@ -18,6 +18,7 @@ from onboard.core.frame import Frame
 from onboard.core.messages import Leg, Message, Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts
+from onboard.wire.speakers import speakers_of
 
 _NODE_MASK = 0xFF
 #: What a call says where no car is meant (dbc/fleet.dbc); no site takes cars so short.
@@ -190,6 +191,8 @@ class Codec:
         self._single = {
             layout.name: (layout, _getter(single[layout.name], layout)) for layout in compiled if layout.name in single
         }
+        #: Which kinds of machine may say what on the bus, by the DBC.
+        self.speakers = speakers_of(layouts, single)
         self._part = lru_cache(maxsize=_MEMORY)(self._decode)
 
     # --- out ---------------------------------------------------------------------------------------------------

@@ -9,23 +9,14 @@ from collections.abc import Iterable, Iterator
 from onboard.core.codes import MAX_NODE_ID, KindCode
 from onboard.core.site import Machine, Site
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts, system_layouts
+from onboard.wire.speakers import GATEWAY, is_in
 
-#: The node of the fleet contract that each kind of machine is.
-_ROLES: dict[KindCode, str] = {
-    KindCode.ROBOT: "Robot",
-    KindCode.LIFT: "Lift",
-    KindCode.COMPARTMENT: "Compartment",
-}
-#: What machines of all other kinds are there; in the contract of their system they go by their kind's name.
-_MACHINE = "Machine"
 #: Device messages by the roles of both ends: a robot's controller sends nothing to doors.
 _ENDS: dict[KindCode, frozenset[str]] = {
     KindCode.ROBOT: frozenset({"Controller", "Drive", "Shuttle"}),
     KindCode.LIFT: frozenset({"Controller", "Drive", "Platform"}),
     KindCode.COMPARTMENT: frozenset({"Controller", "Doors", "Desk", "Bay"}),
 }
-#: The node of the fleet contract that stands for people's tools and bridges to other buses.
-_GATEWAY = "Gateway"
 #: Node-IDs kept for gateways; a site file does not name them.
 _GATEWAY_IDS = range(MAX_NODE_ID + 1, 256)
 _EXTENDED = 1 << 31
@@ -33,17 +24,11 @@ _EXTENDED = 1 << 31
 _NO_NODE = "Vector__XXX"
 
 
-def _is_in(kind: KindCode, nodes: Iterable[str]) -> bool:
-    """Whether a kind of machine is among a contract's nodes."""
-    roles = {_ROLES[kind]} if kind in _ROLES else {_MACHINE, kind.name.capitalize()}
-    return not roles.isdisjoint(nodes)
-
-
 def _sent_by(system: str, machine: Machine, machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
     """What a machine, or its devices, say, and the names of those who listen."""
     for layout in fleet_layouts(system):
-        if _is_in(machine.kind, layout.senders):
-            others = [one.name for one in machines if one != machine and _is_in(one.kind, layout.receivers)]
+        if is_in(machine.kind, layout.senders):
+            others = [one.name for one in machines if one != machine and is_in(one.kind, layout.receivers)]
             yield layout, ",".join(others) or _NO_NODE
     if machine.kind not in _ENDS:
         # A system's own contract does not say which of its kinds has which devices.
@@ -59,7 +44,7 @@ def _gateways(taken: Iterable[str]) -> dict[int, str]:
     names = set(taken)
     named = {}
     for node_id in _GATEWAY_IDS:
-        name = f"{_GATEWAY}{node_id}"
+        name = f"{GATEWAY}{node_id}"
         while name in names:
             name = f"x{name}"
         named[node_id] = name
@@ -69,8 +54,8 @@ def _gateways(taken: Iterable[str]) -> dict[int, str]:
 def _sent_by_gateway(system: str, machines: Iterable[Machine]) -> Iterator[tuple[MessageLayout, str]]:
     """What a gateway says, an operator's orders foremost, and the names of the machines that listen."""
     for layout in fleet_layouts(system):
-        if _GATEWAY in layout.senders:
-            hearing = [one.name for one in machines if _is_in(one.kind, layout.receivers)]
+        if GATEWAY in layout.senders:
+            hearing = [one.name for one in machines if is_in(one.kind, layout.receivers)]
             yield layout, ",".join(hearing) or _NO_NODE
 
 

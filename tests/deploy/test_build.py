@@ -22,6 +22,7 @@ from onboard.config.machine import load_machine
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import EmergencyStop, Heartbeat, Message
+from onboard.io.endings import Ending
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 from tests.tools import require_tool, run_tool
@@ -98,7 +99,7 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
     async with asyncio.timeout(DEADLINE_S):
         message, status, said = await scenario()
     assert isinstance(message, Heartbeat) and message.sender == 11
-    assert status == 1 and "emergency stop from node 251" in said
+    assert status == Ending.WAITS_FOR_PERSON and "emergency stop from node 251" in said
 
 
 def test_the_same_sources_give_the_same_bytes(archive: Path, tmp_path: Path) -> None:
@@ -134,8 +135,12 @@ def test_the_package_is_one_that_dpkg_unpacks_and_its_service_is_in_order(archiv
     assert (root / "usr/lib/onboard/onboard.pyz").read_bytes() == archive.read_bytes()
     assert (root / "usr/bin/onboard").stat().st_mode & 0o777 == 0o755
     service = (root / "usr/lib/systemd/system/onboard.service").read_text()
-    # After an emergency stop the program ends with status 1, and only a person may start it again.
-    assert "Restart=on-abnormal" in service and "WatchdogSec=" in service and "Type=notify" in service
+    for line in ("Restart=on-failure", "WatchdogSec=10", "Type=notify", "StartLimitIntervalSec=0"):
+        assert line in service.splitlines()
+    # The statuses of the program that a person must judge.
+    stays = f"RestartPreventExitStatus={Ending.MISTAKE:d} {Ending.WAITS_FOR_PERSON:d}"
+    assert stays in service.splitlines()
+    assert "/var/lib/onboard/journal.ended" in service
 
 
 def test_every_machine_of_a_site_gets_its_files(tmp_path: Path) -> None:

@@ -6,9 +6,11 @@ import pytest
 
 from bus_sim.plant.customer import Outcome, State
 from bus_sim.run import Simulation
-from onboard.core.codes import DeskInput, DoorName, DoorPosition
+from onboard.core.codes import DeskInput, DoorName, DoorPosition, Reason
 from onboard.core.frame import Frame
+from onboard.core.journal_state import JournalState
 from onboard.core.messages import DeskEvent, DriveOrder, DriveState, Heartbeat
+from onboard.core.recovery_messages import Halted
 from onboard.ports.bus import ErrorState
 from tests.faults.world import Seen, watch
 
@@ -136,16 +138,39 @@ def test_a_crash_at_a_journal_write_strikes_before_or_after_it_is_durable(durabl
 
 
 @pytest.mark.parametrize(
-    ("journal", "left"), [("lost", lambda n: 0), ("torn", lambda n: n - 1), ("rolled_back,entries=2", lambda n: n - 2)]
+    ("journal", "state", "lost"),
+    [
+        ("kept", JournalState.INTACT, 0),
+        ("torn", JournalState.MENDED, 0),
+        ("cut,entries=3", JournalState.MENDED, 0),
+        ("flipped,entries=4", JournalState.MENDED, 0),
+        ("unsealed", JournalState.SHORT, 0),
+        ("foreign", JournalState.FOREIGN, 1_000),
+        ("rolled_back,entries=2", JournalState.INTACT, 2),
+        ("lost", JournalState.NEW, 1_000),
+    ],
 )
-def test_a_journal_can_suffer_in_a_crash(journal: str, left: object) -> None:
+def test_a_journal_can_suffer_in_a_crash(journal: str, state: JournalState, lost: int) -> None:
     def entries(simulation: Simulation) -> int:
         return len(simulation.journals[ROBOT].entries)
 
     seen = watch(f"crash:target=MR1,at_s=59,restart=no,journal={journal}", seconds=60, look=(58.9, entries))
-    assert callable(left)
-    assert int(str(seen.looks[0])) > 2
-    assert entries(seen.simulation) == left(seen.looks[0])
+    before = int(str(seen.looks[0]))
+    assert before > 4
+    found = seen.simulation.journals[ROBOT]
+    assert len(found.replay()) == max(0, before - lost)
+    assert found.condition.state is state
+
+
+@pytest.mark.parametrize(
+    ("journal", "reason"), [("unsealed", Reason.JOURNAL_SHORT), ("foreign", Reason.JOURNAL_FOREIGN)]
+)
+def test_a_machine_whose_journal_is_not_reliable_says_so_and_holds(journal: str, reason: Reason) -> None:
+    seen = watch(f"crash:target=MR1,at_s=59,restart_s=1,journal={journal}", seconds=80)
+    said = [message for time, message in seen.fleet if message.sender == ROBOT and time > 60_000_000]
+    assert {type(one) for one in said} == {Halted}
+    assert isinstance(said[0], Halted) and (said[0].machine, said[0].reason) == (ROBOT, reason)
+    assert "regenerate its rights" in str(seen.simulation.controllers[ROBOT].holon.halted)
 
 
 def test_a_paused_controller_says_nothing_and_then_goes_on() -> None:

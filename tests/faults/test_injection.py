@@ -48,6 +48,8 @@ def test_every_kind_of_the_table_does_something() -> None:
         "car": 1,
         "track": 1,
         "index": 3,
+        "name": "stop",
+        "do": "stop",
     }
     for name, kind in KINDS.items():
         given = {key: values[key] for key, setting in kind.settings.items() if setting.default is None}

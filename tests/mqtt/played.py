@@ -9,11 +9,12 @@ from pathlib import Path
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
+from onboard.core.journal_state import INTACT
 from onboard.gateway.gateway import Gateway
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewaySettings
 from onboard.kinds.registry import system_of
-from onboard.ports.journal import Entry
+from onboard.ports.journal import Compaction, Entry
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import codecs
 from tests.mqtt.double import DoubleBroker
@@ -28,6 +29,8 @@ class MemoryJournal:
 
     def __init__(self) -> None:
         self.kept: list[Entry] = []
+        self.condition = INTACT
+        self.has_grown = False
         self.is_full = False
 
     def replay(self) -> list[Entry]:
@@ -38,7 +41,10 @@ class MemoryJournal:
             raise OSError(28, "No space left on device")
         self.kept.append(entry)
 
-    async def compact(self, entries: Iterable[Entry]) -> None:
+    async def compact(self, fewer: Compaction) -> None:
+        self.kept = fewer(self.kept)
+
+    async def renew(self, entries: Iterable[Entry]) -> None:
         self.kept = list(entries)
 
     async def close(self) -> None:

@@ -104,7 +104,7 @@ async def test_reports_are_delivered_once_in_effect_whatever_happens_to_the_brok
     near = MqttBroker(BrokerAddress("127.0.0.1", await wire.open()), keepalive_s=5, timeout_s=0.5)
     async with mosquitto.broker().session("reader", None, (REPORT,)):
         pass
-    journal = FileJournal(tmp_path / "spool")
+    journal = FileJournal(tmp_path / "spool", "small gateway")
     reports = Reports(journal)
     settings = GatewaySettings(epoch_us=EPOCH_US)
     gateway = Gateway(find_site("small"), fleet_codec(), near, settings, reports=reports)

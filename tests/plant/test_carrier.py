@@ -125,7 +125,7 @@ def test_p32_the_carrier_does_not_move_while_the_shuttle_is_out() -> None:
     assert bench.links[ROBOT].last(DriveState).mode is DriveMode.STANDING
     bench.drive(0, 2)
     assert bench.position_mm() == 0
-    assert bench.rules == []
+    assert bench.rules == ["ORDER_TO_TEAR"], "the order was given all the same"
 
 
 def test_p32_the_shuttle_does_not_leave_a_moving_carrier() -> None:

@@ -39,6 +39,18 @@ def test_p32_moving_with_the_shuttle_out() -> None:
     assert bench.rules == ["SHUTTLE_HOME_TO_MOVE"]
 
 
+def test_p32_an_order_that_would_tear_counts_though_the_drive_refuses_it() -> None:
+    bench = Bench()
+    reach(bench, Side.FAR)
+    bench.timers.run_for(20 * SECOND)
+    where_mm = round(bench.position_mm())
+    bench.drive(where_mm, sequence=1, for_us=SECOND)
+    assert bench.rules == [], "to where it stands it may be ordered"
+    bench.drive(where_mm - 2_400, sequence=2, for_us=SECOND)
+    assert bench.position_mm() == where_mm
+    assert bench.rules == ["ORDER_TO_TEAR"]
+
+
 def test_two_bodies_meeting_between_two_events_are_found() -> None:
     bench = Bench(one_floor(2))
     # The lower one dashes at the upper one and is back before anybody looks.

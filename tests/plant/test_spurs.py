@@ -106,7 +106,7 @@ def test_a_carrier_does_not_turn_with_its_shuttle_out() -> None:
     bench.shuttle(ShuttleAction.REACH, 1, Side.NEAR)
     order(bench, 0, 1, across=True)
     assert bench.world.robots[ROBOT].track == 1
-    assert bench.rules == []
+    assert bench.rules == ["ORDER_TO_TEAR"], "the order was given all the same"
 
 
 # --- without the interlocks: moved by hand in the world -------------------------------------------------------------

@@ -14,6 +14,7 @@ from pathlib import Path
 CORE_TYPES = (
     "onboard.core.codes",
     "onboard.core.frame",
+    "onboard.core.journal_state",
     "onboard.core.messages",
     "onboard.core.recovery_messages",
     "onboard.core.serial",
@@ -72,7 +73,7 @@ class Layer:
     pure: bool = False
 
 
-#: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli.py`` and ``__main__.py``.
+#: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
     "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
     "onboard.kinds": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
@@ -114,18 +115,37 @@ LAYERS: dict[str, Layer] = {
             "onboard.wire",
         )
     ),
+    # What a person says is decided from the decoded bus alone; the gateway's words for a held machine are its words.
+    "onboard.operate": Layer(
+        (
+            *CORE_TYPES,
+            *SYSTEM_TYPES,
+            "onboard.config.problems",
+            *("onboard.core.authority", "onboard.core.lifts"),
+            "onboard.gateway.pauses",
+            "onboard.gateway.whereabouts",
+            "onboard.ports",
+            "onboard.wire",
+        ),
+        not_stdlib=frozenset({"random", "socket", "threading", "time"}),
+    ),
+    # Its command line is a composition root: it opens the bus and the site file.
+    "onboard.operate.cli": Layer(
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.operate", "onboard.wire")
+    ),
     "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.gateway", "onboard.io")),
     "onboard": Layer(
         (
             *ALL_OF_ONBOARD,
-            *("onboard.cli", "onboard.trace.cli", "onboard.web.address", "onboard.web.cli"),
+            *("onboard.cli", "onboard.life", "onboard.operate.cli", "onboard.trace.cli"),
+            *("onboard.web.address", "onboard.web.cli"),
             *(f"onboard.gateway.{name}" for name in ("cli", "gateway", "options", "settings")),
         ),
         not_stdlib=frozenset({"random", "threading", "time"}),
     ),
     "dbc": Layer(not_stdlib=CLOCK_AND_CHANCE | {"asyncio"}),
     "bus_sim": Layer(
-        ("onboard", "onboard.gateway", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
+        ("onboard", "onboard.gateway", "onboard.operate", "onboard.trace", "onboard.web", *ALL_OF_ONBOARD, "dbc"),
         ("distributed", "numpy", "ortools", "rich", "yaml"),
         not_stdlib=frozenset({"threading"}),
     ),
@@ -133,7 +153,7 @@ LAYERS: dict[str, Layer] = {
     "deploy": Layer(
         (
             *("onboard", "onboard.config", *CORE_TYPES, "onboard.io.journal", "onboard.wire"),
-            *("hil.guest.initrd", "hil.guest.kernel"),
+            *("hil.guest.effort", "hil.guest.initrd", "hil.guest.kernel"),
         ),
         ("pytest",),
     ),
@@ -189,7 +209,7 @@ def layer_of(module: str) -> str:
     """The layer that a module belongs to. Raises ``KeyError`` for a package that has no line in the table."""
     parts = module.split(".")
     if parts[0] == "onboard" and len(parts) > 1 and ".".join(parts[:2]) not in LAYERS:
-        if len(parts) > 2 or parts[1] not in ("cli", "__main__"):
+        if len(parts) > 2 or parts[1] not in ("cli", "life", "__main__"):
             raise KeyError(f"{module}: no layer; add a line to the table and to docs/decisions.md")
         return "onboard"
     for length in range(len(parts), 0, -1):

@@ -15,13 +15,13 @@ from onboard.trace.candump_reader import CandumpReader
 from tests.qemu.guest import ROOT, once, require_guest
 
 PLAYED = "moves under authority"
-LIMIT_S = 400.0
+LIMIT_S = 800.0
 
 
 def play(share: Path) -> GuestRun:
     settings = f"export PYTHONPATH={ROOT} PYTHONDONTWRITEBYTECODE=1 COLUMNS=200"
     words = f"{sys.executable} -m hil.guest.bench /run/share -k {PLAYED.rsplit(maxsplit=1)[-1]}"
-    return run_guest(f"{settings}\nexec {words}\n", share, timeout_s=LIMIT_S)
+    return run_guest(f"{settings}\nexec {words}\n", share, limit_s=LIMIT_S)
 
 
 @pytest.fixture(scope="module")

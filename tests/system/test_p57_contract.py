@@ -86,6 +86,16 @@ def test_p57_the_run_used_most_of_the_contract(run: Heard) -> None:
         "TokenRefusal",
         "ManualOrder",
         "ManualState",
+        "Go",
+        "Halted",
+        "LeftOut",
+        "Regeneration",
+        "RegenerationState",
+        "SyncDone",
+        "TokenAssigned",
+        "TokenDispute",
+        "TokenGiven",
+        "TokenSeen",
     }
 
 

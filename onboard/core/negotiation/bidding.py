@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from onboard.core.codes import Criterion
-from onboard.core.serial import BUS_MS_MODULUS
+from onboard.core.serial import ms_after
 from onboard.core.site import Site, Timing
 
 #: How long a bidder waits: from its cost, the call's floor, the criterion and the site's times, in us.
@@ -20,13 +20,11 @@ _READING_US = 500
 #: A finishing time may be this much before the floor, ms: floors are worked out when a call is heard. Ours.
 FLOOR_SLACK_MS = 500
 
-_HALF = BUS_MS_MODULUS >> 1
-
 
 def cost_difference(cost: int, other: int, criterion: Criterion) -> int:
     """``cost - other`` in the criterion's unit; finishing times wrap (RFC 1982), money and length do not."""
     if criterion is Criterion.FINISH_TIME:
-        return (cost - other + _HALF) % BUS_MS_MODULUS - _HALF
+        return ms_after(cost, other)
     return cost - other
 
 

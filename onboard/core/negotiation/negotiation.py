@@ -14,7 +14,7 @@ from onboard.core.negotiation.initiator import State as InitiatorState
 from onboard.core.negotiation.participant import Participant
 from onboard.core.negotiation.sub_calls import SubCalls
 from onboard.core.negotiation.trust import Trust
-from onboard.core.serial import from_bus_ms, successor
+from onboard.core.serial import from_bus_ms, is_newer, successor
 from onboard.core.site import Timing
 
 #: A participation that is over, or in which this machine never bid, is forgotten this long after its deadline: frames
@@ -22,6 +22,8 @@ from onboard.core.site import Timing
 FORGET_US = 60_000_000
 #: Most participations remembered at once. A fleet has tens of calls open, not hundreds.
 MAX_CALLS = 256
+#: No call is open for more of the site's call windows than this: one that ends later was told by a wrong clock. Ours.
+MAX_WINDOWS = 60
 
 Outcome = list[Effect | NegotiationEvent]
 
@@ -166,11 +168,11 @@ class Negotiation:
         if known is not None and known.call == call:
             return []
         deadline_us = from_bus_ms(call.deadline_ms, now_us)
-        if now_us >= last_bid_us(deadline_us, self.timing):
+        if now_us >= last_bid_us(deadline_us, self.timing) or deadline_us > now_us + self._longest_us:
             self.counters.calls_too_late += 1
             return []
         older = [one for one in self.participants.values() if one.key == key or _is_for_same_task(one.call, call)]
-        if any(one.deadline_us > deadline_us and not one.is_over for one in older):
+        if any(one.deadline_us > deadline_us and not one.is_over and not _is_behind(one.call, call) for one in older):
             self.counters.calls_stale += 1
             return []
         outcome: Outcome = []
@@ -212,6 +214,10 @@ class Negotiation:
             self.trust.done(report.task, report.sender, now_us)
         elif report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED) and is_winners:
             self.trust.forfeited(report.task, now_us)
+
+    @property
+    def _longest_us(self) -> int:
+        return MAX_WINDOWS * self.timing.call_window_us
 
     def _spread(self, outcome: Outcome, now_us: int) -> Outcome:
         """Tell all other participations of a bid or an award: their searches knew nothing of it."""
@@ -276,6 +282,11 @@ class Negotiation:
     def _next_call(self) -> int:
         self._last_call = successor(self._last_call, 16)
         return self._last_call
+
+
+def _is_behind(one: CallForProposals, other: CallForProposals) -> bool:
+    """Whether ``other`` was opened after ``one`` by its number: a deadline tells less where a clock was set anew."""
+    return one.sender == other.sender and is_newer(other.call, one.call, 16)
 
 
 def _is_for_same_task(one: CallForProposals, other: CallForProposals) -> bool:

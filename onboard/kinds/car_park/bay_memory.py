@@ -28,7 +28,7 @@ def car_record(statement: CarAt) -> Record:
 
 def cars_at(node_id: int, entries: Iterable[Entry]) -> dict[Reference, CarAt]:
     """What node ``node_id`` has last journalled of each car, as it told it."""
-    return BayMemory(node_id).read(entry for entry in entries if entry.get("record") == "car_at").cars
+    return BayMemory(node_id).read(entry for entry in entries if entry.get("record") in ("car_at", "car_left")).cars
 
 
 def winner_record(car: Reference, winner: int, task: Reference, version: int) -> Record:
@@ -62,7 +62,7 @@ def next_reference(last: int, fleet: Fleet) -> Reference:
     """
     for _ in range(1 << 16):
         last = successor(last, 16)
-        if car_token(fleet.node_id, last) not in fleet.tokens.seen:
+        if not fleet.tokens.is_known(car_token(fleet.node_id, last)):
             break
     return Reference(fleet.node_id, last)
 
@@ -97,6 +97,8 @@ class BayMemory:
                 self.winners.pop(_car(entry), None)
             case "winner":
                 self._take_winner(entry)
+            case "car_left":
+                self._forget(_car(entry))
             case "ticket":
                 queue_ticket(self.tickets, _car(entry), urgent="urgent" in entry)
             case "job":
@@ -109,6 +111,13 @@ class BayMemory:
                 self.job = None
             case "token_given" if self.bay == (int(entry["kind"]), int(entry["number"])):
                 self.was_granted = True
+
+    def _forget(self, car: Reference) -> None:
+        """It left long ago."""
+        for table in (self.cars, self.winners, self.tasks):
+            table.pop(car, None)
+        if car in self.tickets:
+            self.tickets.remove(car)
 
     def _take_winner(self, entry: Entry) -> None:
         car, winner = _car(entry), int(entry["winner"])

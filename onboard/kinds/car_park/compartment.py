@@ -47,13 +47,7 @@ from onboard.core.serial import successor
 from onboard.core.site import Machine, Site, Station
 from onboard.kinds.car_park import bay_task, custody
 from onboard.kinds.car_park.bay_generation import BayGeneration
-from onboard.kinds.car_park.bay_memory import (
-    BayMemory,
-    job_over_record,
-    job_record,
-    next_reference,
-    ticket_record,
-)
+from onboard.kinds.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
 from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.outputs import BayOutputs
@@ -251,7 +245,7 @@ class Compartment:
             if requester != self.job.winner:
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
-            if self.phase is not BayPhase.SERVING:
+            if self.phase is not BayPhase.SERVING or not self._is_open_to_machines():
                 return Reason.DOOR_NOT_READY
             self.job.was_granted |= key.kind is TokenKind.STATION
             return Reason.NONE
@@ -272,18 +266,13 @@ class Compartment:
         job = self.job
         if job is not None and job.winner and effects and self.stewardship.is_given_back(job.car):
             effects += self._call_again(job, now_us)
-        elif job is not None and not job.winner and self._is_mine(job.car) and self._is_unheard(job, now_us):
+        elif job is not None and not job.winner and self._is_unheard(job, now_us):
             # Nobody has a right by the award that was not heard: its car is mine, and goes to the winner only.
             effects += self._call_again(job, now_us)
         return effects
 
     def _is_unheard(self, job: BayTask, now_us: int) -> bool:
-        return self.fleet.negotiation.unheard(job.task, now_us) != NOBODY
-
-    def _is_mine(self, car: Reference) -> bool:
-        record = self.fleet.mirror.cars.get(car)
-        is_mine = record is not None and record.custodian == self.fleet.node_id
-        return is_mine and self.fleet.tokens.holds(car_token(*car))
+        return custody.is_mine(self.fleet, job.car) and self.fleet.negotiation.unheard(job.task, now_us) != NOBODY
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""
@@ -494,6 +483,10 @@ class Compartment:
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None
         return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
+
+    def _is_open_to_machines(self) -> bool:
+        """Whether a shuttle can come in and a person cannot, by what the doors say now."""
+        return self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
 
     def _go(self, phase: BayPhase) -> None:
         self.phase = phase

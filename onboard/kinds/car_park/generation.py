@@ -101,7 +101,9 @@ class CarParkGeneration:
         """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
         if call.criterion is not Criterion.FINISH_TIME or call.operation not in (Operation.PARK, Operation.RETRIEVE):
             return None
-        if self.is_held or self.program.standing is None or len(self.program.remaining) + 4 > MAX_STEPS:
+        if self.program.standing is None or self.program.unplanned:
+            return None
+        if self.is_held or len(self.program.remaining) + 4 > MAX_STEPS:
             return None
         limits = car_park(self.site).cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
@@ -348,6 +350,10 @@ class CarParkGeneration:
         """Stations that the bidder may choose: free places nobody is on the way to, or the one that the call names."""
         if ANY_STATION not in (call.from_station, call.to_station):
             return self._all_candidates(call)
+        return self.free_places(now_us)
+
+    def free_places(self, now_us: int) -> list[Station]:
+        """Places at which no car stands and that nobody has promised, in the site's order."""
         promised = self._promised(now_us)
         return [place for place in self.mirror.free_places() if place.number not in promised]
 

@@ -13,14 +13,15 @@ from onboard.core.behaviour import Fleet
 from onboard.core.codes import Grade, LegAction, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.lifts import gate, lift_at
-from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
+from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
 from onboard.core.occupancy import itinerary_windows
 from onboard.core.site import Segment
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import Phase, ShuttleWork
+from onboard.kinds.car_park.places import Places
 from onboard.kinds.car_park.program import Handling, Program, Step, Work, to_itinerary
-from onboard.kinds.car_park.recovery import forfeited_record
+from onboard.kinds.car_park.recovery import forfeited_record, sink_record
 from onboard.kinds.car_park.travel import Carriage
 
 #: A plan that finds no way is tried again after this, us. Ours.
@@ -29,6 +30,8 @@ RETRY_US = 3_000_000
 LOOK_US = 500_000
 #: Tasks are kept so long without a way, us: a machine that is only restarted is back by then. Ours.
 KEEP_US = 12_000_000
+#: Other places that are tried for a car at one moment: each is a search. Ours.
+MOST_PLACES = 4
 #: FORFEITED is said again so often and so many times, until the task is called or awarded anew. Ours.
 SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
 
@@ -51,6 +54,13 @@ class GoingAround:
     _admissions: int = 0
     _since_us: int | None = None
     _retry_at_us: int | None = None
+    #: Plans and cars heard, what was known when places were last looked at, and when to look again.
+    _heard: int = 0
+    _places_seen: tuple[int, int] = (-1, -1)
+    _place_at_us: int | None = None
+
+    def __post_init__(self) -> None:
+        self.places = Places(self.fleet, self.generation, self.shuttle)
 
     @property
     def program(self) -> Program:
@@ -59,7 +69,7 @@ class GoingAround:
 
     def next_wake(self) -> int | None:
         """When to try again, or to say again what was given back."""
-        times = [self.next_word(), self._retry_at_us]
+        times = [self.next_word(), self._retry_at_us, self._place_at_us]
         return min((time for time in times if time is not None), default=None)
 
     def next_word(self) -> int | None:
@@ -80,7 +90,7 @@ class GoingAround:
                 self._retry_at_us = now_us
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             effects += self._try(now_us)
-        return effects
+        return effects + self._leave_elsewhere(now_us)
 
     def watch_drive(self, now_us: int) -> list[Effect]:
         """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks.
@@ -106,7 +116,8 @@ class GoingAround:
         self._retry_at_us = now_us + RETRY_US
 
     def hear(self, message: Message) -> None:
-        """What was given back is called or awarded anew: enough was said of it."""
+        """What was given back is called or awarded anew: enough was said of it. A place may have been taken."""
+        self._heard += isinstance(message, Itinerary | CarAt)
         if isinstance(message, CallForProposals) and message.task in self.given_back and not message.depth:
             del self.given_back[message.task]
 
@@ -133,11 +144,8 @@ class GoingAround:
     def drop(self, tasks: Sequence[Reference], now_us: int) -> list[Effect]:
         """Take untouched tasks out of the program and plan the rest anew."""
         works = [work for work in self.program.works() if work.call.task not in tasks]
-        shuttle = self.shuttle
-        if shuttle.work is not None and shuttle.work.call.task in tasks:
-            for key in (station_token(shuttle.work.station), car_token(*shuttle.work.car)):
-                self.fleet.tokens.forget(key)
-            shuttle.work, shuttle.phase = None, Phase.DONE
+        if self.shuttle.work is not None and self.shuttle.work.call.task in tasks:
+            self.shuttle.drop()
         kept, origin, start_us = self._turning(tasks, now_us)
         steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
         if steps is None or self._is_trapped(now_us):
@@ -166,6 +174,39 @@ class GoingAround:
             off = steps[1]
             step = 1 if off.to_index > off.from_index else -1
             self.program.steps[self.program.current + 1] = off._replace(to_index=off.from_index + step)
+
+    # --- other places ------------------------------------------------------------------------------------------
+
+    def _leave_elsewhere(self, now_us: int) -> list[Effect]:
+        """A car whose place has become another's goes to a place that is free."""
+        changed = (self.fleet.tokens.changes, self._heard)
+        retries = self._place_at_us is not None and self._place_at_us <= now_us
+        if changed == self._places_seen and not retries:
+            return []
+        self._places_seen, self._place_at_us = changed, None
+        for work in self.places.lost():
+            effects = self._choose_for(work, now_us)
+            if effects:
+                return effects
+            self._place_at_us = now_us + RETRY_US
+        return []
+
+    def _choose_for(self, work: Work, now_us: int) -> list[Effect]:
+        """Nothing where there is no other place, or no way there, now: it waits at its own then."""
+        in_hand = self.program.step is not None and self.program.step.work == work
+        kept, origin, start_us = self._turning([work.call.task] if in_hand else (), now_us)
+        works = self._ahead(self.program.works(), kept)
+        for place in self.places.instead(work, now_us)[:MOST_PLACES] if work in works else ():
+            moved = [one._replace(station=place) if one == work else one for one in works]
+            steps = self.generation.reroute(origin, start_us, moved, now_us)
+            if steps is None:
+                continue
+            if self.shuttle.work == work:
+                self.shuttle.drop()
+            self._heard += 1
+            told = Report(f"car {work.car.number} is left at {place}: {work.station} is another's")
+            return [sink_record(work.call.task, place), told, *self.take_up(kept, steps, moved, now_us)]
+        return []
 
     # --- inner works -------------------------------------------------------------------------------------------
 

@@ -81,6 +81,23 @@ class ShuttleWork:
         """Whether the shuttle may be outside the carrier: then the carrier must not move (row P32)."""
         return self.phase in (Phase.REACH, Phase.CLAMP, Phase.RETRACT)
 
+    @property
+    def is_astray(self) -> bool:
+        """Whether its sensor sees it out though nothing in hand has sent it there: the carrier gets no orders then."""
+        return self.sensed is not None and not self.is_home and not self.is_out
+
+    def drop(self) -> None:
+        """The handling in hand, which was not begun, is not to be: its rights are asked for no more."""
+        if self.work is not None:
+            for key in self._rights():
+                self.fleet.tokens.forget(key)
+        self.work, self.phase = None, Phase.DONE
+
+    @property
+    def is_home(self) -> bool:
+        """Whether its own sensor says that it is home; what was never sensed is not."""
+        return self.sensed is not None and self.sensed.mode is ShuttleMode.HOME
+
     def sense(self, state: ShuttleState, now_us: int) -> list[Effect]:
         """Take up the shuttle's state; one that goes on without the last order has missed it, and hears it again."""
         if self.sensed is None:
@@ -102,7 +119,10 @@ class ShuttleWork:
             return self._resume(self.work, now_us)
         if self.phase is Phase.ACQUIRE:
             effects = self._acquire(now_us)
-            if not self._has_rights():
+            is_taken = self.work.handling is Handling.LEAVE and custody.others_in(
+                self.fleet.mirror, self.work.station, self.work.car
+            )
+            if is_taken or not self._has_rights():
                 return effects
             return effects + self._next(now_us)
         if self.sensed is None or self.sensed.sequence != self.sequence or self.sensed.mode is not ENDS[self.phase]:

@@ -4,12 +4,13 @@ A step is one leg of the itinerary together with what is done in it, so the prog
 happened, and sent as an itinerary, all from one value.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
 from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.lifts import lift_at
+from onboard.core.lifts import lift_at, platform_on, sill
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Site, Station
@@ -72,14 +73,18 @@ class Step(NamedTuple):
 
 @dataclass
 class Program:
-    """What a robot does now and next. ``current`` indexes the step in hand; ``standing`` is where it stands at the end.
+    """What a robot does now and next. ``current`` indexes the step in hand.
 
-    ``version`` is the firm itinerary's 8-bit version, 0 before the first.
+    ``standing`` is where the last step that is over left it, never where a step to come will; it is None until the
+    robot has found its place and taken up what its journal knows (``begin``), and till then nothing is planned or
+    changed here: whoever tries gets ``ValueError``. ``unplanned`` are handlings in hand, after those of the steps,
+    to which no way leads at present. ``version`` is the firm itinerary's 8-bit version, 0 before the first.
     """
 
     site: Site
     standing: Segment | None = None
     steps: list[Step] = field(default_factory=list)
+    unplanned: list[Work] = field(default_factory=list)
     current: int = 0
     version: int = 0
     stamp: Stamp = field(default_factory=lambda: Stamp(0, 0, 0))
@@ -96,7 +101,7 @@ class Program:
 
     def works(self) -> list[Work]:
         """All handlings not yet done, in order."""
-        return [step.work for step in self.remaining if step.work is not None]
+        return [*(step.work for step in self.remaining if step.work is not None), *self.unplanned]
 
     def branch(self, now_us: int) -> tuple[int, Segment, int]:
         """From where a further task can be planned: the number of remaining steps kept, the segment and the time.
@@ -104,8 +109,7 @@ class Program:
         All work in hand is kept and the way to the refuge behind it is given up, but for a run already begun. Raises
         ``ValueError`` where the robot's position is not known yet.
         """
-        if self.standing is None:
-            raise ValueError("no position is known yet")
+        standing = self._place()
         remaining = self.remaining
         kept = 0
         for number, step in enumerate(remaining, start=1):
@@ -116,7 +120,7 @@ class Program:
         while 0 < kept < len(remaining) and self._is_on_platform(remaining[kept - 1]):
             kept += 1
         if kept == 0:
-            where = Segment(remaining[0].track, remaining[0].from_index) if remaining else self.standing
+            where = Segment(remaining[0].track, remaining[0].from_index) if remaining else standing
             return 0, where, now_us
         last = remaining[kept - 1]
         return kept, last.destination, max(last.end_us, now_us)
@@ -127,11 +131,10 @@ class Program:
         The step in hand is kept, and what follows aboard a lift; a wait in hand is given up. Raises ``ValueError``
         where the robot's position is not known yet.
         """
-        if self.standing is None:
-            raise ValueError("no position is known yet")
+        standing = self._place()
         remaining = self.remaining
         if not remaining:
-            return 0, self.standing, now_us
+            return 0, standing, now_us
         if remaining[0].action is LegAction.STAND and not self._is_on_platform(remaining[0]):
             return 0, remaining[0].destination, now_us
         kept = 1
@@ -144,14 +147,28 @@ class Program:
         """Whether a step ends aboard a lift: nobody changes plans there."""
         return step.action is LegAction.RIDE or lift_at(self.site, step.destination) is not None
 
-    def replace(self, steps: list[Step], stamp: Stamp) -> None:
+    def _place(self) -> Segment:
+        if self.standing is None:
+            raise ValueError("no position is known yet")
+        return self.standing
+
+    def begin(self, place: Segment, steps: list[Step], stamp: Stamp, unplanned: Sequence[Work] = ()) -> None:
+        """The robot stands at ``place`` and knows what is in hand: from now on the program is there."""
+        self.standing = place
+        self.replace(steps, stamp, unplanned)
+
+    def replace(self, steps: list[Step], stamp: Stamp, unplanned: Sequence[Work] = ()) -> None:
         """Take up a new programme of remaining ``steps`` under the next version."""
-        self.steps = steps
-        self.current = 0
         self.stamp = stamp
-        self.version = successor(self.version, 8)
-        if steps:
-            self.standing = steps[-1].destination
+        self.unplanned = list(unplanned)
+        self._tell_anew(steps)
+
+    def over(self) -> None:
+        """The step in hand is over: the robot stands where it ends."""
+        step = self.step
+        if step is not None:
+            self.standing = ends_at(self.site, step)
+            self.current += 1
 
     def shift(self, by_us: int) -> None:
         """Delay (or advance) the remaining steps; stamp and order stay, the version grows.
@@ -183,6 +200,7 @@ class Program:
         self._tell_anew([*before, *_later(after, by_us)])
 
     def _tell_anew(self, steps: list[Step]) -> None:
+        self._place()
         self.steps = steps
         self.current = 0
         self.version = successor(self.version, 8)
@@ -191,19 +209,35 @@ class Program:
         """The firm itinerary as it goes on the bus; one STAND leg where nothing is left to do."""
         steps, stamp = self.remaining, self.stamp
         if not steps:
-            if self.standing is None:
-                raise ValueError("no position is known yet")
-            place = self.standing
-            steps = [Step(LegAction.STAND, place.track, place.index, place.index, now_us, now_us + 1000)]
-            # What was awarded is long done: an old award time could not be reached by the leg's 24 bits.
-            stamp = stamp._replace(award_ms=to_bus_ms(now_us))
+            return standing_itinerary(sender, self.version, stamp, self._place(), now_us)
         return to_itinerary(sender, self.version, Grade.FIRM, stamp, steps)
 
 
+def standing_itinerary(sender: int, version: int, stamp: Stamp, place: Segment, now_us: int) -> Itinerary:
+    """The firm itinerary of a robot that only stands at ``place``, from ``now_us`` on: one STAND leg."""
+    steps = [Step(LegAction.STAND, place.track, place.index, place.index, now_us, now_us + 1000)]
+    # What was awarded is long done: an old award time could not be reached by the leg's 24 bits.
+    return to_itinerary(sender, version, Grade.FIRM, stamp._replace(award_ms=to_bus_ms(now_us)), steps)
+
+
+def ends_at(site: Site, step: Step) -> Segment:
+    """Where a carrier is after a step; after a ride on the platform, as a position of the floor's alley."""
+    if step.action is not LegAction.RIDE:
+        return step.destination
+    there = platform_on(site, step.track, sill(site, step.track, step.to_index).track)
+    assert there is not None
+    return there
+
+
 def _later(steps: list[Step], by_us: int) -> list[Step]:
-    """The same steps later (or earlier); a planned wait keeps its end and takes up a delay as far as it can."""
+    """The same steps later (or earlier); a planned wait keeps its end and takes up a delay as far as it can.
+
+    So does time that no step fills: behind a run that is very late, what follows may have been planned anew already.
+    """
     shifted: list[Step] = []
     for step in steps:
+        if shifted and by_us > 0:
+            by_us = max(0, min(by_us, shifted[-1].end_us - step.begin_us))
         moved = step.shifted(by_us)
         if step.action is LegAction.STAND:
             moved = moved._replace(end_us=max(moved.begin_us, step.end_us))

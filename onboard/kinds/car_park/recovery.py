@@ -17,16 +17,14 @@ from onboard.core.codes import (
     LegAction,
     Operation,
     Reason,
+    ShuttleMode,
     TaskPhase,
 )
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.lift_uses import ride_us
-from onboard.core.lifts import platform_on, sill
-from onboard.core.messages import Award, CallForProposals, CarAt, Reference, TaskReport
+from onboard.core.messages import Award, CallForProposals, CarAt, Reference, ShuttleState, TaskReport
 from onboard.core.serial import is_newer
-from onboard.core.site import Segment, Site, Station
+from onboard.core.site import Segment, Station
 from onboard.kinds.car_park.bay_memory import cars_at
-from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import Phase
 from onboard.kinds.car_park.program import Handling, Step, Work
 
@@ -54,6 +52,12 @@ def forfeited_record(task: Reference) -> Record:
     return Record({"record": "forfeited", "task_origin": task.origin, "task": task.number})
 
 
+def sink_record(task: Reference, station: Station) -> Record:
+    """The car of a task is to be left at another station than the award says."""
+    entry: dict[str, str | int] = {"record": "sink", "task_origin": task.origin, "task": task.number}
+    return Record(entry | {"station": station.number})
+
+
 def ride_record(step: Step) -> Record:
     """A ride begins: from now on the floor is the lift's business."""
     return Record({"record": "riding", "lift": step.track, "board": step.from_index, "leave": step.to_index})
@@ -62,15 +66,6 @@ def ride_record(step: Step) -> Record:
 def floor_record(track: int) -> Record:
     """A ride is over: the carrier is on this alley. Or it is about to turn into this spur from its mouth."""
     return Record({"record": "floor", "track": track})
-
-
-def ends_at(site: Site, step: Step) -> Segment:
-    """Where a carrier is after a step; after a ride on the platform, as a position of the floor's alley."""
-    if step.action is not LegAction.RIDE:
-        return step.destination
-    there = platform_on(site, step.track, sill(site, step.track, step.to_index).track)
-    assert there is not None
-    return there
 
 
 @dataclass
@@ -109,6 +104,13 @@ class Recovery:
                 self.forget(_task(entry))
                 self.works += _works(entry)
                 self.versions[_task(entry)] = int(entry.get("version", 1))
+            case "sink":
+                place = Station.from_number(int(entry["station"]))
+                leave = Handling.LEAVE
+                self.works = [
+                    one._replace(station=place) if (one.call.task, one.handling) == (_task(entry), leave) else one
+                    for one in self.works
+                ]
             case "forfeited":
                 self.forget(_task(entry))
             case "step":
@@ -117,25 +119,60 @@ class Recovery:
                 self.works = [work for work in self.works if not _is(work, entry)]
                 self.phase = None
                 if entry["handling"] == Handling.LEAVE.value:
+                    self.versions.pop(_task(entry), None)
                     self.last_done, self.is_news = (_task(entry), int(entry.get("station", 0))), True
             case "riding":
                 self.riding = (int(entry["lift"]), int(entry["board"]), int(entry["leave"]))
             case "floor":
                 self.floor, self.riding = int(entry["track"]), None
 
-    def in_hand(self, generation: CarParkGeneration, now_us: int) -> tuple[Step, ...]:
-        """The handling or the ride that the restart fell into, as the first step of the new program."""
-        here = generation.program.standing
-        assert here is not None
-        if self.riding is not None:
-            lift, board, leave = self.riding
-            end_us = now_us + ride_us(generation.site, lift, board, leave)
-            return (Step(LegAction.RIDE, lift, board, leave, now_us, end_us),)
+    @property
+    def ride(self) -> Step | None:
+        """The ride that the restart fell into, without its times."""
+        if self.riding is None:
+            return None
+        lift, board, leave = self.riding
+        return Step(LegAction.RIDE, lift, board, leave, 0, 0)
+
+    def contradiction(self, place: Segment | None, shuttle: ShuttleState) -> str:
+        """What the sensors say that the journal cannot explain, in words; empty where they agree.
+
+        ``place`` is where the carrier stands at a mark, None between two; ``shuttle`` has come to rest.
+        """
+        first = self.works[0] if self.works else None
+        begun = first is not None and self.phase is not None
+        if shuttle.mode is not ShuttleMode.HOME:
+            if first is None or not begun:
+                return "the shuttle is out, and the journal knows of no handling"
+            if place != first.station.segment:
+                return f"the shuttle is out at {place or 'no mark'}, and the journal has it at {first.station}"
+            return ""
+        if begun:
+            # The gripper may just have closed, or opened.
+            return ""
+        is_loaded = first is not None and first.handling is Handling.LEAVE
+        if is_loaded and not shuttle.load_kg:
+            return "no car is aboard, and the journal has one there"
+        if shuttle.load_kg and not is_loaded:
+            return "a car is aboard, and the journal knows of none"
+        return ""
+
+    def is_under_way(self, place: Segment, shuttle: ShuttleState) -> bool:
+        """Whether the first handling was begun and can be gone on with at ``place``; else it is begun anew.
+
+        With the shuttle home a robot may have been pushed away from the station: only what is left to be told is done.
+        """
         if self.phase is None or not self.works:
-            return ()
-        work = self.works[0]
-        end_us = now_us + generation.handling_us(work.station)
-        return (Step(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)
+            return False
+        first = self.works[0]
+        has_gripped = (shuttle.load_kg > 0) is (first.handling is Handling.TAKE)
+        is_handled = shuttle.mode is ShuttleMode.HOME and self.phase is not Phase.REACH and has_gripped
+        return place == first.station.segment or is_handled
+
+    def untouched(self) -> list[Reference]:
+        """Tasks whose car was not taken and whose handling was not begun, in order."""
+        begun = self.works[0].call.task if self.works and self.phase is not None else None
+        return [one.call.task for one in self.works if one.handling is Handling.TAKE and one.call.task != begun]
 
     def forfeit_unknown(
         self, fleet: Fleet, award: Award, known: Iterable[Work], done: Collection[Reference]

@@ -9,7 +9,6 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     CallResult,
-    DriveMode,
     Grade,
     KindCode,
     LegAction,
@@ -34,8 +33,7 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import to_bus_ms
-from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.core.site import Machine, Site, TrackKind
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.asking import AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution, weighed
@@ -44,17 +42,16 @@ from onboard.kinds.car_park.going_around import GoingAround
 from onboard.kinds.car_park.handling import Phase, ShuttleWork, handle
 from onboard.kinds.car_park.holding import Holding
 from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
-from onboard.kinds.car_park.recovery import Recovery, award_record, ends_at, floor_record, handled_record, ride_record
+from onboard.kinds.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
 from onboard.kinds.car_park.ride_calls import call_lifts
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.site import RideCalls, car_park
+from onboard.kinds.car_park.starting import Body, Stage, Starting
 from onboard.kinds.car_park.travel import Carriage
 from onboard.kinds.car_park.way import way_to_refuge
 
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
 REPLAN_TOLERANCE_US = 500_000
-#: From the first known position after a restart until plans are made: the others say meanwhile what they plan. Ours.
-SETTLING_US = 2_000_000
 #: A step that is not over this long after its planned end is told to be late, by as much again. Ours.
 OVERDUE_US = 2_000_000
 
@@ -88,7 +85,7 @@ class Robot:
     recovery: Recovery = field(init=False)
     going_around: GoingAround = field(init=False)
     holding: Holding = field(init=False)
-    _recover_at_us: int | None = None
+    starting: Starting = field(init=False)
     #: The last tasks that were done: a late word about one of them is no news.
     _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
     _begun: bool = False
@@ -97,6 +94,7 @@ class Robot:
     def __post_init__(self) -> None:
         self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
         self.shuttle = ShuttleWork(self.fleet)
+        self.carriage.is_clear = lambda: self.shuttle.is_home
         self.carriage.way_on = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
         self.giving_way = GivingWay(self.fleet, self.program)
@@ -105,6 +103,10 @@ class Robot:
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
         self.holding = Holding(self.fleet, self.generation, self.carriage, self.shuttle)
+        machine = Body(self.carriage, self.shuttle, self.riding)
+        self.starting = Starting(
+            self.fleet, self.generation, machine, self.recovery, self._say_what_is_mine, self._started
+        )
         if self.recovery.floor is not None:
             self.carriage.track = self.recovery.floor
 
@@ -116,14 +118,16 @@ class Robot:
     @property
     def state(self) -> MachineState:
         """Heartbeat state."""
-        if self._fault is not Reason.NONE or self.going_around.is_stuck:
+        is_astray = self.starting.is_over and self.shuttle.is_astray
+        is_held_back = self.starting.stage is Stage.HELD or self.going_around.is_stuck or is_astray
+        if self._fault is not Reason.NONE or is_held_back:
             return MachineState.STOPPED
         if self.holding.is_at_rest:
             return MachineState.OBSTACLE
-        if self.program.standing is None or self._recover_at_us is not None:
+        if not self.starting.is_over:
             return MachineState.STARTING
         if self.program.step is None:
-            return MachineState.IDLE
+            return MachineState.WAITING if self.program.unplanned else MachineState.IDLE
         return MachineState.WAITING if self.carriage.blocked is not None else MachineState.WORKING
 
     @property
@@ -138,11 +142,7 @@ class Robot:
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Drive and shuttle states."""
         if isinstance(message, DriveState):
-            effects = self.carriage.sense(message, now_us, self.program.version, self.program.current)
-            is_known = self.carriage.sensed is not None
-            if is_known and self.program.standing is None and message.mode is DriveMode.STANDING:
-                effects += self._find_place(now_us)
-            return effects
+            return self.carriage.sense(message, now_us, self.program.version, self.program.current)
         if isinstance(message, ShuttleState):
             effects = self.shuttle.sense(message, now_us)
             if self.shuttle.fault and self._fault is Reason.NONE:
@@ -159,9 +159,9 @@ class Robot:
         if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
             return self.holding.ordered(message)
         lost = self.holding.loses(message)
-        if lost is not None and lost in self.going_around.untouched():
+        if lost is not None and lost in self._untouched():
             return self._lose(lost, now_us)
-        if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or self.program.standing is None:
+        if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or not self.starting.is_over:
             return []
         # Nobody counts on the plan of a robot that is held: it is made anew once it is let go.
         if self.holding.is_at_rest or self.fleet.mirror.itineraries.get(message.sender) is not message:
@@ -181,14 +181,18 @@ class Robot:
                 award.result is CallResult.REJECTED and award.call == call.call
             )
             others = award.result is CallResult.AWARDED and award.winner != self.fleet.node_id and newer
-            if (others or is_void) and (self._recover_at_us is not None or call.task in self.going_around.untouched()):
+            if (others or is_void) and call.task in self._untouched():
                 return self._lose(call.task, now_us)
         return []
+
+    def _untouched(self) -> list[Reference]:
+        """Tasks in hand that can be given back, or be another's."""
+        return self.going_around.untouched() if self.starting.is_over else self.recovery.untouched()
 
     def _lose(self, task: Reference, now_us: int) -> list[Effect]:
         self.recovery.forget(task)
         gone = self.going_around.lose(task)
-        return gone + (self.going_around.drop([task], now_us) if self._recover_at_us is None else [])
+        return gone + (self.going_around.drop([task], now_us) if self.starting.is_over else [])
 
     def _take_up(self, kept: int, steps: Sequence[Step], works: list[Work], now_us: int) -> list[Effect]:
         """A program made anew for the same or fewer tasks, under the same stamp."""
@@ -197,7 +201,8 @@ class Robot:
             self._begun = False
         if not rest and self.carriage.standing_at is not None:
             self.program.standing = self.carriage.standing_at
-        self.program.replace(rest, self.program.stamp)
+        planned = [step.work for step in rest]
+        self.program.replace(rest, self.program.stamp, [work for work in works if work not in planned])
         effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
         effects += self._publish(now_us)
         return effects + (call_lifts(self.fleet, works[0].call, tuple(steps), now_us) if works else [])
@@ -206,13 +211,19 @@ class Robot:
         """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
         kept, origin, start_us = self.program.turning(now_us)
         works = [step.work for step in self.program.remaining[kept:] if step.work is not None]
-        steps = self.generation.reroute(origin, start_us, works, now_us)
+        unplanned = self.program.unplanned
+        steps = self.generation.reroute(origin, start_us, [*works, *unplanned], now_us)
+        if steps is not None:
+            works, unplanned = [*works, *unplanned], []
+        elif unplanned:
+            # What finds no way now must not stand in the way of others either.
+            steps = self.generation.reroute(origin, start_us, works, now_us)
         if steps is None:
             return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is Answer.LATER else []
         calls = [work.call for work in works]
         if not kept:
             self._begun = False
-        self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp)
+        self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp, unplanned)
         effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
         effects += self._publish(now_us)
         return effects + (call_lifts(self.fleet, calls[0], steps, now_us) if calls else [])
@@ -232,7 +243,7 @@ class Robot:
                 (solution,) = proposal.program
                 version = 1 if award is None else award.task_version
                 self.recovery.versions[call.task] = version
-                why = Reason.OPERATOR if self.holding.is_held and self._fault is Reason.NONE else self._fault
+                why = self._why_not()
                 if why is not Reason.NONE:
                     return self.going_around.forfeit(call.task, why, now_us)
                 again = call.task in self.going_around.untouched()
@@ -242,9 +253,18 @@ class Robot:
                 return [self._tell_again(call.task)]
         return []
 
+    def _why_not(self) -> Reason:
+        """Why a task that was won cannot be taken on; NONE where it can."""
+        if self._fault is not Reason.NONE:
+            return self._fault
+        if self.holding.is_held:
+            return Reason.OPERATOR
+        # A bid of before: of a life before, or of when there was still a way for all that is in hand.
+        return Reason.IMPOSSIBLE if self.program.unplanned or not self.starting.is_over else Reason.NONE
+
     def _works(self) -> list[Work]:
-        """What is in hand, and what a restart has left to do."""
-        return [*self.program.works(), *self.recovery.works]
+        """What is in hand, or what a restart has left to do."""
+        return self.program.works() if self.starting.is_over else self.recovery.works
 
     def _tell_again(self, task: Reference) -> Effect:
         """What became of a task whose award is said again."""
@@ -265,13 +285,10 @@ class Robot:
             return self.going_around.say_again(now_us)
         if self.holding.stops(self._begun):
             return self.going_around.say_again(now_us) + self.holding.come_to_rest(now_us)
-        if self.program.standing is None:
-            # On its way to a mark after a restart, or nowhere known.
-            return self.carriage.advance(now_us) if self.carriage.goal is not None else []
-        if self._recover_at_us is not None and self._recover_at_us <= now_us:
-            return self._recover(now_us)
+        if not self.starting.is_over:
+            return self.starting.advance(now_us)
         effects = self.going_around.watch_drive(now_us)
-        effects += self.going_around.advance(now_us) if self._recover_at_us is None else []
+        effects += self.going_around.advance(now_us)
         # A step can end without a word on any bus, and the next is to begin in the same moment.
         for _ in range(MAX_STEPS):
             if self.holding.stops(self._begun):
@@ -298,9 +315,9 @@ class Robot:
             return self.going_around.next_word()
         if self.holding.stops(self._begun):
             return min((one for one in (self.carriage.next_wake(), self.going_around.next_word()) if one), default=None)
-        times = [self.carriage.next_wake(), self._recover_at_us]
-        if self._recover_at_us is None and self.program.standing is not None:
-            times.append(self.going_around.next_wake())
+        if not self.starting.is_over:
+            return min((one for one in (self.carriage.next_wake(), self.starting.next_wake()) if one), default=None)
+        times = [self.carriage.next_wake(), self.going_around.next_wake()]
         step = self.program.step
         if step is not None and self._begun:
             times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
@@ -324,27 +341,8 @@ class Robot:
 
     # --- steps -------------------------------------------------------------------------------------------------
 
-    def _find_place(self, now_us: int) -> list[Effect]:
-        """Admitted at a mark; between marks after a restart, first to the nearest one, as far as rights allow.
-
-        In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
-        """
-        here = self.carriage.standing_at
-        if here is not None and here == self.carriage.nearest:
-            return self._admit(here, now_us)
-        if self.carriage.goal is None and not self.holding.is_held:
-            # It asks first for what it is in: it may have been pushed there while it was off.
-            self.carriage.go(self.carriage.nearest)
-        return []
-
-    def _admit(self, here: Segment, now_us: int) -> list[Effect]:
-        """First position after power-up: stand here and tell everybody; after a restart go on a little later."""
-        self.program.standing = here
-        self.program.replace([], Stamp(to_bus_ms(now_us), self.fleet.node_id, 0))
-        self.carriage.go(here)
-        if self.recovery.is_restart:
-            self._recover_at_us = now_us + SETTLING_US
-        # Whoever has got one of them meanwhile, its initiator knows.
+    def _say_what_is_mine(self) -> list[Effect]:
+        """At a restart: tasks in hand, of which each initiator knows whether another has got it meanwhile."""
         mine = self._taken_on(self.recovery.works)
         if self.recovery.last_done is not None:
             task, station = self.recovery.last_done
@@ -352,39 +350,20 @@ class Robot:
             if self.recovery.is_news:
                 # The power may have failed before this was said, or heard.
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
-        return self._publish(now_us) + mine
+        return mine
 
-    def _recover(self, now_us: int) -> list[Effect]:
-        """Go on with what the journal says is mine, by a way planned anew (rows P14, P20)."""
-        assert self.program.standing is not None
-        works = list(self.recovery.works)
-        steps = self.recovery.in_hand(self.generation, now_us)
-        origin, start_us = self.program.standing, now_us
-        for step in steps:
-            origin = ends_at(self.fleet.site, step)
-            works, start_us = (works if step.work is None else works[1:]), step.end_us
-        more = self.generation.reroute(origin, start_us, works, now_us)
-        if more is None:
-            # Somebody is in the way: the others' plans change.
-            self._recover_at_us = now_us + SETTLING_US
-            return []
-        self._recover_at_us = None
-        if steps:
-            self._resume(steps[0])
-        calls = [work.call for work in self.recovery.works]
-        stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF) if calls else self.program.stamp
-        self.program.replace([*steps, *more], stamp)
-        effects: list[Effect] = [Report("goes on after a restart: " + "; ".join(str(step) for step in (*steps, *more)))]
+    def _started(self, planned: tuple[Step, ...], calls: list[CallForProposals], now_us: int) -> list[Effect]:
+        """The start is over, and the program taken up: tell the plan, and call for rides in what was planned now."""
+        # What a restart has left in hand is the first step, and was begun before.
+        self._begun = len(planned) < len(self.program.steps)
+        effects: list[Effect] = []
+        if self.recovery.is_restart:
+            effects.append(Report("goes on after a restart: " + "; ".join(str(step) for step in self.program.steps)))
+        if self.program.unplanned:
+            # Somebody is in the way: it is tried again, and what was not touched is given back if that lasts.
+            self.going_around.turn_later(now_us)
         effects += self._publish(now_us)
-        return effects + (call_lifts(self.fleet, calls[0], more, now_us) if calls else [])
-
-    def _resume(self, step: Step) -> None:
-        """The step in hand goes on from where the journal and the sensors say that it was."""
-        self._begun = True
-        if step.work is not None and self.recovery.phase is not None:
-            self.shuttle.resume(step.work, self.recovery.phase)
-        elif step.action is LegAction.RIDE:
-            self.riding.begin(step.track, step.to_index)
+        return effects + (call_lifts(self.fleet, calls[0], planned, now_us) if calls else [])
 
     def _take_on(
         self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], version: int, now_us: int
@@ -467,9 +446,10 @@ class Robot:
             effects.append(floor_record(floor))
             self.carriage.ride_to(floor)
         self._begun = False
-        self.program.current += 1
-        late_us = now_us - step.end_us
-        if self.program.step is not None and abs(late_us) > REPLAN_TOLERANCE_US:
+        self.program.over()
+        following = self.program.step
+        late_us = now_us - (step.end_us if following is None else following.begin_us)
+        if following is not None and abs(late_us) > REPLAN_TOLERANCE_US:
             self.program.shift(late_us)
             effects += self._publish(now_us)
         return effects
@@ -491,9 +471,11 @@ class Robot:
         self._fault = reason
         self.carriage.stopped = True
         effects: list[Effect] = [Report(f"stopped: {reason.name}")]
-        lost = self.going_around.untouched()
+        lost = self._untouched()
         for task in lost:
+            self.recovery.forget(task)
             effects += self.going_around.forfeit(task, reason, now_us)
+        self.program.unplanned = [work for work in self.program.unplanned if work.call.task not in lost]
         self.program.steps = [
             step for step in self.program.steps if step.work is None or step.work.call.task not in lost
         ]

@@ -14,7 +14,7 @@ from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
 from onboard.core.petitions import UNORDERED
 from onboard.core.serial import is_newer
-from onboard.core.site import Segment
+from onboard.core.site import Segment, Station
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.bay_memory import BayMemory, winner_record
 
@@ -68,7 +68,7 @@ class Stewardship:
                 for won in [won for won in self._unheard_us if self.winners.get(won) == message.sender]:
                     if isinstance(message, Itinerary) or self.tasks[won][0] == message.task:
                         del self._unheard_us[won]
-            case CallForProposals() if message.operation in (Operation.PARK, Operation.RETRIEVE):
+            case CallForProposals() if self._is_for_a_car(message):
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
                     del self._cars_of_calls[next(iter(self._cars_of_calls))]
@@ -80,6 +80,12 @@ class Stewardship:
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._state_anew(custody.car_of(message), message.version)
         return []
+
+    def _is_for_a_car(self, call: CallForProposals) -> bool:
+        """Whether its winner may fetch a stored car: only a compartment, or a person's station, calls for that."""
+        machine = self.fleet.site.machines.get(call.sender)
+        is_from_whom = machine is None or call.sender in self.fleet.site.compartments
+        return is_from_whom and call.operation in (Operation.PARK, Operation.RETRIEVE)
 
     def won(self, car: Reference, winner: int, task: Reference, version: int) -> list[Effect]:
         """``winner`` may fetch a car, or with 0 nobody may, for ``task`` under ``version``."""
@@ -158,7 +164,10 @@ class Stewardship:
         if key.kind is TokenKind.CAR:
             car = Reference(key.number >> 16, key.number & 0xFFFF)
             return Reason.NONE if self.winners.get(car) == requester else Reason.TOKEN_NOT_GRANTABLE_YET
-        return Reason.NONE
+        # Where a car stands nobody may bring another: only who is to fetch it has anything to do there.
+        cars = custody.others_in(self.fleet.mirror, Station.from_number(key.number))
+        may_enter = all(self.winners.get(car) == requester for car in cars)
+        return Reason.NONE if may_enter else Reason.TOKEN_NOT_GRANTABLE_YET
 
     def car_statements(self) -> list[Effect]:
         """Where each car in my custody stands, and which of them have left last: somebody may have missed that."""

@@ -15,7 +15,7 @@ from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import successor
+from onboard.core.serial import last_boot, successor
 from onboard.core.site import Machine, Site
 from onboard.kinds.cell.contracts import Contract
 from onboard.kinds.cell.generation import ArmGeneration, call_terms
@@ -87,9 +87,8 @@ class ArmRobot:
     def __post_init__(self) -> None:
         site = self.generation.site
         self.driver = Driver(self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
-        boots = sum(1 for entry in self.fleet.entries if entry.get("record") == "boot")
         # Names of goals of an earlier life may still be about.
-        self.generation.number = (boots & 0xFF) << 8
+        self.generation.number = last_boot(self.fleet.entries) << 8
         for one in undertakings(self.fleet.entries).values():
             if one.stage is Stage.OVER:
                 self.over[one.task] = one.manager
@@ -317,7 +316,7 @@ class ArmRobot:
         """A part that lies at its goal goes back into the custody of the goal manager that named it."""
         effects: list[Effect] = []
         wanted = {one.contract.goal.part for one in self.in_hand.values()}
-        for key in list(self.fleet.tokens.held):
+        for key in self.fleet.tokens.mine():
             part = Reference(key.number >> 16, key.number & 0xFFFF)
             if key.kind is TokenKind.CAR and part not in wanted:
                 effects += self.fleet.tokens.give(key, part.origin, now_us)

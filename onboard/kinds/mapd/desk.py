@@ -212,7 +212,7 @@ class OrderDesk(Plain):
         for entry in entries:
             match entry.get("record"):
                 case "boot":
-                    self._attempt = (self._attempt + 1) & 0xFF
+                    self._attempt = int(entry["boot"])
                 case "transport":
                     number = int(entry["task"])
                     cells = int(entry["pickup"]), int(entry["delivery"])

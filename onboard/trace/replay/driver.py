@@ -130,6 +130,7 @@ class Driver:
         """``origin_us`` of the log is where the machine's own clock begins."""
         self.halted = ""
         self._holon = holon
+        holon.listen(codecs.fleet.speakers)
         self._codecs = codecs
         self._decoders = (Decoder(codecs.fleet), Decoder(codecs.device))
         self._origin_us = origin_us

@@ -1,0 +1,169 @@
+"""Forged words of people, of other sites, and about time, starts and stops."""
+
+from collections.abc import Iterator
+
+from bus_sim.attacks.attack import TICK_US, Attack, Node
+from onboard.core.bus_time import BUS_TIME_MODULUS
+from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, OperatorAction, Reason
+from onboard.core.messages import (
+    Blocked,
+    BusTime,
+    CarAt,
+    EmergencyStop,
+    Heartbeat,
+    ManualOrder,
+    Message,
+    OperatorOrder,
+    Reference,
+    SyncRequest,
+)
+from onboard.kinds.graph.messages import NodeAnswer, NodeVerdict, TurnSignal, VisitList, five
+from onboard.kinds.graph.site import FactoryGraph
+from onboard.kinds.terminal.messages import BoxOrder
+from onboard.kinds.terminal.site import EntityKind, Terminal
+
+_SECOND_US = 1_000_000
+#: Machines of another site that one node makes up.
+_GHOSTS = 6
+
+
+class _Repeated(Attack):
+    """Says its words at the begin and again after every ``every_us``."""
+
+    every_us = 5 * _SECOND_US
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node)
+        self._due_us = 0
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """What is said."""
+        raise NotImplementedError
+
+    def tick(self, now_us: int) -> None:
+        """See ``Attack``."""
+        if now_us >= self._due_us:
+            self._due_us = now_us + self.every_us
+            for word in self.words(now_us):
+                self.node.say(word)
+
+
+class Stop(_Repeated):
+    """An emergency stop that nobody of the site said."""
+
+    every_us = 10 * _SECOND_US
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """See ``_Repeated``."""
+        yield EmergencyStop(self.node.node_id, Reason.OPERATOR)
+
+
+class OtherSite(_Repeated):
+    """Several machines of another site, all of them made up."""
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """See ``_Repeated``."""
+        digest = self.node.site.digest % 0xFFFF + 1
+        for ghost in range(self.node.node_id, self.node.node_id + _GHOSTS):
+            yield Heartbeat(ghost, CONTRACT_VERSION, digest, 0, 1, KindCode.ROBOT, MachineState.IDLE)
+
+
+class NewerBoot(_Repeated):
+    """Tells each machine that it was known under a newer boot counter: as if its journal were old."""
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node)
+        self._boots: dict[int, int] = {}
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """See ``Attack``."""
+        if isinstance(message, Heartbeat):
+            self._boots[message.sender] = message.boot
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """See ``_Repeated``."""
+        for node in self.node.site.machines:
+            yield SyncRequest(self.node.node_id, node, self._boots.get(node, 1) % 255 + 1)
+
+
+class BlockAll(_Repeated):
+    """Says of every slot that nobody can pass it."""
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """See ``_Repeated``."""
+        tracks = getattr(self.node.site, "tracks", {})
+        for number, track in tracks.items():
+            for index in range(1, min(track.length, 255) + 1):
+                yield Blocked(self.node.node_id, number, index, Reason.OPERATOR)
+
+
+class HoldAll(_Repeated):
+    """Holds every machine, as a person would."""
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """See ``_Repeated``."""
+        number = self.node.chance.randint(1, 255)
+        for node in self.node.site.machines:
+            yield ManualOrder(self.node.node_id, node, number, ManualMode.HELD)
+
+
+class WrongTime(_Repeated):
+    """Bus time that is an hour ahead."""
+
+    every_us = _SECOND_US
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node)
+        self._ahead_us: int | None = None
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """See ``Attack``."""
+        if isinstance(message, BusTime):
+            self._ahead_us = message.bus_time_us - now_us
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """See ``_Repeated``."""
+        if self._ahead_us is not None:
+            yield BusTime(self.node.node_id, (now_us + self._ahead_us + 3_600 * _SECOND_US) % BUS_TIME_MODULUS)
+
+
+class Orders(_Repeated):
+    """What only an operator's station may order: other people's cars, boxes, ways."""
+
+    every_us = 10 * TICK_US
+
+    def __init__(self, node: Node) -> None:
+        super().__init__(node)
+        self._cars: set[Reference] = set()
+        self._number = node.chance.randint(1, 10_000)
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """See ``Attack``."""
+        if isinstance(message, CarAt):
+            self._cars.add(message.car)
+
+    def words(self, now_us: int) -> Iterator[Message]:
+        """See ``_Repeated``."""
+        me, site, chance = self.node.node_id, self.node.site, self.node.chance
+        self._number += 1
+        if isinstance(site, Terminal):
+            stations = [number for number, one in site.entities.items() if one.kind is EntityKind.STATION]
+            box, station = chance.randint(1, len(site.boxes)), chance.choice(stations)
+            yield BoxOrder(me, site.desk, self._number, box, station, 0, True)
+        elif isinstance(site, FactoryGraph):
+            robots = [node for node, one in site.machines.items() if one.kind is KindCode.VEHICLE]
+            stops = tuple(chance.sample(sorted(site.graph.neighbours), 2))
+            yield VisitList(me, self._number, chance.choice(robots), *five(stops))
+        for compartment in getattr(site, "compartments", {}):
+            for car in sorted(self._cars):
+                yield OperatorOrder(me, compartment, OperatorAction.URGENT_TICKET, car)
+
+
+class WrongAnswers(Attack):
+    """In a factory graph every robot that comes near a node is told by the attacker that it may go on."""
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """See ``Attack``."""
+        if isinstance(message, TurnSignal):
+            go = NodeAnswer(self.node.node_id, message.sender, message.node, NodeVerdict.GO, message.after, 0)
+            self.node.say(go)

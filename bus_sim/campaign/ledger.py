@@ -1,0 +1,89 @@
+"""Results that add up: one line a trial in a file, so that a long campaign is played in parts and goes on anywhere.
+
+A line counts for the state of the program under which it was played, which is a digest of its sources, and for the
+campaign that it belongs to; lines of other states stay in the file and are told of.
+"""
+
+import hashlib
+import json
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+import bus_sim
+import onboard
+from bus_sim.campaign.report import FAILURES, Verdict
+from bus_sim.demand import DemandError
+
+#: Files that a run depends on, beside the interpreter.
+SOURCES = (".py", ".toml", ".dbc", ".csv")
+
+
+@cache
+def state() -> str:
+    """A digest of the program's sources: two checkouts with the same text have the same."""
+    found = hashlib.sha256()
+    for package in (onboard, bus_sim):
+        root = Path(package.__path__[0])
+        for path in sorted(one for one in root.rglob("*") if one.suffix in SOURCES):
+            found.update(f"{package.__name__}/{path.relative_to(root).as_posix()}\n".encode())
+            found.update(path.read_bytes())
+    return found.hexdigest()[:16]
+
+
+@dataclass
+class Ledger:
+    """The file at ``path`` as far as it is about ``campaign``, a text that names all that its trials have in common."""
+
+    path: Path
+    campaign: str
+    #: Verdicts of this state by the number of the seed or point, with why.
+    done: dict[int, tuple[Verdict, str]] = field(default_factory=dict)
+    others: int = 0
+
+    @classmethod
+    def read(cls, path: Path, campaign: str) -> "Ledger":
+        """A file that is not there yet is empty. Raises ``DemandError`` for one that is no ledger."""
+        ledger = cls(path, campaign)
+        try:
+            text = path.read_text(encoding="utf-8") if path.exists() else ""
+            for line in text.splitlines():
+                ledger._take(json.loads(line))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise DemandError(f"--add-to {path}: cannot be read as results of campaigns ({error})") from error
+        return ledger
+
+    def _take(self, entry: dict[str, str | int]) -> None:
+        if (entry["state"], entry["campaign"]) == (state(), self.campaign):
+            self.done[int(entry["number"])] = Verdict(str(entry["verdict"])), str(entry["why"])
+        else:
+            self.others += 1
+
+    def open_of(self, numbers: Iterable[int]) -> list[int]:
+        """Those that were not played under this state."""
+        return [number for number in numbers if number not in self.done]
+
+    def add(self, number: int, verdict: Verdict, why: str) -> None:
+        """One trial more, on disk at once."""
+        self.done[number] = verdict, why
+        entry = {"state": state(), "campaign": self.campaign, "number": number, "verdict": verdict.value, "why": why}
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(entry) + "\n")
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether any trial of this state failed."""
+        return any(verdict in FAILURES for verdict, _ in self.done.values())
+
+    def lines(self) -> list[str]:
+        """What the file has of this state by now."""
+        counts = Counter(verdict for verdict, _ in self.done.values())
+        told = ", ".join(f"{verdict.value} {counts[verdict]}" for verdict in Verdict if counts[verdict])
+        failed = [
+            f"  {number}: {verdict.value}: {why}"
+            for number, (verdict, why) in sorted(self.done.items())
+            if verdict in FAILURES
+        ]
+        return [f"{self.path}: {len(self.done)} runs of state {state()}: {told or 'none'}", *failed]

@@ -1,0 +1,55 @@
+"""Who may say what: only machines of the site count, each with what its kind may say (design, section 5).
+
+What kinds may say stands in the DBC (``BO_TX_BU_``) and comes in as a value, as the core knows no wire. Nodes 251 to
+255 say what a gateway may. All else is as if it had not been heard, and is counted; only an emergency stop counts from
+anybody.
+"""
+
+from dataclasses import dataclass, field
+
+from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, KindCode, Reason
+from onboard.core.messages import Blocked, BusTime, Clear, EmergencyStop, ManualOrder, Message, Speakers
+from onboard.core.site import Machine, Site
+
+#: Highest number that a node can have on the wire.
+_LAST_NODE_ID = 255
+#: What no machine that moves says, whatever its system calls it.
+_OF_FIXED = (BusTime, ManualOrder)
+#: What a machine says only of tracks whose steward it is.
+_OF_STEWARDS = (Blocked, Clear)
+
+
+@dataclass
+class Admission:
+    """What one machine listens to. Without ``speakers``, in a test of decisions alone, every kind says everything."""
+
+    site: Site
+    speakers: Speakers | None = None
+    #: Nodes whose words came to nothing, each with the reason that was told to people.
+    _named: set[tuple[int, Reason]] = field(default_factory=set)
+
+    def why_not(self, message: Message) -> Reason:
+        """NONE where a message counts; else NOT_OF_SITE, NOT_OF_KIND, or NOT_AUTHORISED for a track of another's."""
+        if isinstance(message, EmergencyStop):
+            return Reason.NONE
+        machine = self.site.machines.get(message.sender)
+        if machine is None and not MAX_NODE_ID < message.sender <= _LAST_NODE_ID:
+            return Reason.NOT_OF_SITE
+        kind = KindCode.OBSERVER if machine is None else machine.kind
+        if self.speakers is not None and kind not in self.speakers.get(type(message), ()):
+            return Reason.NOT_OF_KIND
+        return Reason.NONE if machine is None else self._why_not_of(machine, message)
+
+    def _why_not_of(self, machine: Machine, message: Message) -> Reason:
+        if isinstance(message, _OF_FIXED) and machine.kind in MOBILE_KINDS:
+            return Reason.NOT_OF_KIND
+        if isinstance(message, _OF_STEWARDS) and self.site.stewards.get(message.track) != machine.node_id:
+            return Reason.NOT_AUTHORISED
+        return Reason.NONE
+
+    def is_first(self, node: int, reason: Reason) -> bool:
+        """Whether a node's words come to nothing for this reason for the first time: people are told once."""
+        if (node, reason) in self._named:
+            return False
+        self._named.add((node, reason))
+        return True

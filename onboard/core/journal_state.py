@@ -1,0 +1,51 @@
+"""What a machine knows of its own journal when it starts: whole, harmlessly cut, mended, or not to be relied on."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from onboard.core.codes import Reason
+
+
+class JournalState(Enum):
+    """How a journal was found. Only ``SHORT`` and ``FOREIGN`` take the machine's rights away.
+
+    An old but consistent copy of a journal reads INTACT, and one that is lost with its medium reads NEW: no medium can
+    know that of itself, so the bus is asked (design, section 5).
+    """
+
+    NEW = "there is none: a first life, or all is lost"
+    INTACT = "as it was sealed"
+    TORN = "the last write was cut and never counted"
+    MENDED = "its last records were damaged and are restored from their second copy"
+    SHORT = "records that were sealed are missing"
+    FOREIGN = "it is another machine's, or its records are not those that were sealed"
+
+
+@dataclass(frozen=True, slots=True)
+class JournalCondition:
+    """``missing``: sealed records that cannot be read, None where not even their number is known; 0 if none.
+
+    ``mended``: records that were restored. ``why``: one line for a person with file and remedy, empty where all is
+    well.
+    """
+
+    state: JournalState = JournalState.INTACT
+    missing: int | None = 0
+    mended: int = 0
+    why: str = ""
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether what was read is all that was ever confirmed, as far as the medium can know."""
+        return self.state not in (JournalState.SHORT, JournalState.FOREIGN)
+
+
+#: Nothing to tell.
+INTACT = JournalCondition()
+
+
+def reason_of(condition: JournalCondition) -> Reason:
+    """What a machine says of a journal on the bus; NONE where it is reliable."""
+    if condition.is_reliable:
+        return Reason.NONE
+    return Reason.JOURNAL_FOREIGN if condition.state is JournalState.FOREIGN else Reason.JOURNAL_SHORT

@@ -1,0 +1,88 @@
+"""How the last life of this board's controller ended, beside its journal: what a process killed cannot tell itself.
+
+Two files: ``NAME.life`` is the controller's own, ``NAME.ended`` what its supervisor saw (deploy/files/onboard.service,
+``ExecStopPost``). Neither is needed for anything but telling people and for not starting again for ever: a board
+without them starts.
+"""
+
+import contextlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from onboard.core.codes import Reason
+from onboard.io.endings import Ending
+
+#: So many lives in a row that an own fault ended within ``HEALTHY_US`` each, and the machine waits for a person.
+LIMIT = 3
+#: A life that took so long has done its work, us; what ends it is news.
+HEALTHY_US = 600_000_000
+
+#: What systemd says of a service that ended in ``$SERVICE_RESULT`` (systemd.exec(5)), in words for a person.
+_RESULTS = {
+    "watchdog": "it hung, and its watchdog ended it",
+    "timeout": "it did not start or end in time, and was killed",
+    "signal": "it was killed",
+    "core-dump": "it crashed",
+    "oom-kill": "the board's memory was full, and it was killed",
+    "resources": "the board had no room for it",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LastLife:
+    """``told`` is one line for a person, empty where there is nothing to tell; ``reason`` is for the bus."""
+
+    told: str = ""
+    reason: Reason = Reason.NONE
+
+
+class Lives:
+    """The book of one controller's lives. What cannot be read or written is passed over: telling is not working."""
+
+    def __init__(self, journal: Path) -> None:
+        """``journal`` is the journal's folder; the files lie beside it."""
+        self._own = journal.with_name(f"{journal.name}.life")
+        self._seen = journal.with_name(f"{journal.name}.ended")
+        self._short = 0
+
+    def begin(self) -> LastLife:
+        """How the last life ended; from now on this one goes on."""
+        before, seen = self._read(), self._result()
+        short = before.get("short")
+        self._short = short if isinstance(short, int) else 0
+        was_running = before.get("end") == "running"
+        self._write("running")
+        with contextlib.suppress(OSError):
+            self._seen.unlink()
+        if seen == "watchdog":
+            return LastLife(f"the last life: {_RESULTS[seen]}", Reason.WATCHDOG)
+        if not was_running:
+            return LastLife()
+        return LastLife(f"the last life: {_RESULTS.get(seen, 'the board was reset or lost its power')}")
+
+    def end(self, ending: Ending, lived_us: int, *, own_fault: bool = False) -> Ending:
+        """Write down how this life ends. One ended by a fault of its own too often waits for a person."""
+        self._short = self._short + 1 if own_fault and lived_us < HEALTHY_US else 0
+        if self._short >= LIMIT:
+            self._short = 0
+            ending = Ending.WAITS_FOR_PERSON
+        self._write(ending.name)
+        return ending
+
+    def _result(self) -> str:
+        try:
+            return self._seen.read_text(encoding="utf-8", errors="replace").strip()
+        except OSError:
+            return ""
+
+    def _read(self) -> dict[str, object]:
+        try:
+            found = json.loads(self._own.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return {}
+        return found if isinstance(found, dict) else {}
+
+    def _write(self, end: str) -> None:
+        with contextlib.suppress(OSError):
+            self._own.write_text(json.dumps({"end": end, "short": self._short}) + "\n", encoding="utf-8")

@@ -1,0 +1,151 @@
+"""``onboard operate``: what a person says to a site from any node of its bus."""
+
+import argparse
+import asyncio
+import signal
+import sys
+import time
+from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
+
+from onboard.config.problems import ConfigError
+from onboard.config.site import load_site
+from onboard.core.site import Site
+from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.kinds.registry import system_of
+from onboard.operate.asking import Asker
+from onboard.operate.names import OperateError, tool_of
+from onboard.operate.order import MISTAKE
+from onboard.operate.station import Station
+from onboard.operate.wishes import Maker, Wish, maker_of
+from onboard.wire.codec import codecs
+
+EXAMPLES = """\
+exit status: 0 done, and confirmed by those whom it concerns; 1 not confirmed, it says by whom; 2 a person's mistake
+
+stop, hold and block only take motion away: they are said at once. All others ask first; --yes answers for a script.
+
+examples:
+  onboard operate status -i socketcan -c can0 --site mysite.toml         who lives, who stands and why; only listens
+  onboard operate stop -i socketcan -c can0 --site mysite.toml           all stand, until Ctrl-C and 30 s more
+  onboard operate go -i socketcan -c can0 --site mysite.toml             who stands and why; asks; they go on
+  onboard operate block "p(1,3)" -i socketcan -c can0 --site mysite.toml
+  onboard operate regenerate MR1 -i socketcan -c can0 --site mysite.toml
+  onboard operate hold MR1 -i socketcand-asyncio -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site small.toml
+      the same on a site served by: bus-sim run small --serve
+This bus is no safety channel: machines that can hurt somebody have an emergency stop of their own.
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """The command line of ``onboard operate``."""
+    parser = argparse.ArgumentParser(
+        prog="onboard operate",
+        description="Tell a site what a person has decided, on its own bus (docs/operate.md).",
+        epilog=EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    common.add_argument(
+        "--node",
+        type=int,
+        metavar="NODE",
+        help="speak under this node-ID, 251 to 255, that nobody else there has (default: the lowest that is not heard)",
+    )
+    common.add_argument("--yes", action="store_true", help="do not ask")
+    add_bus_arguments(common)
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def command(name: str, told: str) -> argparse.ArgumentParser:
+        return commands.add_parser(name, parents=[common], help=told, description=told)
+
+    status = command("status", "who lives, who stands and why; only listens")
+    status.add_argument("--for", type=float, dest="for_s", metavar="SECONDS", help="listen for so long")
+    stop = command("stop", "all machines stand, as long as this runs and 30 s more")
+    stop.add_argument(
+        "--for", type=float, dest="for_s", metavar="SECONDS", help="end by itself then; 0: once all have answered"
+    )
+    command("go", "lift the emergency stop").add_argument(
+        "--of", metavar="NODE", help="only the stop said by this machine or node-ID (default: all stops)"
+    )
+    block = command("block", "a segment cannot be passed, until clear")
+    block.add_argument("segment", metavar="SEGMENT", help="such as 'p(1,3)'")
+    block.add_argument("--reason", default="operator", help="a reason of the DBC (default: %(default)s)")
+    command("clear", "a segment can be passed again").add_argument(
+        "segment", metavar="SEGMENT", help="such as 'p(1,3)'"
+    )
+    command("hold", "a machine comes to rest, and stands").add_argument("machine", metavar="MACHINE")
+    command("release", "a machine that is held goes on").add_argument("machine", metavar="MACHINE")
+    regenerate = command("regenerate", "the rights of a machine whose journal is lost are made anew")
+    regenerate.add_argument("machine", metavar="MACHINE", help="whose rights; it holds, or is --absent")
+    regenerate.add_argument("--absent", default="", metavar="MACHINE", help="a machine that is off and locked off")
+    regenerate.add_argument(
+        "--body",
+        action="append",
+        metavar="SLOT",
+        help="where the body of the absent machine is: 'p(1,3)', or a lift's name for its platform; gone: nowhere",
+    )
+    regenerate.add_argument(
+        "--locked-off", default="", metavar="MACHINE", help="with --yes: the name that would have to be typed"
+    )
+    return parser
+
+
+def main(argv: Sequence[str]) -> int:
+    """Entry point; returns the exit status."""
+    parser = build_parser()
+    args = parser.parse_args(argv)
+    if not hasattr(args, "interface"):
+        parser.error("name a bus: -i INTERFACE -c CHANNEL")
+    try:
+        site = load_site(args.site)
+        if args.node is not None:
+            tool_of(args.node)
+        # Another life of this station begins elsewhere in the numbers of orders.
+        make = maker_of(site, wish_of(args), seed=time.time_ns() // 1_000_000_000)
+        settings = bus_settings(args, BusSettings(interface="", channel="", bitrate=site.bitrate))
+        return asyncio.run(_run(args, site, settings, make))
+    except (ConfigError, BusOpenError, OperateError) as error:
+        for line in str(error).splitlines():
+            print(line if isinstance(error, ConfigError) else f"onboard operate: {line}", file=sys.stderr)
+        return MISTAKE
+
+
+def wish_of(args: argparse.Namespace) -> Wish:
+    """What a command line asks for."""
+    seconds = getattr(args, "for_s", None)
+    return Wish(
+        args.command,
+        machine=getattr(args, "machine", ""),
+        segment=getattr(args, "segment", ""),
+        reason=getattr(args, "reason", "operator"),
+        of=getattr(args, "of", None) or "",
+        absent=getattr(args, "absent", ""),
+        body=tuple(args.body) if getattr(args, "body", None) else None,
+        for_us=None if seconds is None else round(seconds * 1e6),
+    )
+
+
+async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make: Maker) -> int:
+    bus = await open_bus(settings)
+    system = system_of(site)
+    station = Station(site, codecs(system.name, system.messages).fleet, bus, _tell)
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, station.interrupt)
+    lost = loop.create_task(_watch(bus.wait_lost, station))
+    try:
+        asker = Asker(station, _tell, is_agreed=args.yes, typed=getattr(args, "locked_off", ""))
+        return await station.operate(make, args.node, asker.agrees)
+    finally:
+        lost.cancel()
+        await bus.close()
+
+
+async def _watch(wait_lost: Callable[[], Awaitable[str]], station: Station) -> None:
+    station.lose(await wait_lost())
+
+
+def _tell(line: str) -> None:
+    print(line, flush=True)

@@ -1,0 +1,38 @@
+"""Who may say what on a fleet bus: the senders that the DBC names (``BO_TX_BU_``), as kinds of machine."""
+
+from collections.abc import Iterable, Mapping
+
+from onboard.core.codes import KindCode
+from onboard.core.messages import CallForProposals, Itinerary, Message, Speakers
+from onboard.wire.dbc_file import MessageLayout
+
+#: The node of the fleet contract that stands for people's tools and bridges to other buses.
+GATEWAY = "Gateway"
+#: The node of the fleet contract that each kind is.
+_ROLES: dict[KindCode, str] = {
+    KindCode.ROBOT: "Robot",
+    KindCode.LIFT: "Lift",
+    KindCode.COMPARTMENT: "Compartment",
+    KindCode.OBSERVER: GATEWAY,
+}
+#: What machines of all other kinds are there; in the contract of their system they go by their kind's name.
+_MACHINE = "Machine"
+#: The first frame of each message that travels as a set of frames.
+_SETS: dict[str, type[Message]] = {"Call": CallForProposals, "ItineraryHead": Itinerary}
+
+
+def is_in(kind: KindCode, nodes: Iterable[str]) -> bool:
+    """Whether a kind of machine is among a contract's nodes."""
+    roles = {_ROLES[kind]} if kind in _ROLES else {_MACHINE, kind.name.capitalize()}
+    return not roles.isdisjoint(nodes)
+
+
+def speakers_of(layouts: Iterable[MessageLayout], classes: Mapping[str, type[Message]]) -> Speakers:
+    """By class of message the kinds that may say it; ``classes`` are those that travel as one frame, by DBC name."""
+    found: dict[type[Message], frozenset[KindCode]] = {}
+    for layout in layouts:
+        cls = _SETS.get(layout.name) or classes.get(layout.name)
+        if cls is not None:
+            kinds = (kind for kind in KindCode if kind is not KindCode.ANY and is_in(kind, layout.senders))
+            found[cls] = frozenset(kinds)
+    return found

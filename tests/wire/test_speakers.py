@@ -1,0 +1,38 @@
+"""What kinds may say, by the DBC of each system."""
+
+import pytest
+
+from onboard.core.codes import KindCode
+from onboard.core.messages import Award, Blocked, CallForProposals, EmergencyStop, Itinerary, OperatorOrder, TokenGrant
+from onboard.core.recovery_messages import Go
+from onboard.kinds.graph.messages import NodeAnswer, VisitList
+from onboard.kinds.registry import _SYSTEMS as SYSTEMS
+from onboard.wire.codec import codecs, fleet_codec
+
+_EVERYBODY = frozenset(KindCode) - {KindCode.ANY}
+_GATEWAY = KindCode.OBSERVER
+_MACHINES = _EVERYBODY - {_GATEWAY}
+
+
+def test_the_dbcs_senders_as_kinds() -> None:
+    speakers = fleet_codec().speakers
+    assert speakers[EmergencyStop] == speakers[CallForProposals] == speakers[Award] == _EVERYBODY
+    assert speakers[TokenGrant] == _MACHINES
+    assert speakers[Itinerary] == _MACHINES - {KindCode.COMPARTMENT}
+    assert speakers[Go] == speakers[OperatorOrder] == {_GATEWAY}
+    assert speakers[Blocked] == {KindCode.LIFT, KindCode.COMPARTMENT, _GATEWAY}
+
+
+def test_what_a_system_adds() -> None:
+    graph = SYSTEMS["graph"]
+    speakers = codecs(graph.name, graph.messages).fleet.speakers
+    assert speakers[NodeAnswer] == {KindCode.NODE}
+    assert speakers[VisitList] == {KindCode.DESK, _GATEWAY}
+
+
+@pytest.mark.parametrize("name", sorted(SYSTEMS))
+def test_every_message_of_a_fleet_bus_has_a_kind_of_its_system_or_a_gateway_that_says_it(name: str) -> None:
+    system = SYSTEMS[name]
+    codec = codecs(name, system.messages).fleet
+    own = [cls for cls in system.messages if cls in codec.speakers]
+    assert all(codec.speakers[cls] & ({*system.factories, _GATEWAY}) for cls in own)
