@@ -347,6 +347,8 @@ class Holon:
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self.time.elect(self.clock.local_us(now_us))
+        if self.holding.is_apart:
+            return []
         return self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
@@ -386,6 +388,7 @@ class Holon:
     def _new_life(self, now_us: int) -> tuple[int, list[Effect]]:
         """As after a restart: the boot counter, and the question to all what they know."""
         self.boot = self.witness.boot = self.boot % 255 + 1
+        self.witness.has_past = True
         return self.boot, self.witness.begin(now_us)
 
     def last_word(self, reason: Reason) -> Halted:

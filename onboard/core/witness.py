@@ -100,6 +100,8 @@ class Witness:
         self._since_us = now_us
         self._ask_at_us = now_us + self.site.timing.heartbeat_us
         self.tokens.asked = set(self._others)
+        # Who comes back after a hold asks anew: what was answered before that is old.
+        self.answered.clear()
         return [*self.tokens.testimony(), Send(SyncRequest(self.node_id, NOBODY))]
 
     def shift(self, by_us: int) -> None:

@@ -94,11 +94,12 @@ def test_a_babbling_node_loads_the_bus_and_is_gone_afterwards() -> None:
     assert seen.simulation.controllers[ROBOT].holon.halted is None
 
 
-def test_a_second_board_with_the_same_node_id_stops_the_machine() -> None:
-    seen = watch("double_id:target=MR1,at_s=12", seconds=20)
-    halted = seen.simulation.controllers[ROBOT].holon.halted
-    assert halted is not None
-    assert "node-ID" in halted
+def test_a_second_board_with_the_same_node_id_holds_the_machine_while_it_is_there() -> None:
+    during = watch("double_id:target=MR1,at_s=12,for_s=5", seconds=16).simulation.controllers[ROBOT].holon
+    assert during.holding.is_held
+    assert during.halted is None
+    after = watch("double_id:target=MR1,at_s=12,for_s=5", seconds=30).simulation.controllers[ROBOT].holon
+    assert (after.holding.is_held, after.boot) == (False, 2)
 
 
 # --- controllers and clocks ------------------------------------------------------------------------------------
