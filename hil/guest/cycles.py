@@ -2,7 +2,8 @@
 
 The machines of a small park run as on boards, each in a namespace of its own, on the Linux CAN stack; a car comes in
 before and is fetched after. Every cycle tells how long it took, in the guest's time, until all machines took part
-again and knew the same plans. The bounds: ``LIVES_ON_S`` where the process lives on, ``STARTS_S`` where it starts, loading included.
+again and knew the same plans. The bounds: ``LIVES_ON_S`` where the process lives on, ``STARTS_S`` where it starts,
+loading included.
 """
 
 import argparse
