@@ -63,11 +63,15 @@ async def _agrees(_: Order) -> bool:
 def wish_of(injection: Injection) -> Wish:
     """The command that a fault of kind ``operate`` means."""
     do, seconds = injection.text("do"), injection.number("for_s")
+    segment = f"p({injection.count('track')},{injection.count('index')})"
+    is_absent = injection.text("absent") == "yes"
     return Wish(
         do,
         machine=injection.text("target"),
-        segment=f"p({injection.count('track')},{injection.count('index')})",
+        segment=segment,
         of=injection.text("target") if do == "go" else "",
+        absent=injection.text("target") if is_absent else "",
+        body=(segment,) if is_absent else None,
         for_us=round(seconds * 1e6) if do == "stop" else None,
     )
 

@@ -94,6 +94,11 @@ class Controller:
         """Whether no journal write is under way, so that a frame is taken up at once."""
         return self._writing is None and not self._inbox
 
+    def look_at_clock(self) -> None:
+        """The holon's clock was set from outside: its next wish may come sooner than it was."""
+        if self._writing is None:
+            self._set_timer()
+
     def wire_drops(self) -> Counter[Reason]:
         """Frames of both buses that came to nothing below the holon, by reason."""
         return self._decoders[0].drops + self._decoders[1].drops + self._queue_drops

@@ -4,13 +4,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from onboard.core.codes import NOBODY, Reason
+from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason
 from onboard.core.site import Machine, Site
+from onboard.kinds.car_park.site import CarPark
+from onboard.operate.assignment import Body
 from onboard.operate.blocks import Mark
 from onboard.operate.holds import Hold
-from onboard.operate.names import OperateError, machine_of, movable_of, node_of, reason_of, segment_of
+from onboard.operate.names import OperateError, machine_of, movable_of, node_of, reason_of, segment_of, slot_of
 from onboard.operate.order import Order
 from onboard.operate.park import Park
+from onboard.operate.regenerate import Lost, Regenerate
 from onboard.operate.status import Status
 from onboard.operate.stops import GoAgain, LetGo, Stop
 
@@ -18,6 +21,9 @@ from onboard.operate.stops import GoAgain, LetGo, Stop
 LISTEN_BEATS = 2
 #: A machine that holds for this has rights that nobody knows any more: letting it go is not enough.
 _RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
+
+#: A body that is in no slot of the site any more.
+GONE = "gone"
 
 #: Makes the order from what was heard and the station's node-ID. May raise ``OperateError``.
 Maker = Callable[[Park, int], Order]
@@ -33,6 +39,9 @@ class Wish:
     reason: str = "operator"
     of: str = ""
     for_us: int | None = None
+    #: Of regenerate: who is locked off, and the slots of its body; empty where it has been taken out of the site.
+    absent: str = ""
+    body: tuple[str, ...] | None = None
 
 
 def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
@@ -54,7 +63,31 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
             return partial(Hold, machine=movable_of(site, wish.machine), holds=True, seed=seed)
         case "release":
             return partial(_release, site=site, machine=machine_of(site, wish.machine), seed=seed)
+        case "regenerate":
+            return partial(Regenerate, who=_lost_of(site, wish))
     raise OperateError(f"{wish.command}: no command")
+
+
+def _lost_of(site: Site, wish: Wish) -> Lost:
+    """Who lost its rights, who is locked off, and where the body of that one is. Raises ``OperateError``."""
+    lost = machine_of(site, wish.machine)
+    if not isinstance(site, CarPark):
+        raise OperateError(
+            f"{wish.machine}: only the rights of a car park are made anew; {site.name} is a {site.system}"
+        )
+    if not wish.absent:
+        if wish.body is not None:
+            raise OperateError("--body: goes with --absent; a machine that lives says itself where it is")
+        return Lost(lost.node_id)
+    absent = machine_of(site, wish.absent)
+    if absent.kind not in MOBILE_KINDS:
+        return Lost(lost.node_id, absent.node_id, Body.of_fixed(site, absent))
+    if wish.body is None:
+        raise OperateError(
+            f"--absent {absent.name}: where is its body? give --body 'p(1,3)' for each slot of it, or --body gone"
+        )
+    slots = [slot_of(site, text) for text in wish.body if text != GONE]
+    return Lost(lost.node_id, absent.node_id, Body.of_segments(site, slots))
 
 
 def _release(park: Park, node: int, *, site: Site, machine: Machine, seed: int) -> Order:

@@ -230,9 +230,14 @@ def ends_at(site: Site, step: Step) -> Segment:
 
 
 def _later(steps: list[Step], by_us: int) -> list[Step]:
-    """The same steps later (or earlier); a planned wait keeps its end and takes up a delay as far as it can."""
+    """The same steps later (or earlier); a planned wait keeps its end and takes up a delay as far as it can.
+
+    So does time that no step fills: behind a run that is very late, what follows may have been planned anew already.
+    """
     shifted: list[Step] = []
     for step in steps:
+        if shifted and by_us > 0:
+            by_us = max(0, min(by_us, shifted[-1].end_us - step.begin_us))
         moved = step.shifted(by_us)
         if step.action is LegAction.STAND:
             moved = moved._replace(end_us=max(moved.begin_us, step.end_us))

@@ -22,7 +22,8 @@ RECORDS: Rules = {
     "riding": (Keep("riding"),),
     "floor": (Keep("floor"), End(("riding",))),
     # bay_memory.py: custody of cars, and the bay's own task. ``car_left`` of the core ends what is about a car.
-    "car_at": (Keep("car_at", _CAR),),
+    # In the order in which cars first came.
+    "car_at": (Keep("car_at", _CAR, Which.FIRST_AND_NEWEST),),
     "winner": (Keep("winner", _CAR),),
     "ticket": (Keep("ticket", _CAR, Which.ALL),),
     "job": (Keep("job"), End(("ticket",), _CAR, ("operation", (int(Operation.RETRIEVE),)))),

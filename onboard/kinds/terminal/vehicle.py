@@ -7,12 +7,13 @@ section 5), so a wrong mirror costs time and nothing else. In an area every vehi
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import MotionState, TokenKey, authorised, car_token, segment_token
+from onboard.core.authority import TokenKey, car_token, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.terminal.body import Body
@@ -263,7 +264,7 @@ class Vehicle:
         tokens = self.fleet.tokens
         for key in [one for one in tokens.wanted if one.kind is TokenKind.SEGMENT and one not in keep]:
             tokens.forget(key)
-        for key in [one for one in tokens.held if one.kind is TokenKind.SEGMENT and one not in keep]:
+        for key in [one for one in tokens.mine() if one.kind is TokenKind.SEGMENT and one not in keep]:
             effects += tokens.give(key, self.site.stewards[key.number >> 8], now_us)
         return effects
 
@@ -350,7 +351,7 @@ class Vehicle:
         return car_token(*self.site.box(box))
 
     def _box_at(self, box: int, station: int) -> CarAt:
-        version = self.fleet.tokens.seen.get(self._box_token(box), 0)
+        version = self.fleet.tokens.version_of(self._box_token(box))
         return CarAt(self.fleet.node_id, self.site.box(box), station, version, NO_WHEELBASE_MM)
 
     def _state_box(self, box: int, station: int) -> list[Effect]:

@@ -140,6 +140,9 @@ class BidsInTime(_CallRule):
         due_us = seen.due_us
         if times_us and (due_us is None or min(times_us) <= due_us + CLOCK_TOLERANCE_US):
             return
+        if times_us and seen.event.time_us < self.picture.clock_settles_us:
+            # The caller's deadline was over when its own clock said so.
+            return
         seen.told = True
         late_us = min(times_us) - (due_us or 0) if times_us else 0
         what = f"bid {late_us} us after the deadline" if times_us else "never bid"

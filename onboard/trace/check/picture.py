@@ -97,7 +97,7 @@ class Picture:
             case BusTime(bus_time_us=bus_us):
                 before_us, self.offset_us = self.offset_us, time_us - bus_us
                 if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
-                    self.clock_settles_us = time_us + SETTLING_US
+                    self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
             case TokenGrant() as grant:
                 self.tokens.on_grant(grant, time_us)
             case TokenHeld() as held:
