@@ -29,7 +29,7 @@ LIVES_ON_S, STARTS_S = 10.0, 60.0
 LOAD_S = 10.0
 ROOT = Path(__file__).parents[2]
 #: What a cycle may take of the guest's time, s, and what everything else does.
-_CYCLE_S, _REST_S = 25, 240
+_CYCLE_S, _REST_S = 14, 300
 #: Added to the site: machines so fast that a car is in and out again in a minute and a half.
 _QUICK = """
 [carrier]
