@@ -47,12 +47,12 @@ def scene(site: SiteRun) -> dict[str, object]:
 
     status = site.statuses(["plant"], 150)
     site.tell("the plant's run is over")
+    stopped_at = len(ears.read())
     site.tool("cansend", "can0", plan["stop"])
     held: dict[str, str] = plan["held"]
-    for name, word in held.items():
-        site.wait(ears, f"{name} holds", lambda word=word: any(f.startswith(word) for f in ears.frames), 20)
+    everybody = "everybody holds, and says so"
+    site.wait(ears, everybody, lambda: set(held.values()) <= set(ears.frames[stopped_at:]), 20)
     status |= site.end(site.order.machines)
-    site.tell("all have ended")
     site.end(["candump", "candump-outside", "monitor"])
 
     part = site.share / "part.log"
