@@ -1,72 +1,43 @@
 """Authority: versioned tokens, each with exactly one holder, and the one function that permits motion.
 
-Rules (design, section 5): a right moves only by *erase, journal, then send*; it is accepted only if addressed to me and
-newer than anything seen; nothing is taken back because of a time-out. A lost grant is said again until the new holder
-is heard, so losing frames costs time and never doubles a token.
+Rules (design, section 5): a right moves only by *erase, journal, then send*; it is accepted only if addressed to me,
+newer than all that I did with it, and from whom I believe to hold it; nothing is taken back because of a time-out, and
+what I hold leaves by my own hand only. A lost grant is said again until the new holder is heard, so losing frames costs
+time and never doubles a token. Whatever ends a grant is in the journal, so that no replay revives it.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, KindCode, Reason, TokenKind
-from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import TokenGrant, TokenHeld, TokenRefusal, TokenRequest
-from onboard.core.serial import is_newer, successor
-from onboard.core.site import Segment, Site, Station
+from onboard.core.belief import Belief, Beliefs, Key
+from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason, TokenKind
+from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
+from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
+from onboard.core.site import Segment, Site
+from onboard.core.token_keys import TokenKey, car_token, genesis_holder, may_exist, segment_token, station_token
 
-#: Bits of a version in ``TokenGrant`` and ``TokenHeld``: 163 years of the busiest slot, so that it never wraps.
-_VERSION_BITS = 28
+__all__ = [
+    "Claim",
+    "MotionState",
+    "TokenBook",
+    "TokenKey",
+    "authorised",
+    "car_token",
+    "genesis_holder",
+    "may_exist",
+    "segment_token",
+    "station_token",
+]
+
+#: Highest version of a token: 163 years of the busiest slot, so that it never wraps (28 bits in dbc/fleet.dbc).
+MAX_VERSION = (1 << 28) - 1
 #: Whoever was refused asks again after this many token repeats: the holder remembers the request. Ours.
 REFUSED_REPEATS = 5
 #: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst. Ours.
 IN_FLIGHT_US = 20_000
-
-
-class TokenKey(NamedTuple):
-    """Which token: its kind and 24-bit number."""
-
-    kind: TokenKind
-    number: int
-
-
-def segment_token(segment: Segment) -> TokenKey:
-    """The token of one body slot."""
-    return TokenKey(TokenKind.SEGMENT, segment.number)
-
-
-def station_token(station: Station) -> TokenKey:
-    """The token of one place, or of a compartment's bay: who holds it may send a shuttle in."""
-    return TokenKey(TokenKind.STATION, station.number)
-
-
-def car_token(origin: int, number: int) -> TokenKey:
-    """The token of one car: its holder is the custodian."""
-    return TokenKey(TokenKind.CAR, origin << 16 | number)
-
-
-def genesis_holder(site: Site, key: TokenKey) -> int:
-    """Who holds a token before it first moves, by the site file alone.
-
-    A robot holds the segment of its home, a compartment its bay; the track's steward holds all other segments and
-    places. Cars and tasks are made by their origin node.
-    """
-    if key.kind in (TokenKind.CAR, TokenKind.TASK):
-        return key.number >> 16
-    if key.kind is TokenKind.SEGMENT:
-        for machine in site.machines.values():
-            if machine.kind is KindCode.ROBOT and machine.home.number == key.number:
-                return machine.node_id
-    else:
-        for node_id, station in site.compartments.items():
-            if station.number == key.number:
-                return node_id
-    return site.stewards.get(key.number >> 8, 0)
-
-
-def may_exist(site: Site, key: TokenKey) -> bool:
-    """Whether the site has such a token, so that no frame can fill the book with what nobody ever made."""
-    return genesis_holder(site, key) in site.machines
 
 
 class Claim(NamedTuple):
@@ -100,7 +71,7 @@ class Grant(NamedTuple):
 
 @dataclass
 class TokenBook:
-    """One node's tokens: those it holds, those it gave away and has not heard of yet, and all it saw of others.
+    """One node's tokens: those it holds, those it gave away and has not heard of yet, and whom it believes of others.
 
     Pure: every method takes the time (bus time, us) and returns effects in the order in which they must happen.
     """
@@ -109,8 +80,11 @@ class TokenBook:
     node_id: int
     held: dict[TokenKey, int] = field(default_factory=dict)
     leaving: dict[TokenKey, Grant] = field(default_factory=dict)
+    #: The newest version under which this node itself held a token, or gave it away: what it takes must be newer.
     seen: dict[TokenKey, int] = field(default_factory=dict)
-    holder: dict[TokenKey, int] = field(default_factory=dict)
+    #: To whom each token went that this node gave away last, and under which version: what it answers to a dispute.
+    given: dict[TokenKey, Belief] = field(default_factory=dict)
+    beliefs: Beliefs = field(init=False)
     wanted: dict[TokenKey, int] = field(default_factory=dict)
     refused: dict[TokenKey, Reason] = field(default_factory=dict)
     #: What to say with a request for a token, from this node's plan and mirror.
@@ -122,11 +96,23 @@ class TokenBook:
     #: Tokens asked for without an agreed order, and since when the holder's view of the order has differed from mine.
     unordered: set[TokenKey] = field(default_factory=set)
     behind_since_us: dict[TokenKey, int] = field(default_factory=dict)
-    #: Whether tokens never seen to move count as with their first holders: not while my journal may be lost.
-    genesis_counts: bool = True
+    #: Whether what the journal says is mine may be used: not before all that live have answered after a start.
+    is_synced: bool = True
+    #: Nodes asked for all that they vouch for that have not ended their answer: what they say they hold is believed.
+    asked: set[int] = field(default_factory=set)
+    #: Words that came to nothing, by reason: the holon's own count; and who claimed a right of mine how often.
+    drops: Counter[Reason] = field(default_factory=Counter)
+    claimants: Counter[int] = field(default_factory=Counter)
     #: Grows with every change of the tables above, so that nobody need look twice at the same state.
     changes: int = 0
-    _genesis: dict[TokenKey, int] = field(default_factory=dict)
+    _genesis: dict[Key, int] = field(default_factory=dict)
+    #: Grants to me from whom I do not believe to hold the token, until that is settled.
+    _disputed: dict[TokenKey, TokenGrant] = field(default_factory=dict)
+    #: When a word of a class about a token may be said again, so that many who ask are answered once.
+    _said_us: dict[tuple[TokenKey, type[Message]], int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.beliefs = Beliefs(self._first_holder)
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
@@ -136,39 +122,57 @@ class TokenBook:
             if entry.get("record") not in ("token_held", "token_given", "token_gone"):
                 continue
             key = TokenKey(TokenKind(int(entry["kind"])), int(entry["number"]))
-            version = int(entry["version"])
-            self.seen[key] = version
+            version, holder = int(entry["version"]), int(entry["holder"])
+            self.seen[key] = max(version, self.seen.get(key, 0))
             self.held.pop(key, None)
             self.leaving.pop(key, None)
+            has_come = entry["record"] != "token_given"
+            self.beliefs.take_up(key, version, holder, confirmed=has_come)
             if entry["record"] == "token_held":
                 self.held[key] = version
-            elif entry["record"] == "token_given":
-                self.holder[key] = int(entry["holder"])
-                self.leaving[key] = Grant(version, int(entry["holder"]), 0)
+            else:
+                self.given[key] = Belief(version, holder, has_come)
+            if entry["record"] == "token_given":
+                self.leaving[key] = Grant(version, holder, 0)
 
     def holds(self, key: TokenKey) -> bool:
         """Whether this node is the holder now; a token never seen to move is with its genesis holder."""
-        if key in self.held:
-            return True
-        return self.genesis_counts and self._is_own_at_first(key)
+        return self.is_synced and self.is_mine_by_journal(key)
+
+    def is_mine_by_journal(self, key: TokenKey) -> bool:
+        """Whether this node holds a token if its journal is all that ever was."""
+        return key in self.held or self._is_own_at_first(key)
+
+    def mine(self) -> list[TokenKey]:
+        """Tokens that came to this node and that it may use or give away now."""
+        return list(self.held) if self.is_synced else []
 
     def holder_of(self, key: TokenKey) -> int:
         """Who holds a token as far as this node heard: exact for its own, a hint for others."""
-        if self.holds(key):
-            return self.node_id
-        return self.holder.get(key, self._first_holder(key))
+        return self.node_id if self.holds(key) else self.beliefs.latest(key).holder
 
-    def trust_genesis(self) -> None:
-        """Nobody knew an earlier life of this node: what the site file gives it first is its own."""
-        self.genesis_counts = True
+    def version_of(self, key: TokenKey) -> int:
+        """The newest version of a token that is known for sure, 0 where it never moved."""
+        return max(self.seen.get(key, 0), self.beliefs.of(key).version)
+
+    def own_version(self, key: TokenKey) -> int:
+        """The version under which this node holds a token, or gave it away last; 0 where it never had it but first."""
+        return self.held.get(key, self.seen.get(key, 0))
+
+    def is_known(self, key: TokenKey) -> bool:
+        """Whether anything was ever heard of a token."""
+        return key in self.seen or key in self.beliefs.verified or key in self.beliefs.hints
+
+    def trust(self) -> None:
+        """Nobody knows better than the journal: what it says is mine, and what the site file gives me first, is."""
+        self.is_synced = True
         self.changes += 1
 
     def create(self, key: TokenKey) -> list[Effect]:
         """Bring a new token (of a car) into the world, held by this node. Raises ``ValueError`` where it exists."""
-        if key in self.seen or key in self.held:
+        if self.is_known(key):
             raise ValueError(f"token {key} exists already")
-        self.held[key] = self.seen[key] = 1
-        self.changes += 1
+        self._hold(key, 1)
         return [self._record("token_held", key, 1, self.node_id)]
 
     def retire(self, key: TokenKey) -> bool:
@@ -178,14 +182,16 @@ class TokenBook:
         """
         if key in self.leaving or key in self.wanted:
             return False
-        for table in (self.seen, self.holder, self.held, self._genesis):
+        for table in (self.seen, self.held, self.given, self._genesis, self._disputed):
             table.pop(key, None)
+        self.beliefs.forget(key)
+        self._said_us = {said: due_us for said, due_us in self._said_us.items() if said[0] != key}
         self.changes += 1
         return True
 
     def want(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Ask for a token until it is granted or no longer wanted. Nothing happens where it is held or asked for."""
-        if self.holds(key) or key in self.wanted or self._is_own_at_first(key):
+        if self.is_mine_by_journal(key) or key in self.wanted:
             return []
         self.wanted[key] = now_us
         self.changes += 1
@@ -199,20 +205,29 @@ class TokenBook:
         self.behind_since_us.pop(key, None)
 
     def give(self, key: TokenKey, to: int, now_us: int) -> list[Effect]:
-        """Move a held token to node ``to``: erase, journal, then send. Raises ``ValueError`` where it is not held."""
+        """Move a held token to node ``to``: erase, journal, then send.
+
+        Raises ``ValueError`` where it is not held, or has moved so often that no version is left for it.
+        """
         if not self.holds(key):
             raise ValueError(f"node {self.node_id} gives {key} which it does not hold")
-        version = successor(self.held.pop(key, self.seen.get(key, 0)), _VERSION_BITS)
+        version = self.own_version(key) + 1
+        if version > MAX_VERSION:
+            raise ValueError(f"{key} has no version left after {MAX_VERSION}: regenerate the tokens of this site")
+        self.held.pop(key, None)
         self.changes += 1
         self.seen[key] = version
-        self.holder[key] = to
+        self.given[key] = Belief(version, to)
+        self.beliefs.take_up(key, version, to)
         self.leaving[key] = Grant(version, to, now_us + self.site.timing.token_repeat_us)
         return [self._record("token_given", key, version, to), Send(self._grant(key, version, to))]
+
+    # --- words of others ---------------------------------------------------------------------------------------
 
     def on_request(self, request: TokenRequest, verdict: Reason, now_us: int) -> list[Effect]:
         """Answer a request for a token held here: ``verdict`` NONE grants, any other reason refuses and says so."""
         key = TokenKey(request.token_kind, request.token)
-        pending = self.leaving.get(key)
+        pending = self.leaving.get(key) if self.is_synced else None
         if pending is not None and pending.holder == request.sender:
             if now_us < pending.repeat_at_us - self.site.timing.token_repeat_us + IN_FLIGHT_US:
                 return []
@@ -221,42 +236,54 @@ class TokenBook:
             return []
         if verdict is Reason.NONE:
             return self.give(key, request.sender, now_us)
-        version = self.held.get(key, self.seen.get(key, 0))
-        return [Send(TokenRefusal(self.node_id, key.kind, key.number, _told(version), request.sender, verdict))]
+        version = _told(self.own_version(key))
+        return [Send(TokenRefusal(self.node_id, key.kind, key.number, version, request.sender, verdict))]
 
     def on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
-        """Accept a token only if addressed to me and newer than anything seen; else learn where it went.
+        """Accept a token if addressed to me, newer than all that I did with it, and from whom I believe to hold it.
 
-        One that needs another word first is as if it had not been heard: its giver says both again.
+        One that needs another word first is as if it had not been heard: its giver says both again. Else learn where it
+        went.
         """
         key = TokenKey(grant.token_kind, grant.token)
-        if not self.is_news(key, grant.version):
-            return self._say_again(key, grant)
-        first = self.before_taking(grant) if grant.holder == self.node_id else []
-        if first is None:
-            return []
-        self._learn(key, grant.version, grant.holder)
         if grant.holder != self.node_id:
-            return []
-        self.held[key] = grant.version
-        self.changes += 1
-        self.forget(key)
-        return [
-            *first,
-            self._record("token_held", key, grant.version, self.node_id),
-            Send(TokenHeld(self.node_id, key.kind, key.number, grant.version)),
-        ]
+            return self._overheard(key, grant.sender, grant.version, grant.holder, now_us)
+        return self._offered(key, grant, now_us)
 
-    def on_held(self, statement: TokenHeld) -> list[Effect]:
-        """The new holder speaks: its grant need not be repeated."""
+    def on_held(self, statement: TokenHeld, now_us: int = 0) -> list[Effect]:
+        """The new holder speaks: its grant need not be repeated. Who is not believed to hold it is a claimant."""
         key = TokenKey(statement.token_kind, statement.token)
-        pending = self.leaving.get(key)
-        if pending is not None and pending.version == statement.version and pending.holder == statement.sender:
-            del self.leaving[key]
-            return [self._record("token_gone", key, statement.version, statement.sender)]
-        if self.is_news(key, statement.version):
-            self._learn(key, statement.version, statement.sender)
-        return []
+        sender, version = statement.sender, statement.version
+        if self.holds(key):
+            is_old = version < self.own_version(key)
+            return self._tell_seen(key, now_us) if is_old else self._claimed(key, sender, now_us)
+        belief = self.beliefs.of(key)
+        if belief == (version, sender, True):
+            return []
+        if sender == belief.holder and version >= belief.version:
+            return self._verified(key, version, sender, now_us, confirmed=True)
+        if version <= belief.version:
+            return self._tell_seen(key, now_us) if key in self.seen else []
+        if sender in self.asked:
+            return self._verified(key, version, sender, now_us, confirmed=True)
+        self.beliefs.hint(key, version, sender)
+        return self._dispute(key, version, now_us)
+
+    def on_given(self, word: TokenGiven, now_us: int) -> list[Effect]:
+        """Whoever was believed to hold a token says to whom it gave it: the chain of beliefs goes on from there."""
+        return self._overheard(TokenKey(word.token_kind, word.token), word.sender, word.version, word.holder, now_us)
+
+    def on_dispute(self, dispute: TokenDispute, now_us: int) -> list[Effect]:
+        """Somebody believes that I hold a token which another gave away: say what my journal knows of it."""
+        if dispute.believed != self.node_id:
+            return []
+        return self._answer(TokenKey(dispute.token_kind, dispute.token), now_us)
+
+    def on_seen(self, word: TokenSeen) -> None:
+        """Somebody tells the newest that it knows: a hint."""
+        key = TokenKey(word.token_kind, word.token)
+        self.beliefs.hint(key, word.version, word.holder)
+        self.changes += 1
 
     def on_refusal(self, refusal: TokenRefusal, now_us: int) -> None:
         """Remember why the holder does not give a wanted token yet; as it remembers the request, ask less often."""
@@ -270,19 +297,30 @@ class TokenBook:
             self.wanted[key] = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
             self.changes += 1
 
+    # --- what is said without being asked --------------------------------------------------------------------------
+
     def statements(self) -> list[Effect]:
         """What this node holds away from the site file's first holders, said for a node that asks."""
         return [Send(TokenHeld(self.node_id, key.kind, key.number, version)) for key, version in self.held.items()]
 
+    def testimony(self) -> list[Effect]:
+        """What the journal says that this node holds and has under way, for others to compare with what they know."""
+        gone = [
+            Send(TokenGiven(self.node_id, *key, grant.version, grant.holder)) for key, grant in self.leaving.items()
+        ]
+        return [*self.statements(), *gone]
+
     def wake(self, now_us: int) -> list[Effect]:
         """Say again what has waited long enough: wanted tokens, and grants whose receiver was not heard."""
         effects: list[Effect] = []
+        if not self.is_synced:
+            return effects
         repeat_us = self.site.timing.token_repeat_us
         for key, due_us in self.wanted.items():
             if due_us <= now_us:
                 self.wanted[key] = now_us + repeat_us
                 claim = no_claim(key) if key in self.unordered else self.claim(key)
-                effects.append(Send(TokenRequest(self.node_id, *key, _told(self.seen.get(key, 0)), *claim)))
+                effects.append(Send(TokenRequest(self.node_id, *key, _told(self.version_of(key)), *claim)))
         for key, grant in self.leaving.items():
             if grant.repeat_at_us <= now_us:
                 self.leaving[key] = grant._replace(repeat_at_us=now_us + repeat_us)
@@ -291,35 +329,127 @@ class TokenBook:
 
     def next_wake(self) -> int | None:
         """When something falls due to be said again, bus time in us."""
+        if not self.is_synced:
+            return None
         times = [*self.wanted.values(), *(grant.repeat_at_us for grant in self.leaving.values())]
         return min(times) if times else None
 
     def is_news(self, key: TokenKey, version: int) -> bool:
-        """Whether ``version`` of a token is newer than anything seen of it."""
-        return key not in self.seen or is_newer(version, self.seen[key], _VERSION_BITS)
+        """Whether ``version`` of a token is newer than all that is known of it, hints too."""
+        return version > max(self.seen.get(key, 0), self.beliefs.latest(key).version)
+
+    # --- inner works -----------------------------------------------------------------------------------------------
 
     def _is_own_at_first(self, key: TokenKey) -> bool:
         return key not in self.seen and self._first_holder(key) == self.node_id
 
-    def _first_holder(self, key: TokenKey) -> int:
+    def _first_holder(self, key: Key) -> int:
         found = self._genesis.get(key)
         if found is None:
-            found = self._genesis[key] = genesis_holder(self.site, key)
+            found = self._genesis[key] = genesis_holder(self.site, TokenKey(*key))
         return found
 
-    def _learn(self, key: TokenKey, version: int, holder: int) -> None:
-        # A newer version held elsewhere proves that my own grant arrived, or that my memory is older than the bus.
-        self.changes += 1
-        self.seen[key] = version
-        self.holder[key] = holder
-        self.held.pop(key, None)
+    def _hold(self, key: TokenKey, version: int) -> None:
+        self.held[key] = self.seen[key] = version
+        self.beliefs.take_up(key, version, self.node_id, confirmed=True)
         self.leaving.pop(key, None)
+        self._disputed.pop(key, None)
+        self.forget(key)
 
-    def _say_again(self, key: TokenKey, grant: TokenGrant) -> list[Effect]:
-        """A repeated grant of what I accepted means that my statement was lost: state it again."""
-        if grant.holder == self.node_id and self.held.get(key) == grant.version:
-            return [Send(TokenHeld(self.node_id, key.kind, key.number, grant.version))]
+    def _offered(self, key: TokenKey, grant: TokenGrant, now_us: int) -> list[Effect]:
+        if not self.is_synced:
+            return []
+        if grant.version <= self.seen.get(key, 0):
+            # A repeated grant of what I accepted means that my statement was lost.
+            return self._answer(key, now_us)
+        if self.holds(key):
+            return self._claimed(key, grant.sender, now_us)
+        belief = self.beliefs.of(key)
+        if grant.sender != belief.holder:
+            self.drops[Reason.NOT_THE_HOLDER] += 1
+            self._disputed[key] = grant
+            return self._dispute(key, grant.version, now_us)
+        return self._take(key, grant) if grant.version > belief.version else []
+
+    def _take(self, key: TokenKey, grant: TokenGrant) -> list[Effect]:
+        first = self.before_taking(grant)
+        if first is None:
+            return []
+        self._hold(key, grant.version)
+        return [
+            *first,
+            self._record("token_held", key, grant.version, self.node_id),
+            Send(TokenHeld(self.node_id, key.kind, key.number, grant.version)),
+        ]
+
+    def _overheard(self, key: TokenKey, giver: int, version: int, holder: int, now_us: int) -> list[Effect]:
+        """``giver`` says that it gave a token to ``holder``: believed of whom I believe to have held it."""
+        if self.holds(key):
+            return self._claimed(key, giver, now_us) if version > self.own_version(key) else []
+        belief = self.beliefs.of(key)
+        if version <= belief.version or holder == self.node_id:
+            # What is given to me comes with its grant.
+            return []
+        if giver == belief.holder:
+            return self._verified(key, version, holder, now_us)
+        self.beliefs.hint(key, version, holder)
+        self.changes += 1
         return []
+
+    def _verified(
+        self, key: TokenKey, version: int, holder: int, now_us: int, *, confirmed: bool = False
+    ) -> list[Effect]:
+        """The chain of beliefs goes on: my own grant has arrived with it, and a disputed one may be right now."""
+        self.changes += 1
+        self.beliefs.take_up(key, version, holder, confirmed=confirmed)
+        effects: list[Effect] = []
+        pending = self.leaving.get(key)
+        # Its receiver says that it holds the token, or that it gave it on: either proves that it had it.
+        if pending is not None and (confirmed or version > pending.version):
+            del self.leaving[key]
+            self.given[key] = Belief(pending.version, pending.holder, confirmed=True)
+            effects.append(self._record("token_gone", key, pending.version, pending.holder))
+        disputed = self._disputed.pop(key, None)
+        return effects if disputed is None else effects + self._offered(key, disputed, now_us)
+
+    def _claimed(self, key: TokenKey, by: int, now_us: int) -> list[Effect]:
+        """Somebody says that what I hold is not mine: counted, named, and I keep it and say so."""
+        self.drops[Reason.RIGHT_CLAIMED] += 1
+        self.claimants[by] += 1
+        first = [Report(f"node {by} claims {key.kind.name} {key.number}, which is mine")] * (self.claimants[by] == 1)
+        return [*first, *self._answer(key, now_us)]
+
+    def _answer(self, key: TokenKey, now_us: int) -> list[Effect]:
+        """What my journal knows of a token: that I hold it, or to whom I gave it; once for all who ask at a time."""
+        given = self.given.get(key)
+        word: Message
+        if self.holds(key):
+            word = TokenHeld(self.node_id, key.kind, key.number, self.own_version(key))
+        elif given is not None and self.is_synced:
+            word = TokenGiven(self.node_id, key.kind, key.number, given.version, given.holder)
+        else:
+            return []
+        return self._once(key, word, IN_FLIGHT_US, now_us)
+
+    def _tell_seen(self, key: TokenKey, now_us: int) -> list[Effect]:
+        """Somebody says that it holds a token under a version older than I know."""
+        version, holder, _ = self.beliefs.of(key)
+        if self.is_mine_by_journal(key):
+            version, holder = self.own_version(key), self.node_id
+        word = TokenSeen(self.node_id, key.kind, key.number, version, holder)
+        return self._once(key, word, self.site.timing.token_repeat_us, now_us)
+
+    def _dispute(self, key: TokenKey, version: int, now_us: int) -> list[Effect]:
+        believed = self.beliefs.of(key).holder
+        word = TokenDispute(self.node_id, key.kind, key.number, version, believed)
+        return self._once(key, word, self.site.timing.token_repeat_us // 2, now_us)
+
+    def _once(self, key: TokenKey, word: Message, period_us: int, now_us: int) -> list[Effect]:
+        """Say a word at most once in a period; the same as when it was said last, or not."""
+        if now_us < self._said_us.get((key, type(word)), now_us):
+            return []
+        self._said_us[key, type(word)] = now_us + period_us
+        return [Send(word)]
 
     def _grant_again(self, key: TokenKey, given: Grant) -> list[Effect]:
         grant = self._grant(key, given.version, given.holder)

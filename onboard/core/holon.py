@@ -40,11 +40,9 @@ from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted
 from onboard.core.rights import Rights
-from onboard.core.serial import is_newer
 from onboard.core.site import Machine, Site
+from onboard.core.witness import Witness
 
-#: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
-DIGEST_PATIENCE = 2
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
@@ -83,8 +81,6 @@ class Holon:
         entries = tuple(entries)
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
-        self.tokens.genesis_counts = self._has_past
-        self._trust_at_us: int | None = None
         self.mirror = Mirror(site, machine.node_id)
         for entry in entries:
             if entry.get("record") in ("blocked", "clear"):
@@ -108,10 +104,10 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
-        self.rights = Rights(self.fleet, self._may_grant)
+        self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
+        self.rights = Rights(self.fleet, self._may_grant, self.witness)
         self._heartbeat_due_us: int | None = None
         self._bus_time_due_us: int | None = None
-        self._mismatches: Counter[int] = Counter()
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
@@ -142,9 +138,6 @@ class Holon:
         """
         if not self.journal.is_reliable:
             return self._without_journal()
-        if not self._has_past:
-            # A first life, or a lost journal: peers that knew an earlier one have so long to say so.
-            self._trust_at_us = local_us + self.site.timing.heartbeat_us
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self._elect_time_source(local_us)
         now_us = self.clock.bus_us(local_us)
@@ -152,7 +145,7 @@ class Holon:
         effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
         effects += self.behaviour.start(now_us)
         effects += self._beat(now_us)
-        effects.append(Send(SyncRequest(self.node_id, NOBODY)))
+        effects += self.witness.begin(now_us)
         return self._settle(effects, now_us)
 
     def _without_journal(self) -> list[Effect]:
@@ -208,20 +201,17 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         self._elect_time_source(local_us)
-        if self._trust_at_us is not None and self._trust_at_us <= local_us:
-            self._trust_at_us = None
-            self.tokens.trust_genesis()
         now_us = self.clock.bus_us(local_us)
         effects = self._awake(now_us)
         effects += self._apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
         if not self.holding.is_apart:
-            effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
+            effects += self.witness.wake(now_us) + self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self._heartbeat_due_us = now_us
-        if not self._bus_time_lost and not self._is_still:
+        if not self._bus_time_lost and self._begins:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self._beat(now_us)
         return self._settle(effects, now_us)
@@ -232,15 +222,14 @@ class Holon:
             self._heartbeat_due_us,
             self._bus_time_due_us,
             self.holding.next_wake(),
+            None if self.holding.is_apart else self.witness.next_wake(),
             None if self.holding.is_apart else self.tokens.next_wake(),
             None if self.holding.is_apart else self.rights.petition_due(),
             self.presence.held_until_us,
-            None if self._is_still else self._negotiation_due(),
-            None if self._is_still else self.behaviour.next_wake(),
+            self._negotiation_due() if self._begins else None,
+            self.behaviour.next_wake() if self._begins else None,
         ]
         due = [self.clock.local_us(time) for time in times if time is not None]
-        if self._trust_at_us is not None:
-            due.append(self._trust_at_us)
         return min(due) if due and self.halted is None else None
 
     def _awake(self, now_us: int) -> list[Effect]:
@@ -249,7 +238,7 @@ class Holon:
             return []
         self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
         # One by one: all are asked at power-up only.
-        asked: list[Effect] = [Send(SyncRequest(self.node_id, node)) for node in self.mirror.peers]
+        asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
 
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
@@ -260,14 +249,19 @@ class Holon:
             machine = self.site.machines.get(message.sender)
             if machine is None or machine.kind in MOBILE_KINDS:
                 self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-            elif self.clock.adopt(message.bus_time_us, local_us):
+                return []
+            before_us = self.clock.bus_us(local_us)
+            if self.clock.adopt(message.bus_time_us, local_us):
+                self.witness.shift(self.clock.bus_us(local_us) - before_us)
                 self._heartbeat_due_us = self._bus_time_due_us = self.clock.bus_us(local_us)
             return []
         if self.machine.kind not in MOBILE_KINDS and self.clock.refutes(message.bus_time_us, local_us):
             return [Send(BusTime(self.node_id, self.clock.bus_us(local_us) % BUS_TIME_MODULUS))]
         first = not self.clock.is_set
         self._bus_time_lost = False
+        before_us = self.clock.bus_us(local_us)
         self.clock.heard(message.bus_time_us, local_us)
+        self.witness.shift(self.clock.bus_us(local_us) - before_us)
         effects: list[Effect] = []
         if first:
             now_us = self.clock.bus_us(local_us)
@@ -300,7 +294,7 @@ class Holon:
     def _may_not_bid(self, now_us: int) -> Reason:
         if self.clock.is_lost(self.clock.local_us(now_us)):
             return Reason.BUS_TIME_LOST
-        if self._is_still or self.behaviour.state in (
+        if not self._begins or self.behaviour.state in (
             MachineState.OBSTACLE,
             MachineState.STOPPED,
             MachineState.STARTING,
@@ -331,47 +325,19 @@ class Holon:
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self._elect_time_source(self.clock.local_us(now_us))
-        if fresh:
-            return [Send(SyncRequest(self.node_id, beat.sender, self.mirror.boots_before[beat.sender]))]
-        if beat.mirror_digest == self.mirror.digest():
-            del self._mismatches[beat.sender]
-            return []
-        self._mismatches[beat.sender] += 1
-        if self._mismatches[beat.sender] < DIGEST_PATIENCE:
-            return []
-        del self._mismatches[beat.sender]
-        return [Send(SyncRequest(self.node_id, beat.sender))]
+        return self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
             return []
-        if request.whom == self.node_id and self._has_forgotten(request):
-            return self._halt(
-                f"the journal is lost or old: node {request.sender} knew this node under boot {request.boot_before}; "
-                "a person must regenerate its tokens",
-                Reason.JOURNAL_LOST,
-                request.sender,
-            )
-        effects = self.behaviour.statements(now_us) + self._blocked_again()
-        known = self.mirror.peers.get(request.sender)
-        if (
-            request.whom == NOBODY
-            and known is not None
-            and known.since_us + self.site.timing.heartbeat_us // 2 < now_us
-        ):
-            # All are asked at power-up only: I knew it before, even where its counter is the same again.
-            effects.append(Send(SyncRequest(self.node_id, request.sender, known.boot)))
+        effects = self.witness.on_request(request, now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
             effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
         return effects
 
-    def _has_forgotten(self, request: SyncRequest) -> bool:
-        """Whether my journal lacks a life that a peer knew: tokens that I gave away then would seem to be mine."""
-        before = request.boot_before
-        if before == 0 or request.sender not in self.site.machines:
-            return False
-        return not self._has_past or is_newer(before, self.boot, 8)
+    def _statements(self, now_us: int) -> list[Effect]:
+        return self.behaviour.statements(now_us) + self._blocked_again()
 
     def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
         """A segment is blocked, or clear again; what I am steward of is in my journal."""
@@ -403,6 +369,11 @@ class Holon:
         """Whether this machine is an obstacle: it neither moves nor bids."""
         return self.presence.is_held or self.holding.is_held
 
+    @property
+    def _begins(self) -> bool:
+        """Whether this machine may begin anything: whoever was started again waits until all have answered."""
+        return not (self._is_still or self.witness.is_waiting)
+
     def _on_own_number(self, message: Message, now_us: int) -> list[Effect]:
         """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
         self.drops[Reason.DUPLICATE_NODE_ID] += 1
@@ -433,11 +404,11 @@ class Holon:
 
     def _come_back(self, now_us: int) -> list[Effect]:
         """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
-        self.boot = self.boot % 255 + 1
+        self.boot = self.witness.boot = self.boot % 255 + 1
         self.presence.listen_anew(now_us)
         records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": self.boot})]
-        ask: Effect = Send(SyncRequest(self.node_id, NOBODY))
-        return [*records, Report("comes back: nobody sends under its number any more"), *self._words(), ask]
+        told = Report("comes back: nobody sends under its number any more")
+        return [*records, told, *self._words(), *self.witness.begin(now_us)]
 
     def _words(self) -> list[Effect]:
         """My sign of life, and why I do not act where I do not."""
@@ -454,18 +425,24 @@ class Holon:
 
     def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
+        effects = effects + self._doubts()
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
-        for _ in range(0 if self._is_still else MAX_ROUNDS):
+        for _ in range(MAX_ROUNDS if self._begins else 0):
             more = self.behaviour.advance(now_us)
             if not more:
                 break
             effects = effects + more
         else:
-            if not self._is_still:
+            if self._begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
         self._own_number.note(effects)
         return effects
+
+    def _doubts(self) -> list[Effect]:
+        """Somebody knows that the journal is old: nothing of it is used any more."""
+        doubt = self.witness.doubt
+        return [] if doubt is None else self._halt(doubt.text, doubt.reason, doubt.cause)
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []

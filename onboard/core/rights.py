@@ -20,7 +20,9 @@ from onboard.core.messages import (
     TokenRefusal,
     TokenRequest,
 )
+from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
+from onboard.core.witness import Witness
 
 #: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
 ASK_AGAIN_US = 1_000_000
@@ -35,11 +37,13 @@ class Rights:
 
     fleet: Fleet
     may_grant: Callable[[TokenKey, int, int], Reason]
+    witness: Witness
     _asked_again_us: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.site, self.node_id, self.drops = self.fleet.site, self.fleet.node_id, self.fleet.drops
         self.tokens: TokenBook = self.fleet.tokens
+        self.tokens.drops = self.drops
         self.mirror, self.petitions = self.fleet.mirror, self.fleet.petitions
         self.tokens.claim = self._claim
 
@@ -50,11 +54,16 @@ class Rights:
             TokenGrant: self._on_grant,
             TokenHeld: self._on_held,
             TokenRefusal: self._on_refusal,
+            TokenDispute: self._on_dispute,
+            TokenGiven: self._on_given,
+            TokenSeen: self._on_seen,
+            SyncDone: self.witness.on_done,
         }
 
     def _on_request(self, request: TokenRequest, now_us: int) -> list[Effect]:
         key = TokenKey(request.token_kind, request.token)
         self.petitions.hear(key, request, now_us)
+        self.witness.hear(request)
         if not self.tokens.holds(key):
             return self.tokens.on_request(request, Reason.TOKEN_HELD_BY_OTHER, now_us)
         verdict = self.may_grant(key, request.sender, now_us)
@@ -99,26 +108,52 @@ class Rights:
 
     def _on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         key = TokenKey(grant.token_kind, grant.token)
-        if not may_exist(self.site, key):
-            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+        if not self._may_move(key, grant.holder):
             return []
-        if self.tokens.is_news(key, grant.version):
+        self.witness.hear(grant)
+        if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):
             if key.kind is TokenKind.SEGMENT:
                 self.mirror.order.on_return(grant.sender, Segment(key.number >> 8, key.number & 0xFF))
             self.petitions.close(key, grant.holder)
-        effects = self.tokens.on_grant(grant, now_us)
-        if self.tokens.holds(key):
-            self.petitions.returned(key, now_us)
-            effects += self.serve_petitions(now_us)
-        return effects
+        return self._after(key, self.tokens.on_grant(grant, now_us), now_us)
 
     def _on_held(self, statement: TokenHeld, now_us: int) -> list[Effect]:
         key = TokenKey(statement.token_kind, statement.token)
-        if not may_exist(self.site, key):
-            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+        if not self._may_move(key, statement.sender):
             return []
+        self.witness.hear(statement)
         self.petitions.close(key, statement.sender)
-        return self.tokens.on_held(statement)
+        return self._after(key, self.tokens.on_held(statement, now_us), now_us)
+
+    def _on_given(self, word: TokenGiven, now_us: int) -> list[Effect]:
+        key = TokenKey(word.token_kind, word.token)
+        if not self._may_move(key, word.holder):
+            return []
+        self.witness.hear(word)
+        return self._after(key, self.tokens.on_given(word, now_us), now_us)
+
+    def _on_seen(self, word: TokenSeen, now_us: int) -> list[Effect]:
+        if self._may_move(TokenKey(word.token_kind, word.token), word.holder):
+            self.witness.hear(word)
+            self.tokens.on_seen(word)
+        return []
+
+    def _on_dispute(self, dispute: TokenDispute, now_us: int) -> list[Effect]:
+        return self.tokens.on_dispute(dispute, now_us)
+
+    def _may_move(self, key: TokenKey, holder: int) -> bool:
+        """Whether the site has such a token and such a holder, so that nobody fills the book with what cannot be."""
+        if may_exist(self.site, key) and holder in self.site.machines:
+            return True
+        self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+        return False
+
+    def _after(self, key: TokenKey, effects: list[Effect], now_us: int) -> list[Effect]:
+        """What has come to me by a word may be asked for already."""
+        if effects and self.tokens.holds(key):
+            self.petitions.returned(key, now_us)
+            effects = effects + self.serve_petitions(now_us)
+        return effects
 
     def _on_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
         self.tokens.on_refusal(refusal, now_us)

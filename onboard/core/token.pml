@@ -48,6 +48,8 @@ byte kept_receiver[NODES];
 /* The bus: grants of a version to a machine, statements of holding a version. */
 bool granted[AT(VERSIONS + 1, 0)];
 bool stated[AT(VERSIONS + 1, 0)];
+/* The newest version that anybody gave, by its journal: whoever asks can hear of it. */
+byte newest;
 byte crashes;
 byte losses;
 
@@ -78,6 +80,7 @@ inline record_given(n) {
     atomic {
         todo[n] == GIVE_RECORD;
         kept_holds[n] = false; kept_seen[n] = seen[n]; kept_leaving[n] = leaving[n]; kept_receiver[n] = receiver[n];
+        newest = seen[n];
 #ifdef SEND_FIRST
         todo[n] = IDLE
 #else
@@ -125,17 +128,10 @@ inline state_again(n) {
     atomic { todo[n] == IDLE && holds[n] && seen[n] > 0; stated[AT(seen[n], n)] = true }
 }
 
-/* A grant to another, or a statement of another, that is news: kept in memory only. */
-inline learn(n, version, whom) {
-    atomic {
-        todo[n] == IDLE && n != whom && NEWS(n, version) && (granted[AT(version, whom)] || stated[AT(version, whom)]);
-        seen[n] = version; holds[n] = false; leaving[n] = 0; receiver[n] = 0
-    }
-}
-
+/* The receiver said that it holds the token, or gave it on: what nobody can who did not have it. */
 inline confirmed(n) {
     atomic {
-        todo[n] == IDLE && leaving[n] != 0 && stated[AT(leaving[n], receiver[n])];
+        todo[n] == IDLE && leaving[n] != 0 && (stated[AT(leaving[n], receiver[n])] || newest > leaving[n]);
         leaving[n] = 0; receiver[n] = 0; todo[n] = GONE_RECORD
     }
 }
@@ -204,8 +200,8 @@ end:
     od
 }
 
-/* What it may give to another, and what it hears of each version of each machine: processes of their own, so that
- * SPIN's fairness, which counts processes, is fair to each frame. */
+/* What it may give to another, and what it hears of each version: processes of their own, so that SPIN's fairness, which
+ * counts processes, is fair to each frame. */
 proctype giving(byte n, to) {
 end:
     do
@@ -217,13 +213,6 @@ proctype accepting(byte n, version) {
 end:
     do
     :: accept(n, version)
-    od
-}
-
-proctype learning(byte n, version, whom) {
-end:
-    do
-    :: learn(n, version, whom)
     od
 }
 
@@ -248,8 +237,7 @@ init {
             for (j : 0 .. NODES - 1) {
                 if
                 :: i != j ->
-                    run giving(i, j);
-                    for (v : 1 .. VERSIONS) { run learning(i, v, j) }
+                    run giving(i, j)
                 :: else ->
                     for (v : 1 .. VERSIONS) { run accepting(i, v) }
                 fi

@@ -6,21 +6,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.core.authority import MotionState, TokenBook, TokenKey, authorised, car_token, segment_token
+from onboard.core.authority import (
+    MAX_VERSION,
+    MotionState,
+    TokenBook,
+    TokenKey,
+    authorised,
+    car_token,
+    segment_token,
+)
 from onboard.core.codes import Reason, TokenKind
-from onboard.core.effects import Effect, Record, Send
+from onboard.core.effects import Effect, Record, Report
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
+from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
+from tests.core.token_words import hear, said
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)
 STEWARD, ALICE, BOB = 1, 11, 12
 SEGMENT = Segment(1, 7)
 KEY = segment_token(SEGMENT)
-
-
-def said(effects: list[Effect]) -> list[Message]:
-    return [effect.message for effect in effects if isinstance(effect, Send)]
 
 
 def test_the_site_file_names_the_first_holders() -> None:
@@ -137,12 +143,7 @@ def test_one_holder_at_most_whatever_is_lost_repeated_or_late(seed: int) -> None
     def deliver(lossy: bool) -> None:
         node, message = wire.pop(chance.randrange(len(wire)) if lossy else 0)
         book = books[node]
-        if isinstance(message, TokenRequest):
-            post(book.on_request(message, Reason.NONE, now_us), lossy)
-        elif isinstance(message, TokenGrant):
-            post(book.on_grant(message, now_us), lossy)
-        elif isinstance(message, TokenHeld):
-            post(book.on_held(message), lossy)
+        post(hear(book, message, now_us), lossy)
 
     for step in range(120):
         lossy = step < 90
@@ -170,3 +171,138 @@ def test_a_new_car_has_one_custodian() -> None:
     assert steward.holds(key)
     with pytest.raises(ValueError, match="exists already"):
         steward.create(key)
+
+
+# --- what ends a grant, and from whom one counts (docs/contract-2.md) --------------------------------------------
+
+
+def entries(effects: list[Effect]) -> list[dict[str, str | int]]:
+    return [dict(effect.entry) for effect in effects if isinstance(effect, Record)]
+
+
+def grant(giver: int, version: int, holder: int) -> TokenGrant:
+    return TokenGrant(giver, KEY.kind, KEY.number, version, holder)
+
+
+def replayed(node: int, journal: list[dict[str, str | int]]) -> TokenBook:
+    book = TokenBook(SITE, node)
+    book.replay(journal)
+    return book
+
+
+@pytest.mark.parametrize(
+    "proof",
+    [
+        TokenHeld(ALICE, KEY.kind, KEY.number, 1),
+        TokenHeld(ALICE, KEY.kind, KEY.number, 3),
+        grant(ALICE, 2, BOB),
+        TokenGiven(ALICE, KEY.kind, KEY.number, 2, BOB),
+    ],
+)
+def test_whatever_proves_that_a_grant_came_is_journalled_and_no_restart_revives_it(proof: Message) -> None:
+    steward = TokenBook(SITE, STEWARD)
+    journal = entries(steward.give(KEY, ALICE, 0))
+    journal += entries(hear(steward, proof, 10))
+    assert steward.next_wake() is None
+    assert said(replayed(STEWARD, journal).wake(1 << 40)) == []
+
+
+def test_a_word_of_nobody_who_was_given_it_does_not_end_a_grant() -> None:
+    steward = TokenBook(SITE, STEWARD)
+    steward.give(KEY, ALICE, 0)
+    for word in (TokenHeld(BOB, KEY.kind, KEY.number, 2), grant(BOB, 2, BOB), TokenHeld(240, KEY.kind, KEY.number, 9)):
+        hear(steward, word, 10)
+    assert said(steward.wake(1 << 40)) == [grant(STEWARD, 1, ALICE)]
+
+
+def test_a_version_beyond_half_its_range_is_newer_still_and_the_last_one_is_not_passed() -> None:
+    alice = TokenBook(SITE, ALICE)
+    alice.seen[KEY] = 1
+    hear(alice, grant(STEWARD, MAX_VERSION, ALICE), 0)
+    assert alice.holds(KEY)
+    with pytest.raises(ValueError, match="no version left"):
+        alice.give(KEY, BOB, 0)
+    assert alice.holds(KEY)
+
+
+def test_a_grant_of_a_node_that_does_not_hold_the_token_is_disputed_and_not_taken() -> None:
+    alice, steward = TokenBook(SITE, ALICE), TokenBook(SITE, STEWARD)
+    for giver in (240, BOB):
+        assert said(hear(alice, grant(giver, 5, ALICE), 1 << 30)) in (
+            [TokenDispute(ALICE, KEY.kind, KEY.number, 5, STEWARD)],
+            [],
+        )
+    assert not alice.holds(KEY)
+    assert alice.drops[Reason.NOT_THE_HOLDER] == 2
+    (answer,) = said(hear(steward, TokenDispute(ALICE, KEY.kind, KEY.number, 5, STEWARD), 0))
+    assert answer == TokenHeld(STEWARD, KEY.kind, KEY.number, 0)
+    hear(alice, answer, 1 << 30)
+    assert not alice.holds(KEY)
+    hear(alice, grant(STEWARD, 1, ALICE), 1 << 30)
+    assert alice.holds(KEY)
+
+
+def test_a_grant_that_came_by_a_giver_that_was_not_heard_is_taken_once_its_giver_says_so() -> None:
+    """The steward gave it to Bob while Alice was deaf; Bob gives it to her."""
+    steward, alice, bob = (TokenBook(SITE, node) for node in (STEWARD, ALICE, BOB))
+    steward.give(KEY, BOB, 0)
+    hear(bob, grant(STEWARD, 1, BOB), 1)
+    (given,) = said(bob.give(KEY, ALICE, 2))
+    (dispute,) = said(hear(alice, given, 3))
+    assert dispute == TokenDispute(ALICE, KEY.kind, KEY.number, 2, STEWARD)
+    (answer,) = said(hear(steward, dispute, 4))
+    assert answer == TokenGiven(STEWARD, KEY.kind, KEY.number, 1, BOB)
+    assert said(hear(alice, answer, 5)) == [TokenHeld(ALICE, KEY.kind, KEY.number, 2)]
+    assert alice.holds(KEY)
+
+
+def test_the_answer_to_a_dispute_outlives_a_restart() -> None:
+    steward = TokenBook(SITE, STEWARD)
+    journal = entries(steward.give(KEY, BOB, 0)) + entries(hear(steward, TokenHeld(BOB, KEY.kind, KEY.number, 1), 1))
+    dispute = TokenDispute(ALICE, KEY.kind, KEY.number, 2, STEWARD)
+    assert said(hear(replayed(STEWARD, journal), dispute, 4)) == [TokenGiven(STEWARD, KEY.kind, KEY.number, 1, BOB)]
+
+
+def test_many_who_dispute_are_answered_once() -> None:
+    steward = TokenBook(SITE, STEWARD)
+    steward.give(KEY, BOB, 0)
+    disputes = [TokenDispute(node, KEY.kind, KEY.number, 2, STEWARD) for node in (ALICE, BOB, 13)]
+    assert sum(len(said(hear(steward, dispute, 5))) for dispute in disputes) == 1
+
+
+def test_an_unverified_grant_that_was_overheard_does_not_make_the_true_one_old() -> None:
+    alice = TokenBook(SITE, ALICE)
+    hear(alice, grant(240, 900, 240), 0)
+    hear(alice, grant(BOB, 900, BOB), 0)
+    hear(alice, TokenHeld(BOB, KEY.kind, KEY.number, 900), 0)
+    hear(alice, grant(STEWARD, 1, ALICE), 1)
+    assert alice.holds(KEY)
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        TokenHeld(BOB, KEY.kind, KEY.number, 900),
+        TokenHeld(BOB, KEY.kind, KEY.number, 1),
+        grant(BOB, 900, BOB),
+        grant(BOB, 900, ALICE),
+        TokenGiven(BOB, KEY.kind, KEY.number, 900, 13),
+    ],
+)
+def test_a_right_leaves_by_its_holders_own_hand_only_and_who_claims_it_is_named(word: Message) -> None:
+    alice = TokenBook(SITE, ALICE)
+    hear(alice, grant(STEWARD, 1, ALICE), 0)
+    effects = hear(alice, word, 1 << 30)
+    assert alice.holds(KEY) and alice.held[KEY] == 1
+    assert alice.drops[Reason.RIGHT_CLAIMED] == 1
+    assert said(effects) == [TokenHeld(ALICE, KEY.kind, KEY.number, 1)]
+    assert [effect.text for effect in effects if isinstance(effect, Report)] == [
+        "node 12 claims SEGMENT 263, which is mine"
+    ]
+
+
+def test_who_says_that_it_holds_what_it_gave_away_is_told_what_came_after() -> None:
+    alice = TokenBook(SITE, ALICE)
+    hear(alice, grant(STEWARD, 1, ALICE), 0)
+    (word,) = said(hear(alice, TokenHeld(BOB, KEY.kind, KEY.number, 0), 1 << 30))
+    assert word == TokenSeen(ALICE, KEY.kind, KEY.number, 1, ALICE)

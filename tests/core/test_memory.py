@@ -93,13 +93,17 @@ def test_one_version_of_a_cars_token_has_one_custodian() -> None:
 def test_cars_that_left_long_ago_leave_nothing_behind() -> None:
     """A machine runs for years: what it knows of tokens and winners is bounded by the cars that are there."""
     machine = holon(1)
+    machine.tokens.trust()
     for number in range(1, 4 * MAX_GONE_CARS):
         car = Reference(STEWARD, number)
+        machine.tokens.create(car_token(*car))
+        machine.tokens.give(car_token(*car), ROBOT, 10)
         machine.receive(TokenHeld(ROBOT, TokenKind.CAR, car_token(*car).number, 2), 10)
         machine.receive(CarAt(ROBOT, car, SITE.places[0].number, 2, 2500), 10)
         machine.receive(TokenGrant(ROBOT, TokenKind.CAR, car_token(*car).number, 3, STEWARD), 10)
-        machine.receive(CarAt(ROBOT, car, OUTSIDE, 4, 2500), 10)
-    for table in (machine.mirror.cars, machine.tokens.seen, machine.tokens.held, machine.tokens.holder):
+        assert machine.tokens.holds(car_token(*car))
+        machine.mirror.on_car(CarAt(STEWARD, car, OUTSIDE, 3, 2500))
+    for table in (machine.mirror.cars, machine.tokens.seen, machine.tokens.held, machine.tokens.given):
         assert len(table) <= MAX_GONE_CARS + 1
     first = Reference(STEWARD, 1)
     machine.tokens.create(car_token(*first))

@@ -7,8 +7,9 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 from onboard.core.authority import TokenBook, TokenKey, segment_token, station_token
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRequest
+from onboard.core.messages import Message
 from onboard.core.site import Segment
+from tests.core.token_words import hear
 from tests.sites import one_floor
 
 SITE = one_floor(2)
@@ -45,17 +46,11 @@ class Tokens(RuleBasedStateMachine):
             self.books[node].replay(self.journals[node])
 
     def hear(self, node: int, message: Message, *, is_willing: bool, cut: int = 99) -> None:
-        book, effects = self.books[node], list[Effect]()
+        book = self.books[node]
         if message.sender == node:
             return
-        if isinstance(message, TokenRequest):
-            verdict = Reason.NONE if is_willing else Reason.TOKEN_NOT_GRANTABLE_YET
-            effects = book.on_request(message, verdict, self.now_us)
-        elif isinstance(message, TokenGrant):
-            effects = book.on_grant(message, self.now_us)
-        elif isinstance(message, TokenHeld):
-            effects = book.on_held(message)
-        self.carry_out(node, effects, cut)
+        verdict = Reason.NONE if is_willing else Reason.TOKEN_NOT_GRANTABLE_YET
+        self.carry_out(node, hear(book, message, self.now_us, verdict), cut)
 
     @rule(node=nodes, key=keys, cut=cuts)
     def wants(self, node: int, key: TokenKey, cut: int) -> None:
@@ -100,7 +95,8 @@ class Tokens(RuleBasedStateMachine):
             for node in NODES:
                 self.carry_out(node, self.books[node].wake(self.now_us))
                 self.carry_out(node, self.books[node].statements())
-            for message in list(self.said):
+            while self.said:
+                message, *self.said = self.said
                 for node in NODES:
                     self.hear(node, message, is_willing=False)
         for key in KEYS:

@@ -56,6 +56,7 @@ class Board:
         self.holon = Holon(SITE, SITE.machines[ROBOT], factory, boot=2, entries=entries)
         self.said: list[Effect] = list(self.holon.start(0))
         self.said += self.holon.receive(BusTime(STEWARD, 0), 0)
+        self.holon.tokens.trust()
         self.now_us = 0
 
     def stands(self, index: int, mode: DriveMode = DriveMode.STANDING) -> None:

@@ -68,7 +68,7 @@ class Recorder:
 
     def attach(self, patch: pytest.MonkeyPatch) -> None:
         """Listen to every token book and negotiation until the patch is undone."""
-        for name in ("give", "on_grant", "on_held"):
+        for name in ("give", "on_grant", "on_held", "on_given"):
             patch.setattr(TokenBook, name, self._token_listener(getattr(TokenBook, name)))
         patch.setattr(TokenBook, "replay", self._restart_listener(TokenBook.replay))
         patch.setattr(Participant, "_fire", self._participant_listener(Participant._fire))
@@ -95,18 +95,12 @@ class Recorder:
         node = self.index(key, book.node_id)
         if isinstance(what, TokenKey):
             steps.append(f"give({node}, {self.index(key, rest[0])})")
-        elif isinstance(what, TokenHeld) and not any(isinstance(one, Record) for one in effects):
-            steps.append(f"learn({node}, {what.version}, {self.index(key, what.sender)})")
-        elif isinstance(what, TokenHeld):
-            steps.append(f"confirmed({node})")
-        elif what.holder == book.node_id:
-            steps.append(f"accept({node}, {what.version})")
-        else:
-            steps.append(f"learn({node}, {what.version}, {self.index(key, what.holder)})")
         for effect in effects:
             if isinstance(effect, Record) and str(effect.entry["record"]).startswith("token_"):
                 # Of what goes to the journal with a token, such as the place of a car, the model knows nothing.
                 name = str(effect.entry["record"]).removeprefix("token_")
+                decided = {"gone": f"confirmed({node})", "held": f"accept({node}, {effect.entry['version']})"}
+                steps += [decided[name]] if name in decided else []
                 steps.append(f"record_{name}({node})")
             elif isinstance(effect, Send) and isinstance(effect.message, TokenGrant):
                 steps.append(f"send_grant({node})")

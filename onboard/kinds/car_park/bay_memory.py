@@ -62,7 +62,7 @@ def next_reference(last: int, fleet: Fleet) -> Reference:
     """
     for _ in range(1 << 16):
         last = successor(last, 16)
-        if car_token(fleet.node_id, last) not in fleet.tokens.seen:
+        if not fleet.tokens.is_known(car_token(fleet.node_id, last)):
             break
     return Reference(fleet.node_id, last)
 

@@ -15,7 +15,6 @@ from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CarAt, Reference, TokenGrant
 from onboard.core.mirror import Mirror
-from onboard.core.serial import successor
 from onboard.core.site import Site, Station
 from onboard.kinds.car_park.bay_memory import car_record
 
@@ -57,7 +56,7 @@ def replay(fleet: Fleet, said: Iterable[CarAt]) -> None:
     for one in said:
         key = car_token(*one.car)
         leaving = tokens.leaving.get(key)
-        given = leaving is not None and leaving.version == successor(one.version, 16)
+        given = leaving is not None and leaving.version == one.version + 1
         if given or tokens.held.get(key) == one.version:
             fleet.mirror.on_car(one)
 
@@ -74,7 +73,7 @@ def statements(fleet: Fleet) -> list[Effect]:
 def before_grant(fleet: Fleet, grant: TokenGrant) -> list[Effect]:
     """Where the car stood when I gave its token away, as long as nobody has said anything newer."""
     record = fleet.mirror.cars.get(car_of(grant)) if grant.token_kind is TokenKind.CAR else None
-    if record is None or record.custodian != fleet.node_id or successor(record.version, 16) != grant.version:
+    if record is None or record.custodian != fleet.node_id or record.version + 1 != grant.version:
         return []
     return [Send(CarAt(fleet.node_id, car_of(grant), record.station, record.version, record.wheelbase_mm))]
 
@@ -88,7 +87,7 @@ def before_taking(fleet: Fleet, grant: TokenGrant) -> list[Effect] | None:
         record is None
         or record.station in (ANY_STATION, OUTSIDE)
         or record.custodian != grant.sender
-        or successor(record.version, 16) != grant.version
+        or record.version + 1 != grant.version
     ):
         fleet.drops[Reason.MIRROR_BEHIND] += 1
         return None
@@ -103,7 +102,7 @@ def give_back(fleet: Fleet, needed: Container[TokenKey], now_us: int) -> list[Ef
     A car goes with the word where it stands; one that is aboard, or that nobody has told of, is kept.
     """
     effects: list[Effect] = []
-    for key in [key for key in fleet.tokens.held if key.kind is not TokenKind.SEGMENT and key not in needed]:
+    for key in [key for key in fleet.tokens.mine() if key.kind is not TokenKind.SEGMENT and key not in needed]:
         if key.kind is TokenKind.STATION:
             effects += fleet.tokens.give(key, keeper(fleet.site, Station.from_number(key.number)), now_us)
             continue

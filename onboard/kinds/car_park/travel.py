@@ -410,7 +410,7 @@ class Carriage:
 
     def _held_segments(self) -> list[TokenKey]:
         tokens = self.fleet.tokens
-        keys = [key for key in tokens.held if key.kind is TokenKind.SEGMENT]
+        keys = [key for key in tokens.mine() if key.kind is TokenKind.SEGMENT]
         home = segment_token(self.fleet.machine.home)
         if home not in tokens.held and tokens.holds(home):
             keys.append(home)

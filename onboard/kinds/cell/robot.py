@@ -316,7 +316,7 @@ class ArmRobot:
         """A part that lies at its goal goes back into the custody of the goal manager that named it."""
         effects: list[Effect] = []
         wanted = {one.contract.goal.part for one in self.in_hand.values()}
-        for key in list(self.fleet.tokens.held):
+        for key in self.fleet.tokens.mine():
             part = Reference(key.number >> 16, key.number & 0xFFFF)
             if key.kind is TokenKind.CAR and part not in wanted:
                 effects += self.fleet.tokens.give(key, part.origin, now_us)

@@ -232,7 +232,7 @@ class Desk:
             key = car_token(*car)
             stands = record.station in self.site.entities and record.custodian != self.fleet.node_id
             if stands and car.origin == self.fleet.node_id and self.fleet.tokens.holds(key):
-                version = self.fleet.tokens.seen.get(key, 0)
+                version = self.fleet.tokens.version_of(key)
                 statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
                 self.fleet.mirror.on_car(statement)
                 effects += [Record(box_record(statement)), Send(statement)]

@@ -263,7 +263,7 @@ class Vehicle:
         tokens = self.fleet.tokens
         for key in [one for one in tokens.wanted if one.kind is TokenKind.SEGMENT and one not in keep]:
             tokens.forget(key)
-        for key in [one for one in tokens.held if one.kind is TokenKind.SEGMENT and one not in keep]:
+        for key in [one for one in tokens.mine() if one.kind is TokenKind.SEGMENT and one not in keep]:
             effects += tokens.give(key, self.site.stewards[key.number >> 8], now_us)
         return effects
 
@@ -350,7 +350,7 @@ class Vehicle:
         return car_token(*self.site.box(box))
 
     def _box_at(self, box: int, station: int) -> CarAt:
-        version = self.fleet.tokens.seen.get(self._box_token(box), 0)
+        version = self.fleet.tokens.version_of(self._box_token(box))
         return CarAt(self.fleet.node_id, self.site.box(box), station, version, NO_WHEELBASE_MM)
 
     def _state_box(self, box: int, station: int) -> list[Effect]:

@@ -1,0 +1,52 @@
+"""Which tokens a site has, and who holds each before it first moves."""
+
+from typing import NamedTuple
+
+from onboard.core.codes import KindCode, TokenKind
+from onboard.core.site import Segment, Site, Station
+
+
+class TokenKey(NamedTuple):
+    """Which token: its kind and 24-bit number."""
+
+    kind: TokenKind
+    number: int
+
+
+def segment_token(segment: Segment) -> TokenKey:
+    """The token of one body slot."""
+    return TokenKey(TokenKind.SEGMENT, segment.number)
+
+
+def station_token(station: Station) -> TokenKey:
+    """The token of one place, or of a compartment's bay: who holds it may send a shuttle in."""
+    return TokenKey(TokenKind.STATION, station.number)
+
+
+def car_token(origin: int, number: int) -> TokenKey:
+    """The token of one car: its holder is the custodian."""
+    return TokenKey(TokenKind.CAR, origin << 16 | number)
+
+
+def genesis_holder(site: Site, key: TokenKey) -> int:
+    """Who holds a token before it first moves, by the site file alone.
+
+    A robot holds the segment of its home, a compartment its bay; the track's steward holds all other segments and
+    places. Cars and tasks are made by their origin node.
+    """
+    if key.kind in (TokenKind.CAR, TokenKind.TASK):
+        return key.number >> 16
+    if key.kind is TokenKind.SEGMENT:
+        for machine in site.machines.values():
+            if machine.kind is KindCode.ROBOT and machine.home.number == key.number:
+                return machine.node_id
+    else:
+        for node_id, station in site.compartments.items():
+            if station.number == key.number:
+                return node_id
+    return site.stewards.get(key.number >> 8, 0)
+
+
+def may_exist(site: Site, key: TokenKey) -> bool:
+    """Whether the site has such a token, so that no frame can fill the book with what nobody ever made."""
+    return genesis_holder(site, key) in site.machines

@@ -1,0 +1,261 @@
+"""Restart: who was started again asks all what they know, and uses no right before they have answered.
+
+A journal may be an old copy of itself, and no medium knows that (``journal_state.py``). The bus does: who took a token
+from me says so, and so does who saw it taken. What is known better elsewhere takes the right to move from this machine
+until a person has decided (docs/contract-2.md, Restart).
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Heartbeat, SyncRequest, TokenGrant, TokenHeld, TokenRequest
+from onboard.core.mirror import Mirror
+from onboard.core.recovery_messages import Halted, SyncDone, TokenGiven, TokenSeen
+from onboard.core.serial import is_newer
+
+#: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
+DIGEST_PATIENCE = 2
+#: Who asks within this time of an answer shares the next one, us: at power-up all ask all. Ours.
+ANSWER_PERIOD_US = 250_000
+
+
+class Doubt(NamedTuple):
+    """Why this machine must not use its rights, who knows better, and what of."""
+
+    reason: Reason
+    cause: int
+    what: str
+
+    @property
+    def text(self) -> str:
+        """One line for a person."""
+        return f"the journal is lost or old: node {self.cause} {self.what}; a person must regenerate its tokens"
+
+
+@dataclass
+class Witness:
+    """One machine's questions after its start, and its answers to those of others. All times are bus time, us.
+
+    ``has_past`` tells whether the journal knows an earlier life; ``statements`` says all that the machine vouches for.
+    """
+
+    tokens: TokenBook
+    mirror: Mirror
+    boot: int
+    has_past: bool
+    statements: Callable[[int], list[Effect]]
+    #: Who has said that it does nothing, as ``Presence`` keeps them.
+    halts: Mapping[int, Halted] = field(default_factory=dict)
+    doubt: Doubt | None = None
+    #: Machines that have answered since this one started: what they say later is no proof against its journal.
+    answered: set[int] = field(default_factory=set)
+    #: How often in a row a peer's mirror has differed from mine.
+    mismatches: Counter[int] = field(default_factory=Counter)
+    #: What machines that were started again held by their own word before, until they say so again.
+    doubted: dict[int, dict[TokenKey, int]] = field(default_factory=dict)
+    _since_us: int | None = None
+    _ask_at_us: int | None = None
+    _askers: set[int] = field(default_factory=set)
+    _answer_at_us: int | None = None
+    _quiet_until_us: int | None = None
+
+    def __post_init__(self) -> None:
+        self.site, self.node_id = self.tokens.site, self.tokens.node_id
+        self._others = set(self.site.machines) - {self.node_id}
+
+    # --- asking ------------------------------------------------------------------------------------------------
+
+    @property
+    def is_over(self) -> bool:
+        """Whether all that live have answered, and nobody knew better than the journal."""
+        return self.tokens.is_synced
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a machine that was started again has to wait still; in a first life only rights wait."""
+        return self.has_past and not self.is_over
+
+    def on_heartbeat(self, beat: Heartbeat, *, is_fresh: bool) -> list[Effect]:
+        """Ask who is new or was started again, and whose mirror has differed from mine for a while."""
+        if is_fresh:
+            self._was_started(beat.sender)
+            return self.ask(beat.sender, self.mirror.boots_before[beat.sender])
+        if beat.mirror_digest == self.mirror.digest():
+            del self.mismatches[beat.sender]
+            return []
+        self.mismatches[beat.sender] += 1
+        if self.mismatches[beat.sender] < DIGEST_PATIENCE:
+            return []
+        del self.mismatches[beat.sender]
+        return self.ask(beat.sender)
+
+    def begin(self, now_us: int) -> list[Effect]:
+        """What the journal says that I hold and gave away, for all to compare, and the question to all."""
+        self.tokens.is_synced = False
+        self._since_us = now_us
+        self._ask_at_us = now_us + self.site.timing.heartbeat_us
+        self.tokens.asked = set(self._others)
+        return [*self.tokens.testimony(), Send(SyncRequest(self.node_id, NOBODY))]
+
+    def shift(self, by_us: int) -> None:
+        """Bus time was set, or set anew: what is due stays as far away as it was."""
+        self._since_us = _later(self._since_us, by_us)
+        self._ask_at_us = _later(self._ask_at_us, by_us)
+        self._answer_at_us = _later(self._answer_at_us, by_us)
+        self._quiet_until_us = _later(self._quiet_until_us, by_us)
+
+    def ask(self, node: int, boot_before: int = 0) -> list[Effect]:
+        """Ask one machine for all that it vouches for; what it says that it holds is believed until it has done."""
+        self.tokens.asked.add(node)
+        return [Send(SyncRequest(self.node_id, node, boot_before))]
+
+    def on_done(self, word: SyncDone, now_us: int) -> list[Effect]:
+        """A machine has said all: of what it held before its restart and does not know of, it is told."""
+        if word.whom not in (NOBODY, self.node_id) or word.sender not in self._others:
+            return []
+        self.tokens.asked.discard(word.sender)
+        self.answered.add(word.sender)
+        effects = self._tell_doubted(word.sender)
+        self._review(now_us)
+        return effects
+
+    def _review(self, now_us: int) -> None:
+        """The rights are mine once all that live have answered; without a past, all there are, or all as new as I."""
+        if self.is_over or self.doubt is not None or self._since_us is None:
+            return
+        if now_us >= self._since_us + self.site.timing.heartbeat_us and not self._missing(now_us):
+            self.tokens.trust()
+
+    def _missing(self, now_us: int) -> set[int]:
+        live = self._live(now_us)
+        if not self.has_past and any(self.mirror.peers[node].boot > 1 for node in live):
+            # A first life in a fleet that has a past: whoever is away may know of an earlier one.
+            return self._others - self.answered
+        return live - self.answered
+
+    def _live(self, now_us: int) -> set[int]:
+        """Who can answer: not who has said that it is halted or held apart."""
+        return (self.mirror.alive(now_us) & self._others) - set(self.halts)
+
+    def wake(self, now_us: int) -> list[Effect]:
+        """Ask again who has not answered, and answer those who asked meanwhile."""
+        effects: list[Effect] = []
+        self._review(now_us)
+        if not self.is_over and self.doubt is None and self._ask_at_us is not None and self._ask_at_us <= now_us:
+            self._ask_at_us = now_us + self.site.timing.heartbeat_us
+            missing, live = self._missing(now_us), self._live(now_us)
+            for node in sorted(missing & live):
+                effects += self.ask(node)
+            for node in sorted(missing - live):
+                effects.append(Send(Halted(self.node_id, self.node_id, Reason.JOURNAL_LOST, node, False, self.boot)))
+        if self._answer_at_us is not None and self._answer_at_us <= now_us:
+            effects += self._answer(now_us)
+        return effects
+
+    def next_wake(self) -> int | None:
+        """When there is something to ask or to answer, bus time in us."""
+        asking = None if self.is_over or self.doubt is not None else self._ask_at_us
+        return min((time for time in (asking, self._answer_at_us) if time is not None), default=None)
+
+    # --- answering ---------------------------------------------------------------------------------------------
+
+    def _was_started(self, node: int) -> None:
+        """A machine was started again: what it held by its own word it has to say again."""
+        beliefs = self.tokens.beliefs.verified
+        self.doubted[node] = {
+            TokenKey(*key): one.version for key, one in beliefs.items() if one.holder == node and one.confirmed
+        }
+
+    def on_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
+        """Answer at once; whoever asks soon after shares one answer with all others who do."""
+        if request.whom == self.node_id and self._has_forgotten(request):
+            self._doubt(Reason.JOURNAL_LOST, request.sender, f"knew this node under boot {request.boot_before}")
+            return []
+        known = self.mirror.peers.get(request.sender)
+        effects: list[Effect] = []
+        patience_us = self.site.timing.heartbeat_us // 2
+        if request.whom == NOBODY and known is not None and known.since_us + patience_us < now_us:
+            # All are asked at power-up only: I knew it before, even where its counter is the same again.
+            effects = self.ask(request.sender, known.boot)
+        self._askers.add(request.sender)
+        if self._quiet_until_us is not None and now_us < self._quiet_until_us:
+            self._answer_at_us = self._quiet_until_us
+            return effects
+        return self._answer(now_us) + effects
+
+    def _has_forgotten(self, request: SyncRequest) -> bool:
+        """Whether my journal lacks a life that a peer knew: tokens that I gave away then would seem to be mine."""
+        before = request.boot_before
+        if before == 0 or request.sender not in self._others:
+            return False
+        return not self.has_past or is_newer(before, self.boot, 8)
+
+    def _answer(self, now_us: int) -> list[Effect]:
+        askers, self._askers = sorted(self._askers), set()
+        self._answer_at_us, self._quiet_until_us = None, now_us + ANSWER_PERIOD_US
+        effects = self.statements(now_us)
+        for node in askers:
+            effects += self._tell_doubted(node)
+        effects += self._for_the_silent(now_us)
+        whom = askers[0] if len(askers) == 1 else NOBODY
+        return [*effects, Send(SyncDone(self.node_id, whom, self.boot))]
+
+    def _tell_doubted(self, node: int) -> list[Effect]:
+        lost = self.doubted.get(node, {})
+        return [Send(TokenSeen(self.node_id, *key, version, node)) for key, version in lost.items()]
+
+    def _for_the_silent(self, now_us: int) -> list[Effect]:
+        """What machines hold that cannot say so themselves: whoever gave it to them may have forgotten that."""
+        live = self.mirror.alive(now_us) | {self.node_id}
+        return [
+            Send(TokenSeen(self.node_id, *key, one.version, one.holder))
+            for key, one in self.tokens.beliefs.verified.items()
+            if one.holder not in live and one.version
+        ]
+
+    # --- what others know better -------------------------------------------------------------------------------
+
+    def hear(self, word: TokenHeld | TokenGrant | TokenGiven | TokenSeen | TokenRequest) -> None:
+        """Compare what a machine says of a token with the journal, before the word counts for anything else."""
+        if word.sender not in self._others:
+            return
+        key = TokenKey(word.token_kind, word.token)
+        if isinstance(word, TokenHeld | TokenGrant | TokenGiven):
+            self._said_again(word.sender, key, word.version)
+        if self.doubt is not None or self._since_us is None or word.sender in self.answered:
+            return
+        own = self.tokens.own_version(key)
+        is_mine = self.tokens.is_mine_by_journal(key)
+        match word:
+            case TokenRequest():
+                mask = (1 << SEEN_VERSION_BITS) - 1
+                is_newer_seen = is_newer(word.version_seen, own & mask, SEEN_VERSION_BITS)
+                is_better = is_mine and word.version_seen != 0 and is_newer_seen
+            case TokenHeld():
+                is_better = is_mine and word.version > own
+            case TokenSeen():
+                is_better = word.version > own and (is_mine or word.holder == self.node_id)
+            case _:
+                is_better = False
+        if is_better:
+            version = word.version_seen if isinstance(word, TokenRequest) else word.version
+            reason = Reason.JOURNAL_SHORT if self.has_past else Reason.JOURNAL_LOST
+            self._doubt(reason, word.sender, f"knows version {version} of {key.kind.name} {key.number}")
+
+    def _doubt(self, reason: Reason, cause: int, what: str) -> None:
+        self.doubt = Doubt(reason, cause, what)
+        self.tokens.is_synced = False
+
+    def _said_again(self, node: int, key: TokenKey, version: int) -> None:
+        lost = self.doubted.get(node)
+        if lost is not None and version >= lost.get(key, version + 1):
+            del lost[key]
+
+
+def _later(time_us: int | None, by_us: int) -> int | None:
+    return None if time_us is None else time_us + by_us
