@@ -16,7 +16,7 @@ from onboard.core.messages import CallForProposals, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.petitions import Petitions
-from onboard.core.site import Machine, Site
+from onboard.core.site import Machine, Segment, Site
 
 
 @dataclass
@@ -34,6 +34,8 @@ class Fleet:
     petitions: Petitions = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
     admissions: int = 0
+    #: After this machine's rights were made anew: the slots that it was given, which are those of its body.
+    slots_told: tuple[Segment, ...] = ()
     _left: list[Reference] = field(default_factory=list)
 
     def __post_init__(self) -> None:
