@@ -36,6 +36,10 @@ class Fleet:
     admissions: int = 0
     #: After this machine's rights were made anew: the slots that it was given, which are those of its body.
     slots_told: tuple[Segment, ...] = ()
+    #: Whether nobody knows this machine's rights, and so not where it is.
+    has_no_rights: bool = False
+    #: Machines whose rights were made anew: of what was promised to them before they know nothing.
+    forgetful: set[int] = field(default_factory=set)
     _left: list[Reference] = field(default_factory=list)
 
     def __post_init__(self) -> None:

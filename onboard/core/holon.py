@@ -395,10 +395,12 @@ class Holon:
         """Whether this machine asks for rights and gives them away."""
         return not (self.holding.is_apart or self.regeneration.is_frozen)
 
-    def _thaw(self, has_new_rights: bool, now_us: int) -> list[Effect]:
+    def _thaw(self, lost: int, now_us: int) -> list[Effect]:
         """Rights were made anew, or it was broken off: who lost its own begins as after a restart, all others look."""
-        if has_new_rights:
-            self.witness.doubt, self.witness.has_past = None, True
+        if lost not in (NOBODY, self.node_id):
+            self.fleet.forgetful.add(lost)
+        elif lost == self.node_id:
+            self.witness.doubt, self.witness.has_past, self.fleet.has_no_rights = None, True, False
             self.fleet.slots_told = self.regeneration.slots()
             if self.holding.why.reason in RIGHTS_LOST:
                 return self._apply(self.holding.go(self.node_id), now_us)
@@ -480,6 +482,7 @@ class Holon:
         doubt = self.witness.doubt
         if doubt is None or self.holding.why.reason in RIGHTS_LOST:
             return []
+        self.fleet.has_no_rights = True
         held = self._apply(self.holding.for_person(doubt.reason, doubt.cause), self._heartbeat_due_us or 0)
         return [Report(doubt.text), *held]
 

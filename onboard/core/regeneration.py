@@ -38,14 +38,14 @@ SAY_AGAIN_US = 4_000_000
 
 @dataclass
 class Regenerating:
-    """All times are bus time, us. ``on_end`` is called when the machine may act again, True where a list counts now.
+    """All times are bus time, us. ``on_end`` is called when the machine may act again: whose rights are new, or 0.
 
     ``extra`` says what belongs to the rights: where bodies and cars are.
     """
 
     tokens: TokenBook
     extra: Callable[[int], list[Effect]]
-    on_end: Callable[[bool, int], list[Effect]]
+    on_end: Callable[[int, int], list[Effect]]
     #: The epoch in which this machine lives, 0 for the first.
     epoch: int = 0
     phase: RegenerationPhase = RegenerationPhase.NONE
@@ -196,13 +196,13 @@ class Regenerating:
         self.tokens.changes += 1
         effects.append(Record({"record": "epoch", "epoch": self.epoch}))
         effects.append(self._state(RegenerationPhase.COMMIT, 0, 0))
-        return [*effects, *self.on_end(self._lost == self.node_id, now_us)]
+        return [*effects, *self.on_end(self._lost, now_us)]
 
     def _give_up(self, why: str, now_us: int) -> list[Effect]:
         # The journal says the epoch once more: what was read back is over.
         record: list[Effect] = [Record({"record": "epoch", "epoch": self.epoch})] if self.is_kept else []
         self.phase, self._say_us = RegenerationPhase.NONE, None
-        return [*record, Report(f"nothing has changed: {why}"), *self.on_end(False, now_us)]
+        return [*record, Report(f"nothing has changed: {why}"), *self.on_end(NOBODY, now_us)]
 
     # --- the book ----------------------------------------------------------------------------------------------
 

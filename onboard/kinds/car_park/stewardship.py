@@ -91,12 +91,14 @@ class Stewardship:
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
         effects: list[Effect] = []
-        lost = {winner for winner in self.fleet.mirror.obstacles.machines if self._is_lost(winner, now_us)}
+        obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
+        lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
         for car in [car for car, winner in self.winners.items() if winner in lost] if lost else []:
             if car in self.tasks and self._is_untouched(car):
                 task, version = self.tasks[car]
                 effects += self.won(car, NOBODY, task, version)
                 self._say_at_us[car] = now_us
+        forgetful &= set(obstacles)
         for car in [car for car, due_us in self._say_at_us.items() if due_us <= now_us]:
             record = self.fleet.mirror.cars.get(car)
             gone = record is None or record.station == OUTSIDE

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from onboard.core.codes import KindCode, MachineState, ManualMode
 from onboard.core.messages import BusTime, Heartbeat, ManualState, Message, Progress, TokenGrant, TokenHeld
+from onboard.core.recovery_messages import Regeneration, TokenAssigned
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import Event
@@ -102,6 +103,8 @@ class Picture:
                 self.tokens.on_grant(grant, time_us)
             case TokenHeld() as held:
                 self.tokens.on_held(held, time_us)
+            case TokenAssigned() | Regeneration() as word:
+                self.tokens.on_operator(word, time_us)
             case Progress() as progress if self._site is not None:
                 body = body_of(self._site, progress, time_us)
                 if body is not None:

@@ -3,8 +3,9 @@
 from collections import OrderedDict, deque
 from typing import NamedTuple
 
-from onboard.core.codes import KindCode, TokenKind
+from onboard.core.codes import KindCode, RegenerationPhase, TokenKind
 from onboard.core.messages import TokenGrant, TokenHeld
+from onboard.core.recovery_messages import Regeneration, TokenAssigned
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, Station
 
@@ -48,6 +49,8 @@ class TokensSeen:
         self.from_start = False
         self._site = site
         self._past: OrderedDict[Token, deque[Handover]] = OrderedDict()
+        #: What an operator's tool has assigned, until it says that it counts.
+        self._assigned: dict[Token, TokenAssigned] = {}
 
     def last(self, token: Token) -> Handover | None:
         """The newest handover heard of."""
@@ -95,6 +98,18 @@ class TokensSeen:
     def on_held(self, held: TokenHeld, time_us: int) -> None:
         """Take up a statement; it tells something new only where the grant is not in the log."""
         self._learn(Token(held.token_kind, held.token), Handover(held.version, 0, held.sender, time_us))
+
+    def on_operator(self, word: TokenAssigned | Regeneration, time_us: int) -> None:
+        """A line of a list of rights that are made anew, or a step: the list counts from COMMIT on, else it is over."""
+        if isinstance(word, TokenAssigned):
+            if len(self._assigned) < MOST_TOKENS:
+                self._assigned[Token(word.token_kind, word.token)] = word
+            return
+        if word.regeneration_phase is RegenerationPhase.COMMIT:
+            for token, one in self._assigned.items():
+                self._learn(token, Handover(one.version, 0, one.holder, time_us))
+        if word.regeneration_phase is not RegenerationPhase.READ_BACK:
+            self._assigned.clear()
 
     def _learn(self, token: Token, handover: Handover) -> None:
         past = self._past.get(token)
