@@ -12,7 +12,7 @@ from typing import Protocol
 from onboard.core.authority import TokenBook, TokenKey, car_token
 from onboard.core.codes import KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Record
-from onboard.core.messages import CallForProposals, Message, Reference
+from onboard.core.messages import CallForProposals, CarAt, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.petitions import Petitions
@@ -38,6 +38,8 @@ class Fleet:
     slots_told: tuple[Segment, ...] = ()
     #: Whether nobody knows this machine's rights, and so not where it is.
     has_no_rights: bool = False
+    #: Where cars stand whose custody came to this machine so.
+    cars_told: dict[Reference, CarAt] = field(default_factory=dict)
     #: Machines whose rights were made anew: of what was promised to them before they know nothing.
     forgetful: set[int] = field(default_factory=set)
     _left: list[Reference] = field(default_factory=list)

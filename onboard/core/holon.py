@@ -107,7 +107,8 @@ class Holon:
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
-        self.regeneration = Regenerating(self.tokens, self._statements, self._thaw)
+        self.regeneration = Regenerating(self.tokens, lambda: self.mirror.cars, self._statements, self._thaw)
+        self.regeneration.cars_told = self.fleet.cars_told
         self.regeneration.replay(entries)
         self.rights.is_frozen = lambda: self.regeneration.is_frozen
         self._heartbeat_due_us: int | None = None
@@ -320,7 +321,10 @@ class Holon:
         return []
 
     def _on_car(self, statement: CarAt, now_us: int) -> list[Effect]:
-        self.mirror.on_car(statement)
+        if self.regeneration.is_frozen:
+            self.regeneration.on_car(statement)
+        else:
+            self.mirror.on_car(statement)
         return []
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:

@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from onboard.core.authority import TokenBook, TokenKey, may_exist, segment_token, station_token
+from onboard.core.authority import TokenBook, TokenKey, car_token, may_exist, segment_token, station_token
 from onboard.core.belief import Belief
-from onboard.core.codes import NOBODY, MachineState, Reason, RegenerationPhase, TokenKind
+from onboard.core.codes import NOBODY, OUTSIDE, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.lifts import GATE_INDEX, PLATFORM_INDEX
-from onboard.core.messages import Heartbeat, Message, TokenHeld
+from onboard.core.messages import CarAt, Heartbeat, Message, Reference, TokenHeld
+from onboard.core.mirror import CarRecord
 from onboard.core.recovery_messages import (
     Regeneration,
     RegenerationState,
@@ -44,11 +45,15 @@ class Regenerating:
     """
 
     tokens: TokenBook
+    cars: Callable[[], Mapping[Reference, CarRecord]]
     extra: Callable[[int], list[Effect]]
     on_end: Callable[[int, int], list[Effect]]
     #: The epoch in which this machine lives, 0 for the first.
     epoch: int = 0
     phase: RegenerationPhase = RegenerationPhase.NONE
+    #: Where cars stand that were given to this machine, by who remembers it: its behaviour takes them up.
+    cars_told: dict[Reference, CarAt] = field(default_factory=dict)
+    _cars: dict[Reference, CarAt] = field(default_factory=dict)
     _next: int = 0
     _lost: int = NOBODY
     _list: dict[TokenKey, TokenAssigned] = field(default_factory=dict)
@@ -120,6 +125,12 @@ class Regenerating:
             self._list[key] = word
         return []
 
+    def on_car(self, word: CarAt) -> None:
+        """While all stand, who remembers where a car of the lost machine is says so in its place."""
+        known = self._cars.get(word.car)
+        if known is None or word.version > known.version:
+            self._cars[word.car] = word
+
     def on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
         """Somebody lives in the epoch of my list: it counts. Somebody of mine works: it does not."""
         if not self.is_kept:
@@ -160,6 +171,7 @@ class Regenerating:
         if not self.is_frozen or (word.epoch, word.lost) != (self._next, self._lost):
             effects.append(Report(f"stands: the rights of node {word.lost} are made anew"))
             self.phase, self._next, self._lost, self._list = RegenerationPhase.FREEZE, word.epoch, word.lost, {}
+            self._cars.clear()
             self._begin_to_say(now_us)
         elif now_us >= self._said_us + SAY_AGAIN_US:
             self._begin_to_say(now_us)
@@ -174,10 +186,16 @@ class Regenerating:
             key = TokenKey(*told)
             if one.holder not in (self.node_id, NOBODY) and (key in book.given or one.holder == self._lost):
                 known[key] = TokenSeen(self.node_id, *key, one.version, one.holder)
+        cars: list[Message] = []
+        for car, stands in self.cars().items():
+            if stands.custodian == self._lost and stands.station != OUTSIDE:
+                key = car_token(*car)
+                known.setdefault(key, TokenSeen(self.node_id, *key, stands.version, self._lost))
+                cars.append(CarAt(self.node_id, car, stands.station, stands.version, stands.wheelbase_mm))
         if not is_lost:
             held = {key: TokenHeld(self.node_id, *key, version) for key, version in book.held.items()}
             known |= held
-        self._to_say = deque(known.values())
+        self._to_say = deque([*cars, *known.values()])
         self._to_say.extend(one.message for one in self.extra(now_us) if isinstance(one, Send))
         self._count, self._say_us, self._said_us = len(known), now_us, now_us
 
@@ -192,6 +210,10 @@ class Regenerating:
 
     def _commit(self, now_us: int) -> list[Effect]:
         effects = self._take_up()
+        mine = {
+            key.number for key in self._list if key.kind is TokenKind.CAR and self._list[key].holder == self.node_id
+        }
+        self.cars_told.update({car: one for car, one in self._cars.items() if car_token(*car).number in mine})
         self.epoch, self.phase = self._next, RegenerationPhase.NONE
         self.tokens.changes += 1
         effects.append(Record({"record": "epoch", "epoch": self.epoch}))

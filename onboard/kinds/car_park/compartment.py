@@ -32,6 +32,7 @@ from onboard.core.codes import (
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import (
     BayState,
+    CarAt,
     DeskEvent,
     DoorState,
     Message,
@@ -304,6 +305,12 @@ class Compartment:
             return effects
         return effects + self._to_free()
 
+    def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
+        """My journal is lost and my rights were made anew: whatever was meant with the car in my bay, it is parked."""
+        self.stewardship.left = None
+        self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        return [job_record(*self.memory.job), *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
         assert self.memory.job is not None
@@ -333,6 +340,8 @@ class Compartment:
 
     def _when_free(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.doors is not None
+        if self.stewardship.left is not None and self.bay.load_kg:
+            return self._park_again(self.stewardship.left, now_us)
         if not self._is(DoorName.INPUT, DoorPosition.OPEN):
             return []
         if self._key_pressed:

@@ -38,6 +38,8 @@ class Stewardship:
     #: The task that each car's winner has won and its version.
     tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
+    #: A car in my own bay, compartment, that I know nothing of but by others since my rights were made anew.
+    left: CarAt | None = None
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -99,6 +101,12 @@ class Stewardship:
                 effects += self.won(car, NOBODY, task, version)
                 self._say_at_us[car] = now_us
         forgetful &= set(obstacles)
+        for car, told in list(self.fleet.cars_told.items()):
+            if self.fleet.tokens.holds(car_token(*car)):
+                del self.fleet.cars_told[car]
+                effects += custody.state(self.fleet, car, told.station, told.wheelbase_mm)
+                own = self.fleet.site.compartments.get(self.fleet.node_id)
+                self.left = told if own is not None and told.station == own.number else self.left
         for car in [car for car, due_us in self._say_at_us.items() if due_us <= now_us]:
             record = self.fleet.mirror.cars.get(car)
             gone = record is None or record.station == OUTSIDE

@@ -99,12 +99,8 @@ class Picture:
                 before_us, self.offset_us = self.offset_us, time_us - bus_us
                 if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
                     self.clock_settles_us = time_us + SETTLING_US
-            case TokenGrant() as grant:
-                self.tokens.on_grant(grant, time_us)
-            case TokenHeld() as held:
-                self.tokens.on_held(held, time_us)
-            case TokenAssigned() | Regeneration() as word:
-                self.tokens.on_operator(word, time_us)
+            case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
+                self.tokens.feed(word, time_us)
             case Progress() as progress if self._site is not None:
                 body = body_of(self._site, progress, time_us)
                 if body is not None:

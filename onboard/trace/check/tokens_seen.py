@@ -51,6 +51,7 @@ class TokensSeen:
         self._past: OrderedDict[Token, deque[Handover]] = OrderedDict()
         #: What an operator's tool has assigned, until it says that it counts.
         self._assigned: dict[Token, TokenAssigned] = {}
+        self._step = RegenerationPhase.NONE
 
     def last(self, token: Token) -> Handover | None:
         """The newest handover heard of."""
@@ -99,12 +100,28 @@ class TokensSeen:
         """Take up a statement; it tells something new only where the grant is not in the log."""
         self._learn(Token(held.token_kind, held.token), Handover(held.version, 0, held.sender, time_us))
 
+    def feed(self, word: TokenGrant | TokenHeld | TokenAssigned | Regeneration, time_us: int) -> None:
+        """Take up one word about tokens."""
+        match word:
+            case TokenGrant():
+                self.on_grant(word, time_us)
+            case TokenHeld():
+                self.on_held(word, time_us)
+            case _:
+                self.on_operator(word, time_us)
+
+    @property
+    def is_frozen(self) -> bool:
+        """Whether all stand, so that rights can be made anew."""
+        return self._step in (RegenerationPhase.FREEZE, RegenerationPhase.READ_BACK)
+
     def on_operator(self, word: TokenAssigned | Regeneration, time_us: int) -> None:
         """A line of a list of rights that are made anew, or a step: the list counts from COMMIT on, else it is over."""
         if isinstance(word, TokenAssigned):
             if len(self._assigned) < MOST_TOKENS:
                 self._assigned[Token(word.token_kind, word.token)] = word
             return
+        self._step = word.regeneration_phase
         if word.regeneration_phase is RegenerationPhase.COMMIT:
             for token, one in self._assigned.items():
                 self._learn(token, Handover(one.version, 0, one.holder, time_us))
