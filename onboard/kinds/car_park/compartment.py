@@ -340,10 +340,10 @@ class Compartment:
 
     def _when_free(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.doors is not None
-        if self.stewardship.left is not None and self.bay.load_kg:
-            return self._park_again(self.stewardship.left, now_us)
         if not self._is(DoorName.INPUT, DoorPosition.OPEN):
             return []
+        if self.stewardship.left is not None and self.bay.load_kg:
+            return self._park_again(self.stewardship.left, now_us)
         if self._key_pressed:
             self._key_pressed = False
             return self._admit(now_us)

@@ -15,6 +15,8 @@ VERSION_BITS = 16
 MEMORY = 8
 #: Most tokens remembered: all of the largest site, and the cars of many days. The one longest silent is forgotten.
 MOST_TOKENS = 20_000
+#: A freeze that is not said again for so long is over, us (onboard/core/regeneration.py).
+FORGOTTEN_US = 10_000_000
 #: A frame may overtake another of its own sender, whose identifier is larger, by some bursts on a busy bus, us.
 OVERTAKING_US = 100_000
 
@@ -51,7 +53,7 @@ class TokensSeen:
         self._past: OrderedDict[Token, deque[Handover]] = OrderedDict()
         #: What an operator's tool has assigned, until it says that it counts.
         self._assigned: dict[Token, TokenAssigned] = {}
-        self._step = RegenerationPhase.NONE
+        self._step, self._step_us = RegenerationPhase.NONE, 0
 
     def last(self, token: Token) -> Handover | None:
         """The newest handover heard of."""
@@ -110,10 +112,10 @@ class TokensSeen:
             case _:
                 self.on_operator(word, time_us)
 
-    @property
-    def is_frozen(self) -> bool:
-        """Whether all stand, so that rights can be made anew."""
-        return self._step in (RegenerationPhase.FREEZE, RegenerationPhase.READ_BACK)
+    def is_frozen(self, now_us: int) -> bool:
+        """Whether all stand, so that rights can be made anew: not long after the last word of it."""
+        is_begun = self._step in (RegenerationPhase.FREEZE, RegenerationPhase.READ_BACK)
+        return is_begun and now_us - self._step_us < FORGOTTEN_US
 
     def on_operator(self, word: TokenAssigned | Regeneration, time_us: int) -> None:
         """A line of a list of rights that are made anew, or a step: the list counts from COMMIT on, else it is over."""
@@ -121,7 +123,7 @@ class TokensSeen:
             if len(self._assigned) < MOST_TOKENS:
                 self._assigned[Token(word.token_kind, word.token)] = word
             return
-        self._step = word.regeneration_phase
+        self._step, self._step_us = word.regeneration_phase, time_us
         if word.regeneration_phase is RegenerationPhase.COMMIT:
             for token, one in self._assigned.items():
                 self._learn(token, Handover(one.version, 0, one.holder, time_us))
