@@ -27,7 +27,7 @@ def blocked(simulation: Simulation, injection: Injection) -> None:
 
 
 def emergency_stop(simulation: Simulation, _: Injection) -> None:
-    """Somebody presses the button: every machine stops until it is switched on again."""
+    """Somebody presses the button: every machine holds for half a minute, or until an operator lets it go on."""
     _say(simulation, EmergencyStop(STATION, Reason.OPERATOR))
 
 

@@ -16,15 +16,13 @@ from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
-from onboard.core.site import Segment, Site
+from onboard.core.site import Site
 from onboard.core.token_keys import TokenKey, car_token, genesis_holder, may_exist, segment_token, station_token
 
 __all__ = [
     "Claim",
-    "MotionState",
     "TokenBook",
     "TokenKey",
-    "authorised",
     "car_token",
     "genesis_holder",
     "may_exist",
@@ -462,30 +460,6 @@ class TokenBook:
         return Record(
             {"record": record, "kind": int(key.kind), "number": key.number, "version": version, "holder": holder}
         )
-
-
-@dataclass(frozen=True, slots=True)
-class MotionState:
-    """What ``authorised`` looks at: the tokens held and whether the machine may move at all."""
-
-    tokens: TokenBook
-    position_known: bool
-    stopped: bool
-
-
-def authorised(state: MotionState, segment: Segment) -> tuple[bool, Reason]:
-    """Whether this machine's body may be in ``segment`` now, and if not, why not.
-
-    Asked before every movement order and again while the movement runs; nothing else permits motion.
-    """
-    if state.stopped:
-        return False, Reason.OPERATOR
-    if not state.position_known:
-        return False, Reason.POSITION_UNKNOWN
-    key = segment_token(segment)
-    if not state.tokens.holds(key):
-        return False, state.tokens.refused.get(key, Reason.NOT_AUTHORISED)
-    return True, Reason.NONE
 
 
 def _told(version: int) -> int:

@@ -12,7 +12,7 @@ from typing import Any
 
 from onboard.core.authority import TokenBook, TokenKey, car_token, may_exist, segment_token, station_token
 from onboard.core.belief import Belief
-from onboard.core.codes import NOBODY, OUTSIDE, MachineState, Reason, RegenerationPhase, TokenKind
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, OUTSIDE, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.lifts import GATE_INDEX, PLATFORM_INDEX
 from onboard.core.messages import CarAt, Heartbeat, Message, Reference, TokenHeld
@@ -27,8 +27,6 @@ from onboard.core.recovery_messages import (
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, TrackKind
 
-#: Why a machine holds whose rights nobody knows any more; only regeneration gives it any.
-RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
 #: A freeze that its operator does not say again for so long is over, us: it says it each second. Ours.
 FORGOTTEN_US = 10_000_000
 #: Statements said in one go, and the pause behind them, us: a controller's queue has room for 1,000 frames. Ours.
@@ -130,6 +128,14 @@ class Regenerating:
         known = self._cars.get(word.car)
         if known is None or word.version > known.version:
             self._cars[word.car] = word
+
+    def strange(self, beat: Heartbeat) -> Reason:
+        """Why a machine's words do not count: another contract, another site, or rights of another epoch; or NONE."""
+        if beat.contract != CONTRACT_VERSION:
+            return Reason.OTHER_CONTRACT
+        if beat.site_digest != self.site.digest:
+            return Reason.OTHER_SITE
+        return Reason.NONE if beat.epoch == self.epoch else Reason.OTHER_EPOCH
 
     def on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
         """Somebody lives in the epoch of my list: it counts. Somebody of mine works: it does not."""

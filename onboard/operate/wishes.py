@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason
-from onboard.core.regeneration import RIGHTS_LOST
+from onboard.core.holding import RIGHTS_LOST
 from onboard.core.site import Machine, Site
 from onboard.kinds.car_park.site import CarPark
 from onboard.operate.assignment import Body

@@ -19,9 +19,8 @@ from deploy.package import build_package
 from deploy.wheels import PINS, DeployError, pinned_wheels
 from onboard.cli import main as onboard_main
 from onboard.config.machine import load_machine
-from onboard.core.codes import Reason
 from onboard.core.frame import Frame
-from onboard.core.messages import EmergencyStop, Heartbeat, Message
+from onboard.core.messages import Heartbeat, Message, SyncRequest
 from onboard.io.endings import Ending
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
@@ -67,7 +66,7 @@ def test_the_single_file_walks_a_person_through_a_new_machine(archive: Path) -> 
 
 
 async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: Path, tmp_path: Path) -> None:
-    """Against a served bus, as a board would join it; its reason for stopping is an emergency stop."""
+    """Against a served bus, as a board would join it; its reason for stopping is what another machine knows of it."""
     machine = fleet(tmp_path, "--device", "can0") / "MR1" / "machine.toml"
     heard: asyncio.Queue[Message] = asyncio.Queue()
     decoder = Decoder(fleet_codec())
@@ -81,7 +80,7 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
         medium = Medium(LoopClock(asyncio.get_running_loop()))
         server = SocketcandServer(lambda _, name: medium.attach(name), int, port=0)
         port = await server.start()
-        ears = medium.attach("ears", 251)
+        ears = medium.attach("IOC1", 1)
         ears.subscribe(on_frame)
         served = f'interface = "socketcand-asyncio"\nhost = "127.0.0.1"\nport = {port}\n'
         machine.write_text(machine.read_text().replace('interface = "socketcan"\n', served))
@@ -90,7 +89,7 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
             stderr=asyncio.subprocess.PIPE,
         )
         message = await heard.get()
-        for frame in fleet_codec().encode(EmergencyStop(251, Reason.OPERATOR)):
+        for frame in fleet_codec().encode(SyncRequest(1, 11, 9)):
             ears.send(frame)
         _, said = await program.communicate()
         await server.close()
@@ -99,7 +98,7 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
     async with asyncio.timeout(DEADLINE_S):
         message, status, said = await scenario()
     assert isinstance(message, Heartbeat) and message.sender == 11
-    assert status == Ending.WAITS_FOR_PERSON and "emergency stop from node 251" in said
+    assert status == Ending.WAITS_FOR_PERSON and "node 1 knew this node under boot 9" in said
 
 
 def test_the_same_sources_give_the_same_bytes(archive: Path, tmp_path: Path) -> None:

@@ -48,8 +48,11 @@ def scene(site: SiteRun) -> dict[str, object]:
     status = site.statuses(["plant"], 150)
     site.tell("the plant's run is over")
     site.tool("cansend", "can0", plan["stop"])
-    status |= site.statuses(site.order.machines, 20)
-    site.tell("all have stopped")
+    held: dict[str, str] = plan["held"]
+    for name, word in held.items():
+        site.wait(ears, f"{name} holds", lambda word=word: any(f.startswith(word) for f in ears.frames), 20)
+    status |= site.end(site.order.machines)
+    site.tell("all have ended")
     site.end(["candump", "candump-outside", "monitor"])
 
     part = site.share / "part.log"

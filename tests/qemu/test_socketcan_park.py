@@ -11,6 +11,7 @@ from hil.guest.machine import GuestRun, run_guest
 from onboard.config.site import parse_site
 from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.core.messages import EmergencyStop, Heartbeat, Itinerary, Message, Progress, SyncRequest, TaskReport
+from onboard.core.recovery_messages import Halted
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records
 from onboard.wire.codec import fleet_codec
@@ -39,6 +40,13 @@ def heartbeats() -> dict[str, str]:
     return {name: frame_of(said[node])[:8] for name, node in MACHINES.items()}
 
 
+def held() -> dict[str, str]:
+    """Of every machine the begin of the frame in which it says that it holds by the person's stop."""
+    said = {node: Halted(node, node, Reason.EMERGENCY_STOP, PERSON, False, 1) for node in MACHINES.values()}
+    # Identifier, and of the data the machine, the reason and the node: the boot counter may be any.
+    return {name: frame_of(said[node])[: 8 + 1 + 6] for name, node in MACHINES.items()}
+
+
 def make(share: Path) -> GuestRun:
     share.mkdir()
     (share / "site.toml").write_text(SITE)
@@ -55,6 +63,7 @@ def make(share: Path) -> GuestRun:
         "ask": frame_of(SyncRequest(PERSON, MACHINES["MR1"])),
         "answer": frame_of(Progress(MACHINES["MR1"], 1, 1, 1, 1, 0, 0))[:8],
         "stop": frame_of(EmergencyStop(PERSON, Reason.OPERATOR)),
+        "held": held(),
     }
     (share / "plan.json").write_text(json.dumps(plan))
     return run_guest(scene_script("tests.qemu.park_scene"), share, limit_s=LIMIT_S)
@@ -123,15 +132,15 @@ def test_from_outside_the_interface_tells_who_sent(park: Path) -> None:
     assert {node for node, _ in senders} == set(names)
 
 
-def test_cansend_asks_and_is_answered_and_an_emergency_stop_stops_everybody(park: Path) -> None:
+def test_cansend_asks_and_is_answered_and_an_emergency_stop_holds_everybody(park: Path) -> None:
     order = [message for _, _, message in recorded(park / "fleet.log")]
     asked = order.index(SyncRequest(PERSON, MACHINES["MR1"]))
     assert any(isinstance(one, Itinerary) and one.sender == MACHINES["MR1"] for one in order[asked:])
     assert EmergencyStop(PERSON, Reason.OPERATOR) in order
     status = json.loads((park / "found.json").read_text())["status"]
-    assert status == {"plant": 0} | dict.fromkeys(MACHINES, 3)
+    assert status == {"plant": 0} | dict.fromkeys(MACHINES, 0)
     for name in MACHINES:
-        assert f"{name}: halted: emergency stop from node {PERSON}: OPERATOR" in (park / f"{name}.txt").read_text()
+        assert f"{name}: held: EMERGENCY_STOP, by node {PERSON}" in (park / f"{name}.txt").read_text()
 
 
 def test_cantools_monitor_shows_every_machine(park: Path) -> None:

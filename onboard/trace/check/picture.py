@@ -98,7 +98,7 @@ class Picture:
             case BusTime(bus_time_us=bus_us):
                 before_us, self.offset_us = self.offset_us, time_us - bus_us
                 if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
-                    self.clock_settles_us = time_us + SETTLING_US
+                    self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
             case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
                 self.tokens.feed(word, time_us)
             case Progress() as progress if self._site is not None:
