@@ -71,7 +71,7 @@ def wish_of(injection: Injection) -> Wish:
         segment=segment,
         of=injection.text("target") if do == "go" else "",
         absent=injection.text("target") if is_absent else "",
-        body=(segment,) if is_absent else None,
+        body=(injection.text("body").replace(";", ",") or segment,),
         for_us=round(seconds * 1e6) if do == "stop" else None,
     )
 

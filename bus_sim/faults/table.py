@@ -275,6 +275,7 @@ KINDS: Final[Mapping[str, Kind]] = {
             "track": _count("the number of a track, for block, clear and an absent body", 1, 1, 254),
             "index": _count("the index of a segment, for block, clear and an absent body", 1, 1, 255),
             "absent": _one_of("no", "yes"),
+            "body": Setting(str, "a slot such as p(1;5), or gone, for regenerate", ""),
             "for_s": _seconds(10.0),
         },
     ),

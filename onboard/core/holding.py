@@ -25,6 +25,10 @@ TWIN_BEATS = 600
 DEAF_BEATS = 2
 
 
+#: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
+RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
+
+
 class Hold(Enum):
     """Whether a machine acts, or what holds it."""
 

@@ -33,6 +33,7 @@ from onboard.core.codes import (
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import (
     BayState,
+    CarAt,
     DeskEvent,
     DoorState,
     Message,
@@ -311,6 +312,12 @@ class Compartment:
             return effects
         return effects + self._to_free()
 
+    def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
+        """My journal is lost and my rights were made anew: whatever was meant with the car in my bay, it is parked."""
+        self.stewardship.left = None
+        self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        return [job_record(*self.memory.job), *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
         assert self.memory.job is not None
@@ -342,6 +349,8 @@ class Compartment:
         assert self.bay is not None and self.doors is not None
         if not self._is(DoorName.INPUT, DoorPosition.OPEN):
             return []
+        if self.stewardship.left is not None and self.bay.load_kg:
+            return self._park_again(self.stewardship.left, now_us)
         if self._key_pressed:
             self._key_pressed = False
             return self._admit(now_us)

@@ -21,7 +21,7 @@ from onboard.core.site import Segment
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import ShuttleWork
 from onboard.kinds.car_park.program import Step, ends_at, standing_itinerary
-from onboard.kinds.car_park.recovery import Recovery
+from onboard.kinds.car_park.recovery import Recovery, floor_record
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.travel import Carriage
 
@@ -116,11 +116,16 @@ class Starting:
 
         In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
         """
-        carriage = self.body.carriage
+        carriage, told = self.body.carriage, self.fleet.slots_told
+        effects: list[Effect] = []
+        if told:
+            # A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
+            self.fleet.slots_told, carriage.track, self.recovery.is_restart = (), told[0].track, True
+            effects.append(floor_record(told[0].track))
         here = carriage.standing_at
         assert carriage.sensed is not None
         if here is not None and here == carriage.nearest:
-            return self._is_placed(here, now_us)
+            return effects + self._is_placed(here, now_us)
         out = carriage.way_out
         if out is not None and carriage.goal is not None and carriage.goal != out:
             carriage.go(out)
@@ -128,11 +133,11 @@ class Starting:
         rests = carriage.sensed.mode in (DriveMode.STANDING, DriveMode.FAULT)
         if carriage.goal is None and rests and shuttle is not None and shuttle.mode in AT_REST:
             if shuttle.mode is not ShuttleMode.HOME:
-                return self._hold(self.recovery.contradiction(None, shuttle))
+                return effects + self._hold(self.recovery.contradiction(None, shuttle))
             if not self.generation.is_held:
                 # It asks first for what it is in: it may have been pushed there while it was off.
                 carriage.go(out or carriage.nearest)
-        return carriage.advance(now_us) if carriage.goal is not None else []
+        return effects + (carriage.advance(now_us) if carriage.goal is not None else [])
 
     def _is_placed(self, here: Segment, now_us: int) -> list[Effect]:
         """Stand here and tell everybody; after a restart go on a little later."""

@@ -202,8 +202,11 @@ class Carriage:
         return abs(state.position_mm - axis.position_mm(axis.index_at(state.position_mm))) > OFF_LIMIT_MM
 
     def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
-        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known."""
-        if self.sensed is None:
+        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known.
+
+        A journal that is lost knew the track; the drive alone knows only where on it.
+        """
+        if self.sensed is None or self.fleet.has_no_rights:
             return []
         here, offset_mm = self._told_at(self.sensed)
         self._reported = here
