@@ -177,8 +177,9 @@ class Checks:
         self._excused_us = self._picture.excused_us = max(self._excused_us, until_us)
 
     def excuse_clocks(self, until_us: int) -> None:
-        """Until then, us of the log, clocks are wrong on purpose: a deadline is over when its machine thinks so,
-        and bus time that goes back is no other run.
+        """Until then, us of the log, clocks are wrong on purpose.
+
+        A deadline is over when its machine thinks so, and bus time that goes back is no other run.
         """
         self._clocks_until_us = self._picture.clock_settles_us = until_us + SETTLING_US
 
