@@ -178,7 +178,10 @@ class Checks:
         self._excused_us = self._picture.excused_us = max(self._excused_us, until_us)
 
     def excuse_clocks(self, until_us: int) -> None:
-        """Until then, us of the log, clocks are wrong on purpose: a deadline is over when its machine thinks so."""
+        """Until then, us of the log, clocks are wrong on purpose.
+
+        A deadline is over when its machine thinks so, and bus time that goes back is no other run.
+        """
         self._clocks_until_us = self._picture.clock_settles_us = until_us + SETTLING_US
 
     def feed(self, time_us: int, channel: str, frame: Frame) -> None:
@@ -238,7 +241,7 @@ class Checks:
         """The time to go by: a little back is held, much back is another run, as is bus time that starts anew."""
         last_us, offset_us = self._last_us, self._picture.offset_us
         back_us = 0 if last_us is None else last_us - time_us
-        anew = isinstance(message, BusTime) and offset_us is not None
+        anew = isinstance(message, BusTime) and offset_us is not None and time_us >= self._clocks_until_us
         # A bus time that stands still while the log goes on is one that began anew as well.
         anew = anew and isinstance(message, BusTime) and time_us - message.bus_time_us - (offset_us or 0) > BACK_US
         if back_us > BACK_US or anew:
