@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.core.backoff import BackOff
 from onboard.core.belief import Belief, Beliefs, Key
 from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
@@ -83,6 +84,8 @@ class TokenBook:
     #: To whom each token went that this node gave away last, and under which version: what it answers to a dispute.
     given: dict[TokenKey, Belief] = field(default_factory=dict)
     beliefs: Beliefs = field(init=False)
+    #: When what waits for an answer is said again.
+    backoff: BackOff = field(init=False)
     wanted: dict[TokenKey, int] = field(default_factory=dict)
     refused: dict[TokenKey, Reason] = field(default_factory=dict)
     #: What to say with a request for a token, from this node's plan and mirror.
@@ -110,6 +113,7 @@ class TokenBook:
     _said_us: dict[tuple[TokenKey, type[Message]], int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.backoff = BackOff(self.site.timing.token_repeat_us)
         self.beliefs = Beliefs(self._first_holder)
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
@@ -199,8 +203,18 @@ class TokenBook:
         """Stop asking. A grant that still arrives is accepted and can be given back."""
         self.changes += 1
         self.wanted.pop(key, None)
+        self.backoff.forget(("wanted", key))
         self.refused.pop(key, None)
         self.behind_since_us.pop(key, None)
+
+    def begin_anew(self, now_us: int) -> None:
+        """A machine has come back, or was started: what waits may wait for it, and is said soon again."""
+        self.backoff.begin_anew()
+        soon_us = now_us + self.site.timing.token_repeat_us
+        self.wanted = {key: min(due_us, soon_us) for key, due_us in self.wanted.items()}
+        self.leaving = {
+            key: grant._replace(repeat_at_us=min(grant.repeat_at_us, soon_us)) for key, grant in self.leaving.items()
+        }
 
     def give(self, key: TokenKey, to: int, now_us: int) -> list[Effect]:
         """Move a held token to node ``to``: erase, journal, then send.
@@ -217,7 +231,8 @@ class TokenBook:
         self.seen[key] = version
         self.given[key] = Belief(version, to)
         self.beliefs.take_up(key, version, to)
-        self.leaving[key] = Grant(version, to, now_us + self.site.timing.token_repeat_us)
+        self.backoff.forget(("leaving", key))
+        self.leaving[key] = Grant(version, to, self.backoff.say(("leaving", key), now_us))
         return [self._record("token_given", key, version, to), Send(self._grant(key, version, to))]
 
     # --- words of others ---------------------------------------------------------------------------------------
@@ -227,7 +242,8 @@ class TokenBook:
         key = TokenKey(request.token_kind, request.token)
         pending = self.leaving.get(key) if self.is_synced else None
         if pending is not None and pending.holder == request.sender:
-            if now_us < pending.repeat_at_us - self.site.timing.token_repeat_us + IN_FLIGHT_US:
+            said_us = self.backoff.last_us(("leaving", key))
+            if said_us is not None and now_us < said_us + IN_FLIGHT_US:
                 return []
             return self._grant_again(key, pending)
         if not self.holds(key):
@@ -292,7 +308,9 @@ class TokenBook:
                 self.behind_since_us.setdefault(key, now_us)
             else:
                 self.behind_since_us.pop(key, None)
-            self.wanted[key] = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
+            asked_us = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
+            is_behind = refusal.reason is Reason.MIRROR_BEHIND
+            self.wanted[key] = asked_us if is_behind else max(asked_us, self.wanted[key])
             self.changes += 1
 
     # --- what is said without being asked --------------------------------------------------------------------------
@@ -313,15 +331,17 @@ class TokenBook:
         effects: list[Effect] = []
         if not self.is_synced:
             return effects
-        repeat_us = self.site.timing.token_repeat_us
+        waiting = len(self.wanted) + len(self.leaving)
         for key, due_us in self.wanted.items():
             if due_us <= now_us:
-                self.wanted[key] = now_us + repeat_us
                 claim = no_claim(key) if key in self.unordered else self.claim(key)
+                longest_us = self.backoff.longest_us if claim.itinerary_version else self.backoff.unordered_us
+                self.wanted[key] = self.backoff.say(("wanted", key), now_us, waiting, longest_us)
                 effects.append(Send(TokenRequest(self.node_id, *key, _told(self.version_of(key)), *claim)))
         for key, grant in self.leaving.items():
             if grant.repeat_at_us <= now_us:
-                self.leaving[key] = grant._replace(repeat_at_us=now_us + repeat_us)
+                due_us = self.backoff.say(("leaving", key), now_us, waiting)
+                self.leaving[key] = grant._replace(repeat_at_us=due_us)
                 effects += self._grant_again(key, grant)
         return effects
 
@@ -405,6 +425,7 @@ class TokenBook:
         # Its receiver says that it holds the token, or that it gave it on: either proves that it had it.
         if pending is not None and (confirmed or version > pending.version):
             del self.leaving[key]
+            self.backoff.forget(("leaving", key))
             self.given[key] = Belief(pending.version, pending.holder, confirmed=True)
             effects.append(self._record("token_gone", key, pending.version, pending.holder))
         disputed = self._disputed.pop(key, None)

@@ -361,6 +361,8 @@ class Holon:
             self.time.elect(self.clock.local_us(now_us))
         if self.holding.is_apart:
             return news
+        if fresh:
+            self.tokens.begin_anew(now_us)
         return news + self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:

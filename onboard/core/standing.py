@@ -7,7 +7,7 @@ the end only its place counts.
 from dataclasses import dataclass, field
 
 from onboard.core.codes import MOBILE_KINDS, Grade, LegAction
-from onboard.core.messages import Itinerary, Leg, Message, Progress, TaskReport, Waiting
+from onboard.core.messages import Itinerary, Leg, Message, Progress, TaskReport, TokenRequest, Waiting
 from onboard.core.mirror import Mirror
 from onboard.core.occupancy import final_position, turned_in
 from onboard.core.serial import from_bus_ms
@@ -46,7 +46,8 @@ class Standing:
             if known is None or known.place != place:
                 self._seen[message.sender] = _Seen(place, now_us, now_us)
             return
-        speaks = isinstance(message, Waiting | TaskReport)
+        # Who asks for a right waits for it.
+        speaks = isinstance(message, Waiting | TaskReport | TokenRequest)
         speaks = speaks or (isinstance(message, Itinerary) and message.grade is Grade.FIRM)
         if speaks and message.sender in self._seen:
             self._seen[message.sender].spoke_us = now_us

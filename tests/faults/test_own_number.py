@@ -8,9 +8,9 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import Injection
 from bus_sim.run import FLEET, Simulation
 from bus_sim.sites import find_site
-from onboard.core.codes import Reason, TokenKind
+from onboard.core.codes import CallResult, Reason, TokenKind
 from onboard.core.frame import Frame
-from onboard.core.messages import Diagnostic, Heartbeat, Message, TokenGrant
+from onboard.core.messages import Award, Diagnostic, Heartbeat, Message, Reference, TokenGrant
 from onboard.core.recovery_messages import Go, Halted
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
@@ -56,8 +56,9 @@ def test_a_second_board_holds_the_machine_while_it_is_there() -> None:
 
 
 @pytest.mark.parametrize("go", [True, False])
-def test_a_right_given_away_under_its_number_needs_a_person(go: bool) -> None:
-    forged = TokenGrant(ROBOT, TokenKind.SEGMENT, find_site("small").machines[ROBOT].home.number, 7, 12)
+def test_an_award_under_its_number_needs_a_person(go: bool) -> None:
+    task = Reference(ROBOT, 1)
+    forged = Award(ROBOT, 3, 12, task, 1, CallResult.AWARDED, Reason.NONE)
 
     def act(run: Simulation) -> None:
         says(run, 15, forged)
@@ -68,8 +69,21 @@ def test_a_right_given_away_under_its_number_needs_a_person(go: bool) -> None:
     last_us, last = words(scene)[-1]
     assert (last.reason, last.needs_person) == (Reason.DUPLICATE_NODE_ID, True)
     assert (last_us < 61e6) is go
-    states = [beat.boot for _, beat in scene.all(Heartbeat, FLEET) if beat.sender == ROBOT]
-    assert states[-1] == (2 if go else 1)
+    boots = [beat.boot for _, beat in scene.all(Heartbeat, FLEET) if beat.sender == ROBOT]
+    assert boots[-1] == (2 if go else 1)
+
+
+def test_a_right_that_was_taken_from_it_meanwhile_is_found_when_it_comes_back() -> None:
+    """A person who lets it go on does not make two holders: all say what they hold, and that is compared."""
+    forged = TokenGrant(ROBOT, TokenKind.SEGMENT, find_site("small").machines[ROBOT].home.number, 7, 12)
+
+    def act(run: Simulation) -> None:
+        says(run, 15, forged)
+        says(run, 60, Go(OPERATOR, ROBOT))
+
+    scene = play(find_site("small"), stays(), before=act, extra_s=120)
+    _, last = words(scene)[-1]
+    assert (last.reason, last.needs_person) == (Reason.JOURNAL_SHORT, True)
 
 
 def test_a_log_that_is_played_on_the_live_bus_does_not_stop_the_fleet_for_good() -> None:

@@ -26,6 +26,8 @@ Outcome = list[Effect | NegotiationEvent]
 #: is enough. Ours.
 QUICK_AWARDS = 10
 SLOW_DOWN = 10
+#: The longest pace, in award repeats: 16 s at the default of 100 ms. Ours.
+SLOWEST = 160
 
 #: Steps and largest values of a sub-call's two durations on the wire (dbc/fleet.dbc, CallParent), in ms.
 READY_STEP_MS, MAX_READY_MS = 100, 1_638_300
@@ -277,8 +279,10 @@ class Initiator:
             if not self.terms.depth:
                 self.trust.given(self.terms.task, winner, cost, self.terms.criterion)
         self.awards_sent += 1
-        slow = self.awards_sent > QUICK_AWARDS
-        self.due_us = now_us + self.timing.award_repeat_us * (SLOW_DOWN if slow else 1)
+        slow = self.awards_sent - QUICK_AWARDS
+        # Ever more slowly: what a winner that is down needs to hear it hears when it is back and asks.
+        factor = min(SLOWEST, SLOW_DOWN << min(slow, 10)) if slow > 0 else 1
+        self.due_us = now_us + self.timing.award_repeat_us * factor
         outcome: Outcome = [Send(self._closing(winner, CallResult.AWARDED, Reason.NONE))]
         if self.awards_sent == QUICK_AWARDS + 1:
             task = self.terms.task
