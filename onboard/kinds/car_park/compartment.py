@@ -42,10 +42,9 @@ from onboard.core.messages import (
     TaskReport,
     TokenRequest,
 )
-from onboard.core.mirror import Mirror
-from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, Estimator, NegotiationEvent
+from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.serial import successor
-from onboard.core.site import Machine, Site, Station
+from onboard.core.site import Station
 from onboard.kinds.car_park import bay_task, custody
 from onboard.kinds.car_park.bay_generation import BayGeneration
 from onboard.kinds.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
@@ -55,20 +54,6 @@ from onboard.kinds.car_park.outputs import BayOutputs
 from onboard.kinds.car_park.program import Program
 from onboard.kinds.car_park.site import car_park
 from onboard.kinds.car_park.stewardship import Stewardship
-
-
-class CompartmentFactory:
-    """Makes compartments."""
-
-    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
-        """The compartment's task-generation function."""
-        return BayGeneration(site, machine)
-
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Compartment":
-        """The compartment's steps; ``estimator`` is the one made above."""
-        if not isinstance(estimator, BayGeneration):
-            raise TypeError("a compartment needs its own task-generation function")
-        return Compartment(fleet, estimator)
 
 
 @dataclass
