@@ -1,6 +1,7 @@
 """``python -m deploy``: what people put on boards."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,11 +13,14 @@ from deploy.image.image import build_image, build_update
 from deploy.image.release import Release
 from deploy.image.root import build_root
 from deploy.package import build_package
+from deploy.replace import write_replacement
 from deploy.update.manifest import UpdateError, version_key
 from deploy.update.signature import make_keys
 from deploy.wheels import DeployError
 from onboard.config.problems import ConfigError
 
+#: Outside of any checkout, and nobody else's.
+SECRET = Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "onboard" / "update-key.pem"
 HELP = """\
 exit status:
   0  done; each file written is one line
@@ -26,10 +30,11 @@ examples:
   python -m deploy archive                 dist/onboard.pyz, which any Python 3.11 or newer runs
   python -m deploy deb                     a Debian package with the service
   sudo python -m deploy root               the root file system for 64-bit ARM boards, its kernel and its digest
-  python -m deploy keys                    update-key.pem, which signs updates and stays here, and update-key.pub.pem
-  sudo python -m deploy image --key update-key.pub.pem
+  python -m deploy keys                    ~/.config/onboard/update-key.pem, which signs updates and stays there, and
+                                           update-key.pub.pem beside it
+  sudo python -m deploy image --key ~/.config/onboard/update-key.pub.pem
                                            dist/onboard.img, which boards are flashed with
-  sudo python -m deploy update --secret update-key.pem --version 0.2.0
+  sudo python -m deploy update --secret ~/.config/onboard/update-key.pem --version 0.2.0
                                            a signed update for boards that were flashed with such an image
   python -m deploy machines mysite.toml    dist/machines/NAME/, the files for every board's boot partition
 """
@@ -59,6 +64,12 @@ def build_parser() -> argparse.ArgumentParser:
     machines.add_argument(
         "--device", default="can1", metavar="CHANNEL", help="of the device bus; may be the same (can1)"
     )
+    replace = commands.add_parser("replace", help="what a board needs that takes another's place")
+    replace.add_argument(
+        "--card", type=Path, required=True, metavar="DIR", help="the old board's boot partition, or dist/machines/NAME"
+    )
+    replace.add_argument("--journal", type=Path, metavar="DIR", help="its journal's folder, where it can be read")
+    replace.add_argument("--out", type=Path, default=Path("dist/replace"), metavar="DIR")
     return parser
 
 
@@ -81,7 +92,7 @@ def _add_image(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="Debian's package raspi-firmware, not free software; a Raspberry Pi does not start without it",
     )
     keys = commands.add_parser("keys", help="a pair of keys for updates")
-    keys.add_argument("--out", type=Path, default=Path("update-key.pem"), metavar="FILE", help="the secret one")
+    keys.add_argument("--out", type=Path, default=SECRET, metavar="FILE", help=f"the secret one ({SECRET})")
     update = commands.add_parser("update", help="a signed update for boards with such an image")
     update.add_argument("--out", type=Path, metavar="FILE", help="dist/onboard-VERSION.update")
     update.add_argument(
@@ -119,6 +130,8 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
             return [made.kernel, made.initrd, made.squashfs, f"sha256 {made.digest}"]
         case "machines":
             return [*write_fleet(args.site, args.out, args.fleet, args.device)]
+        case "replace":
+            return [*write_replacement(args.card, args.journal, args.out)]
         case "image":
             args.out.parent.mkdir(parents=True, exist_ok=True)
             version_key(args.version)
@@ -127,6 +140,7 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
             return [image.disk, f"sha256 {image.digest}", f"root file system: sha256 {image.root.digest}"]
         case "keys":
             public = args.out.with_suffix(".pub.pem")
+            args.out.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
             make_keys(args.out, public)
             return [args.out, public]
         case "update":

@@ -17,6 +17,12 @@ _PLACES = {
     "onboard": ("usr/bin/onboard", 0o755),
     "onboard.service": ("usr/lib/systemd/system/onboard.service", 0o644),
     "70-can.link": ("usr/lib/systemd/network/70-can.link", 0o644),
+    **{
+        f"onboard-{name}.service": (f"usr/lib/systemd/system/onboard-{name}.service", 0o644)
+        for name in ("gateway", "web", "recorder", "clock")
+    },
+    "record": ("usr/lib/onboard/record", 0o755),
+    "clock": ("usr/lib/onboard/clock", 0o755),
 }
 _CONTROL = """\
 Package: onboard-fleet

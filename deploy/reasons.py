@@ -67,7 +67,10 @@ ADVICE: dict[Reason, Advice] = {
         "look at the machine, clear the fault, then start its controller again",
     ),
     Reason.SENSOR_FAULT: _KEPT,
-    Reason.INVARIANT_BROKEN: _KEPT,
+    Reason.INVARIANT_BROKEN: Advice(
+        "a belief of the controller was wrong; it was stopped and is started again",
+        "keep its recording and what its console says, and report them; the third time in a row it waits for a person",
+    ),
     Reason.INCOMPLETE_SET: Advice(
         "frames of one message did not all arrive",
         "nothing for a few; for many: queue length 1000 at every interface, error counters, bus load",
@@ -104,6 +107,65 @@ ADVICE: dict[Reason, Advice] = {
     Reason.NODE_SILENT: Advice(
         "a machine has not been heard for three heartbeats, and counts as an obstacle",
         "its power, its cable, and what its console says",
+    ),
+    Reason.NOT_OF_SITE: Advice(
+        "a node that the site file does not have speaks",
+        "find the sender by the identifier's lowest byte, and take it off",
+    ),
+    Reason.NOT_OF_KIND: Advice(
+        "a machine says what its kind may not say",
+        "is that board's machine file right? Else find the sender, and take it off",
+    ),
+    Reason.NOT_THE_HOLDER: Advice(
+        "a token was granted by a node that the receiver does not believe to hold it; both name what they know",
+        "nothing for a few; if it stays so, look at the journals of both, and at who speaks under their numbers",
+    ),
+    Reason.RIGHT_CLAIMED: Advice(
+        "a machine claims a right that another one holds, which keeps it",
+        "look at the machine that claims: an old journal, or somebody who speaks under its number",
+    ),
+    Reason.EMERGENCY_STOP: Advice(
+        "somebody has said an emergency stop", "find out why; then `onboard operate go`, or start the controller again"
+    ),
+    Reason.LEFT_OUT: Advice(
+        "a machine that forfeited a task is left out of its next calls", "why did it not do it? See what it said before"
+    ),
+    Reason.OTHER_EPOCH: Advice(
+        "a machine was absent when rights were regenerated; it joins as an obstacle",
+        "clear its journal only where it was declared absent: see replacing, above",
+    ),
+    Reason.JOURNAL_SHORT: Advice(
+        "a journal lacks what others know of it: an old copy, or its end is lost; the machine holds",
+        "`onboard operate regenerate`: see replacing, above",
+    ),
+    Reason.JOURNAL_FOREIGN: Advice(
+        "the journal is that of another machine or site",
+        "put this machine's own journal there; else see replacing, above",
+    ),
+    Reason.NO_FRESH_PROOF: Advice(
+        "what a movement depends on was not confirmed just now: a sill, a bay, a platform", _NOTHING
+    ),
+    Reason.RUNAWAY: Advice(
+        "a machine's steps did not come to rest; it was stopped and is started again",
+        "keep its recording and what its console says, and report them; the third time in a row it waits for a person",
+    ),
+    Reason.WATCHDOG: Advice(
+        "a controller hung, its supervisor ended it, and it was started again",
+        "once: nothing; if it comes again: the board's processor, its power and its card",
+    ),
+    Reason.BUS_LOST: Advice(
+        "a board's CAN interface was gone, and has come back; the machine stood meanwhile",
+        "for more than one: the adapter's plug and cable, `dmesg` on the board",
+    ),
+    Reason.CLOCK_JUMPED: Advice(
+        "a machine's clock does not fit the bus time", "nothing for one; if it comes again, change that board"
+    ),
+    Reason.FALSE_STATEMENT: Advice(
+        "a machine said what its own sensors, or those of others, refute", "look at that machine and its sensors"
+    ),
+    Reason.REGENERATION: Advice(
+        "rights are being regenerated; machines stand meanwhile",
+        "finish it, or end it with `onboard operate regenerate`",
     ),
 }
 

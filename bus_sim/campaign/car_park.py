@@ -45,6 +45,10 @@ class CarPark:
         """See ``Stage``."""
         return [str(one) for one in self._oracle.finish()]
 
+    def waits_since(self, time_us: int) -> int:
+        """See ``Stage``."""
+        return sum(_waits_since(customer, time_us) for customer in self._street.customers)
+
     def tally(self) -> Tally:
         """Whoever has lost the ticket does not count as waiting: no machine can help there."""
         customers, summary = self._street.customers, self._street.summary()
@@ -67,6 +71,15 @@ def is_over(street: Street) -> bool:
         or _looks_for_ticket(customer)
         for customer in street.customers
     )
+
+
+def _waits_since(customer: Customer, time_us: int) -> bool:
+    """Whether a customer waits who waited at this time: to bring the car, or to have it back."""
+    if customer.state is State.GONE or _looks_for_ticket(customer):
+        return False
+    visit = customer.visit
+    since_us = visit.arrived_us if visit.parked_us is None else visit.asked_us
+    return since_us is not None and since_us <= time_us
 
 
 def _looks_for_ticket(customer: Customer) -> bool:

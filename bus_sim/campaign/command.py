@@ -13,17 +13,20 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from bus_sim.campaign import table
+from bus_sim.campaign.cold_start import cold_starts
 from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.ledger import Ledger
 from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
+from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.systems import SYSTEMS, usual_orders, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
+from bus_sim.stranger import Stranger
 from bus_sim.systems.orders import Orders
 from onboard.core.site import Site
 
@@ -45,7 +48,9 @@ and that all mirrors become equal.
 
 With --exhaustive one reference scene of a car park (a car in and out, or with --scene overlap three that meet) is
 played again and again, each time with one single fault: every frame lost or doubled at each receiver, or every
-controller killed before each of its frames and around each of its journal writes.
+controller killed before each of its frames and around each of its journal writes, or (journal) at each of its writes
+with the write torn, 1 to 50 records lost, a page zeroed, a bit flipped, the seal gone, another machine's journal, an
+old copy, or no journal at all. A machine that holds because it cannot rely on its journal, and says so, counts as told.
 
 exit status:
   0  every run was safe, and went on once its faults were over
@@ -57,8 +62,10 @@ examples:
   bus-sim campaign standard --seeds 1-8 --cars 300 --apart 90 --faults-an-hour 6 --no-baseline --limit 86400
   bus-sim campaign graph --seeds 1-30 --orders 40
   bus-sim campaign small --exhaustive crash --sample 400
+  bus-sim campaign small --exhaustive journal --sample 400
   bus-sim campaign small --exhaustive crash --scene overlap --add-to crashes.jsonl
   bus-sim campaign small --seeds 1-2000 --faults two-crashes --apart 30 --no-baseline --add-to crashes.jsonl
+  bus-sim campaign standard --cold-start
   bus-sim campaign standard --seeds 1-2000 --dask tcp://10.0.0.5:8786
 """
 
@@ -82,6 +89,12 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         choices=[str(one) for one in Scene],
         default=str(Scene.ALONE),
         help="with --exhaustive: one car alone, or three that overlap (default: alone)",
+    )
+    parser.add_argument(
+        "--cold-start",
+        action="store_true",
+        help="instead of seeds: cut the power of all machines at work, and see who takes part again within 30 s, with "
+        "nobody missing and with each machine missing in turn",
     )
     parser.add_argument("--sample", type=int, metavar="N", help="with --exhaustive: only so many, spread over all")
     parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
@@ -119,6 +132,11 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--out", type=Path, default=Path("campaign"), metavar="DIR", help="failures (default: campaign)"
     )
+    parser.add_argument(
+        "--stranger",
+        choices=[one.value for one in Stranger],
+        help="no faults: the first robot bids and does not do what it wins, beside the same seeds without it",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results as JSON too")
     parser.add_argument(
         "--add-to",
@@ -132,7 +150,11 @@ def run_campaign_command(args: argparse.Namespace) -> int:
     """Play it. Raises ``DemandError`` for a mistake in the command line, ``SiteNotFoundError`` for an unknown site."""
     site = find_site(args.site)
     plan = _plan(args, site)
+    if args.stranger is not None:
+        return _strangers(args, plan, site)
     console = Console()
+    if args.cold_start:
+        return _start_cold(args.site, site, console)
     ledger = _ledger(args, plan)
     trials, total = _trials(args, plan, site, console, ledger)
     results: list[Result] = []
@@ -154,6 +176,31 @@ def run_campaign_command(args: argparse.Namespace) -> int:
             console.print(line, highlight=False, markup=False, soft_wrap=True)
     has_failed = any(result.report.verdict in FAILURES for result in results)
     return 1 if has_failed or (ledger is not None and ledger.has_failed) else 0
+
+
+def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
+    if site.system in SYSTEMS:
+        raise DemandError(f"--stranger {args.stranger}: {site.name} is a {site.system}, and only a car park has it")
+    strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, plan.limit_s or SCENE_LIMIT_S)
+    pairs = sorted(
+        play_pairs(strange, read_seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed
+    )
+    for pair in pairs:
+        print(pair.line())
+    bad = [pair for pair in pairs if not pair.is_good]
+    worst = max(pair.longer_s for pair in pairs)
+    told = f"{len(pairs)} seeds with a machine that {strange.how.value}"
+    print(f"{told}: {len(bad)} failed; mean wait at most {worst:+.1f} s longer than without it")
+    return 1 if bad else 0
+
+
+def _start_cold(name: str, site: Site, console: Console) -> int:
+    """0 where every machine with power took part in time, each time."""
+    is_good = True
+    for start in cold_starts(site, name):
+        console.print(str(start), highlight=False, markup=False, soft_wrap=True)
+        is_good &= start.is_good
+    return 0 if is_good else 1
 
 
 def _why(result: Result) -> str:

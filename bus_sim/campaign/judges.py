@@ -39,6 +39,10 @@ class Judges:
         """Faults last until then, loop time in us: what must happen in time has time from there."""
         self._checks.excuse(until_us)
 
+    def excuse_clocks(self, until_us: int) -> None:
+        """Clocks are wrong on purpose until then, loop time in us."""
+        self._checks.excuse_clocks(until_us)
+
     def finish(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """The run is over: what was unsafe, and what stood still though nothing was broken any more."""
         findings = self._checks.finish().findings

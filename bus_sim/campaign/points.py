@@ -11,6 +11,7 @@ from functools import partial
 from typing import Final
 
 from bus_sim.campaign.car_park import ORIGIN_US, is_over
+from bus_sim.campaign.journal_points import journal_faults
 from bus_sim.campaign.trial import STEP_US
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
@@ -32,6 +33,7 @@ class Single(StrEnum):
     OMISSION = "omission"
     DUPLICATE = "duplicate"
     CRASH = "crash"
+    JOURNAL = "journal"
 
 
 class Scene(StrEnum):
@@ -132,4 +134,5 @@ _POINTS: dict[Single, Callable[[Site, Counts], list[AnyFault]]] = {
     Single.OMISSION: partial(_frames, FaultKind.OMISSION, 0),
     Single.DUPLICATE: partial(_frames, FaultKind.DUPLICATE, AGAIN_US),
     Single.CRASH: _crashes,
+    Single.JOURNAL: lambda _, counts: journal_faults(counts.written),
 }

@@ -3,10 +3,11 @@
 import random
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
+from math import log10
 from typing import Final
 
 from bus_sim.faults.injection import Injection
-from bus_sim.faults.table import Value
+from bus_sim.faults.table import TEN_YEARS_MS, Value
 from bus_sim.systems.session import FAULTS
 from onboard.core.codes import KindCode
 from onboard.core.site import Site
@@ -32,6 +33,17 @@ def _some(chance: random.Random, site: Site) -> str:
     names = [machine.name for machine in site.machines.values()]
     chosen = chance.sample(names, chance.randint(1, max(1, len(names) // 2)))
     return "|".join(sorted(chosen))
+
+
+def _any(chance: random.Random, site: Site) -> str:
+    """One machine to all of them."""
+    names = [machine.name for machine in site.machines.values()]
+    return "|".join(sorted(chance.sample(names, chance.randint(1, len(names)))))
+
+
+def _jump_ms(chance: random.Random) -> int:
+    """From a tenth of a second to ten years, as many small ones as large ones."""
+    return chance.choice([-1, 1]) * round(10 ** chance.uniform(2, log10(TEN_YEARS_MS)))
 
 
 def _of(kind: KindCode) -> Callable[[random.Random, Site], str]:
@@ -103,6 +115,16 @@ _MORE: Final[dict[str, Draw]] = {
     "actuator_halfway": lambda c, s: {"target": _ROBOT(c, s), "after_s": _lasting(0.1, 3, c)},
 }
 
+_CLOCKS: Final[dict[str, Draw]] = {
+    "drift": lambda c, s: {
+        "target": _any(c, s),
+        "ppm": c.choice([-1, 1]) * round(10 ** c.uniform(2, 5)),
+        "for_s": _lasting(20, 400, c),
+    },
+    "clock_frozen": lambda c, s: {"target": _any(c, s), "for_s": _lasting(0.5, 120, c)},
+    "clock_jump": lambda c, s: {"target": _any(c, s), "by_ms": _jump_ms(c)},
+}
+
 PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "none": {},
     "bus": _BUS,
@@ -110,6 +132,7 @@ PROFILES: Final[dict[str, dict[str, Draw]]] = {
     "two-crashes": {"crash": _crash},
     "people": _PEOPLE,
     "all": {**_BUS, **_CRASH, **_PEOPLE, **_MORE},
+    "clocks": _CLOCKS,
 }
 #: Kinds that have no moment of their own.
 _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})

@@ -10,7 +10,7 @@ from typing import Final
 
 from bus_sim.can.faults import Fault, FaultInjector, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.faults.table import KINDS
+from bus_sim.faults.table import KINDS, Group
 from bus_sim.run import BusRun
 from onboard.controller.shell import Controller
 from onboard.core.codes import MachineState
@@ -38,6 +38,8 @@ class Measure(StrEnum):
     RESTART_ADMITTED = "restart to admitted"
     #: The last fault is over and all machines run: until all mirrors have one digest.
     HEAL_DIGESTS = "heal to equal digests"
+    #: The last fault is over: until everybody is served who waited then.
+    HEAL_SERVED = "heal to all served"
 
 
 def healed_us(faults: Iterable[AnyFault]) -> int:
@@ -52,6 +54,12 @@ def healed_us(faults: Iterable[AnyFault]) -> int:
             lasts = [key for key in ("for_s", "spread_s") if key in settings]
             ends.append(fault.at_us + round(sum(fault.number(key) for key in lasts) * 1e6))
     return max(ends)
+
+
+def clocks_right_us(faults: Iterable[AnyFault]) -> int | None:
+    """When the last fault of a clock is over, us of loop time; None where there is none."""
+    ends = [healed_us([one]) for one in faults if isinstance(one, Injection) and KINDS[one.kind].group is Group.CLOCK]
+    return max(ends, default=None)
 
 
 class Recovery:
@@ -78,6 +86,8 @@ class Recovery:
         self._struck: dict[FaultInjector, int] = {}
         self._deaf: dict[int, int] = {}
         self._is_healing = bool(faults)
+        #: The healing after which nobody waits any more; 0 for none.
+        self._served_since_us = 0
         simulation.before_start.append(self._on_start)
         simulation.after_crash.append(self._on_crash)
         if faults:
@@ -86,6 +96,12 @@ class Recovery:
             simulation.fleet.tap(self._on_frame)
         if faults:
             self._at(self.healed_us, self._look_at_digests)
+
+    def look_at_waits(self, waits_since: Callable[[int], int]) -> None:
+        """Everybody who waited when the last fault was over, is served or has gone."""
+        if self._served_since_us != self.healed_us and not waits_since(self.healed_us):
+            self._served_since_us = self.healed_us
+            self._note(Measure.HEAL_SERVED, self._now_us() - self.healed_us)
 
     def mirrors_agree(self) -> bool:
         """Whether all machines run that are not dead for good, none is halted, and all mirrors have one digest."""
@@ -126,7 +142,7 @@ class Recovery:
         now_us = self._now_us()
         for controller in self._simulation.controllers.values():
             holon = controller.holon
-            if node in holon.mirror.alive(holon.clock.bus_us(now_us)):
+            if node in holon.mirror.alive(holon.bus_us(now_us)):
                 self._at(now_us + LOOK_US, partial(self._look_at_loss, node, since_us))
                 return
         if self._simulation.controllers:

@@ -18,6 +18,7 @@ class Verdict(StrEnum):
     CRASHED = "program error"
     HUNG = "hung"
     STOPPED = "stopped safely"
+    HELD = "held, told"
     NOT_SERVED = "not served"
     NOT_LIVE = "stood still"
     APART = "not converged"

@@ -38,6 +38,9 @@ class Stage(Protocol):
     def violations(self) -> list[str]:
         """What the oracle says; asked once, when the run is over."""
 
+    def waits_since(self, time_us: int) -> int:
+        """How many wait now who waited then already, us of loop time; 0 where a system does not tell."""
+
     def tally(self) -> Tally:
         """What became of everybody who came; asked once, when the run is over, before ``violations``."""
 

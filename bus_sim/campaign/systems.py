@@ -82,6 +82,10 @@ class SystemStage:
         """See ``Stage``."""
         return list(self._plant.violations)
 
+    def waits_since(self, time_us: int) -> int:
+        """See ``Stage``."""
+        return 0
+
     def tally(self) -> Tally:
         """See ``Stage``."""
         return self._system.tally(self._plant)

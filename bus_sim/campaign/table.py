@@ -10,6 +10,7 @@ from bus_sim.campaign.runner import Plan, Result
 COLUMNS = (
     Verdict.SERVED,
     Verdict.TOLD,
+    Verdict.HELD,
     Verdict.DELAYED,
     Verdict.STOPPED,
     Verdict.APART,

@@ -4,9 +4,10 @@ from collections import Counter
 from pathlib import Path
 
 from bus_sim.campaign.car_park import CarPark
+from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
-from bus_sim.campaign.recovery import Recovery
+from bus_sim.campaign.recovery import Recovery, clocks_right_us
 from bus_sim.campaign.report import CONVERGED_US, Report, Verdict
 from bus_sim.campaign.stage import Stage, StageMaker
 from bus_sim.campaign.systems import SYSTEMS, SystemStage
@@ -49,12 +50,17 @@ async def _play(
     stage.arm(scenario.faults)
     judges = Judges(stage.run, disturbed=bool(scenario.faults))
     recovery = Recovery(stage.run, scenario.faults)
+    right_us = clocks_right_us(scenario.faults)
+    if right_us is not None:
+        judges.excuse_clocks(right_us)
+    held = Held()
+    stage.run.observers.append(held.hear)
     error, hung, ends = "", "", _End(stage, recovery)
     try:
         stage.run.start()
         await run_until(
             stage.run,
-            lambda: stage.is_broken or judges.is_unsafe or ends(loop.now_us()),
+            lambda: stage.is_broken or judges.is_unsafe or held.is_over(loop.now_us()) or ends(loop.now_us()),
             round(scenario.limit_s * 1e6),
             STEP_US,
             lambda: judges.excuse(recovery.healed_us),
@@ -65,7 +71,7 @@ async def _play(
         error = f"{type(problem).__name__}: {problem}"
     finally:
         stage.run.close()
-    return _judge(stage, scenario, usual_wait_s, (error, hung), judges, recovery)
+    return _judge(stage, scenario, usual_wait_s, (error, hung), judges, recovery, held)
 
 
 class _End:
@@ -78,7 +84,10 @@ class _End:
 
     def __call__(self, now_us: int) -> bool:
         """Everybody is served or told why, all faults are over, and the mirrors agree or had all the time to."""
-        if now_us < self._recovery.healed_us or not self._stage.is_over:
+        if now_us < self._recovery.healed_us:
+            return False
+        self._recovery.look_at_waits(self._stage.waits_since)
+        if not self._stage.is_over:
             return False
         self._over_us = max(self._over_us or now_us, self._recovery.healed_us)
         return self._recovery.mirrors_agree() or now_us - self._over_us >= CONVERGED_US
@@ -91,6 +100,7 @@ def _judge(
     errors: tuple[str, str],
     judges: Judges,
     recovery: Recovery,
+    held: Held,
 ) -> Report:
     (error, hung), tally = errors, stage.tally()
     unsafe, stalls = judges.finish()
@@ -106,6 +116,8 @@ def _judge(
         (bool(violations), Verdict.VIOLATION),
         (bool(error), Verdict.CRASHED),
         (bool(hung or stage.run.restless), Verdict.HUNG),
+        # Whoever waits for it now waits for a person, and has been told so.
+        (bool(held.since_us), Verdict.HELD),
         (bool(tally.waiting and halted), Verdict.STOPPED),
         (bool(tally.waiting), Verdict.NOT_SERVED),
         (bool(stalls), Verdict.NOT_LIVE),

@@ -26,6 +26,7 @@ ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
     "disk_full": controllers.disk_full,
     "power_cut": controllers.power_cut,
     "drift": controllers.drift,
+    "clock_frozen": controllers.clock_frozen,
     "clock_jump": controllers.clock_jump,
     "sensor_off": devices.sensor_off,
     "sensor_stuck": devices.sensor_stuck,

@@ -4,7 +4,7 @@ import random
 from collections.abc import Callable
 from dataclasses import replace
 
-from bus_sim.faults.holon import FaultyHolon
+from bus_sim.faults.holon import FROZEN_PPM, FaultyHolon
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.journals import hurt
 from bus_sim.run import Simulation
@@ -105,17 +105,34 @@ def pause(simulation: Simulation, injection: Injection) -> None:
 
 
 def drift(simulation: Simulation, injection: Injection) -> None:
-    """The clock is too fast or too slow from now on, until the controller is restarted."""
-    holon = _holon(simulation, injection)
-    if holon is not None:
-        holon.set_clock(simulation.loop.now_us(), ppm=injection.count("ppm"))
+    """The clocks are too fast or too slow from now on, until it is over or the controller is restarted."""
+    _set_rate(simulation, injection, injection.count("ppm"))
+
+
+def clock_frozen(simulation: Simulation, injection: Injection) -> None:
+    """The clocks stand still: what was due in a moment is not due, and what comes from outside comes at one time."""
+    _set_rate(simulation, injection, FROZEN_PPM)
 
 
 def clock_jump(simulation: Simulation, injection: Injection) -> None:
-    """The clock jumps, forwards or backwards."""
-    holon = _holon(simulation, injection)
-    if holon is not None:
-        holon.set_clock(simulation.loop.now_us(), jump_us=injection.count("by_ms") * 1000)
+    """The clocks jump, forwards or backwards."""
+    _set_clocks(simulation, injection, jump_us=injection.count("by_ms") * 1000)
+
+
+def _set_rate(simulation: Simulation, injection: Injection, ppm: int) -> None:
+    _set_clocks(simulation, injection, ppm=ppm)
+    if injection.number("for_s"):
+        # At its rate again, whatever it shows.
+        simulation.plant.timers.call_at(injection.until_us, lambda: _set_clocks(simulation, injection, ppm=0))
+
+
+def _set_clocks(simulation: Simulation, injection: Injection, *, jump_us: int = 0, ppm: int | None = None) -> None:
+    for name in injection.target.split("|"):
+        controller = simulation.controllers.get(machine_named(simulation, name).node_id)
+        if controller is not None:
+            assert isinstance(controller.holon, FaultyHolon)
+            controller.holon.set_clock(simulation.loop.now_us(), jump_us=jump_us, ppm=ppm)
+            controller.look_at_clock()
 
 
 def slow_node(simulation: Simulation, injection: Injection) -> None:

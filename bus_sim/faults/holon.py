@@ -9,6 +9,8 @@ from onboard.core.messages import Message
 #: Messages that wait for a process that stands still; beyond that the oldest stay and the newest are lost, as in the
 #: receive buffer of a socket (Linux' default holds some hundred CAN frames). Ours.
 HELD_LIMIT = 300
+#: The rate of a clock that stands still.
+FROZEN_PPM = -1_000_000
 
 
 class FaultyHolon(Holon):
@@ -59,8 +61,12 @@ class FaultyHolon(Holon):
         """See ``Holon``."""
         return super().start(self._own_us(local_us))
 
+    def bus_us(self, local_us: int) -> int:
+        """See ``Holon``."""
+        return super().bus_us(self._own_us(local_us))
+
     def next_wake(self) -> int | None:
-        """See ``Holon``; in loop time."""
+        """See ``Holon``; in loop time. A clock that is frozen lets nothing fall due."""
         due_us = super().next_wake()
         if due_us is None:
             return None
@@ -69,6 +75,8 @@ class FaultyHolon(Holon):
         if not (self._ppm or self._offset_us):
             return due_us
         way_us = due_us - self._offset_us - self._zero_us
+        if self._ppm == FROZEN_PPM:
+            return self._zero_us if way_us <= 0 else None
         at_us = self._zero_us + math.ceil(way_us / (1 + self._ppm / 1e6))
         # Rounding must not wake it a microsecond early, at which it finds nothing due, for ever.
         while self._own_us(at_us) < due_us:

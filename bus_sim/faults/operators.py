@@ -27,7 +27,7 @@ def blocked(simulation: Simulation, injection: Injection) -> None:
 
 
 def emergency_stop(simulation: Simulation, _: Injection) -> None:
-    """Somebody presses the button: every machine stops until it is switched on again."""
+    """Somebody presses the button: every machine holds for half a minute, or until an operator lets it go on."""
     _say(simulation, EmergencyStop(STATION, Reason.OPERATOR))
 
 
@@ -63,11 +63,15 @@ async def _agrees(_: Order) -> bool:
 def wish_of(injection: Injection) -> Wish:
     """The command that a fault of kind ``operate`` means."""
     do, seconds = injection.text("do"), injection.number("for_s")
+    segment = f"p({injection.count('track')},{injection.count('index')})"
+    is_absent = injection.text("absent") == "yes"
     return Wish(
         do,
         machine=injection.text("target"),
-        segment=f"p({injection.count('track')},{injection.count('index')})",
+        segment=segment,
         of=injection.text("target") if do == "go" else "",
+        absent=injection.text("target") if is_absent else "",
+        body=(injection.text("body").replace(";", ",") or segment,),
         for_us=round(seconds * 1e6) if do == "stop" else None,
     )
 

@@ -58,6 +58,8 @@ def _one_of(*words: str) -> Setting:
     return Setting(read, " or ".join(words), words[0])
 
 
+#: The farthest that a clock jumps.
+TEN_YEARS_MS: Final = 3_653 * 86_400_000
 _MACHINE: Final = Setting(str, "the name of a machine, such as MR1", None)
 _MACHINES: Final = Setting(str, "names of machines joined by |, such as MR1|ER1", None)
 _SEED: Final = _count("a whole number", 0, low=-(2**63), high=2**63)
@@ -69,6 +71,11 @@ _CAR: Final = _count("the number of a car in the order of arrival, from 1", None
 def _one(**more: Setting) -> dict[str, Setting]:
     """Settings of a fault that strikes one machine at a time."""
     return {"target": _MACHINE, "at_s": _AT, **more}
+
+
+def _clocks(**more: Setting) -> dict[str, Setting]:
+    """Settings of a fault that strikes the clocks of any machines."""
+    return {"target": _MACHINES, "at_s": _AT, **more}
 
 
 #: By name. ``at_s`` counts from power-up; what lasts has ``for_s``, and is over then.
@@ -186,13 +193,20 @@ KINDS: Final[Mapping[str, Kind]] = {
     ),
     "drift": Kind(
         Group.CLOCK,
-        "a clock that is too fast, or too slow",
-        _one(ppm=_count("millionths from -100000 to 100000", 200, -100_000, 100_000)),
+        "clocks that are too fast, or too slow, for for_s (0: until the controller is restarted)",
+        _clocks(ppm=_count("millionths from -100000 to 100000", 200, -100_000, 100_000), for_s=_seconds(0.0)),
+    ),
+    "clock_frozen": Kind(
+        Group.CLOCK,
+        "clocks that stand still",
+        _clocks(for_s=_seconds(10.0, low=0.001)),
     ),
     "clock_jump": Kind(
         Group.CLOCK,
-        "a clock that jumps",
-        _one(by_ms=_count("milliseconds from -100000 to 100000", 2_000, -100_000, 100_000)),
+        "clocks that jump, ten years at most",
+        _clocks(
+            by_ms=_count(f"milliseconds from -{TEN_YEARS_MS} to {TEN_YEARS_MS}", 2_000, -TEN_YEARS_MS, TEN_YEARS_MS)
+        ),
     ),
     "sensor_off": Kind(Group.SENSOR, "a machine's sensors say nothing", _one(for_s=_seconds(30.0))),
     "sensor_stuck": Kind(Group.SENSOR, "a machine's sensors go on saying what they last said", _one(for_s=_seconds(5))),
@@ -250,7 +264,7 @@ KINDS: Final[Mapping[str, Kind]] = {
             "for_s": _seconds(120.0),
         },
     ),
-    "emergency_stop": Kind(Group.PEOPLE, "an operator stops all machines at once", {"at_s": _AT}),
+    "emergency_stop": Kind(Group.PEOPLE, "an operator holds all machines at once, for half a minute", {"at_s": _AT}),
     "operate": Kind(
         Group.PEOPLE,
         "a person gives a command of onboard operate and agrees; target: whom hold, release, go or regenerate name",
@@ -258,8 +272,10 @@ KINDS: Final[Mapping[str, Kind]] = {
             "at_s": _AT,
             "do": _one_of("stop", "go", "block", "clear", "hold", "release", "regenerate")._replace(default=None),
             "target": _MACHINE._replace(default=""),
-            "track": _count("the number of a track, for block and clear", 1, 1, 254),
-            "index": _count("the index of a segment, for block and clear", 1, 1, 255),
+            "track": _count("the number of a track, for block, clear and an absent body", 1, 1, 254),
+            "index": _count("the index of a segment, for block, clear and an absent body", 1, 1, 255),
+            "absent": _one_of("no", "yes"),
+            "body": Setting(str, "a slot such as p(1;5), or gone, for regenerate", ""),
             "for_s": _seconds(10.0),
         },
     ),

@@ -78,12 +78,19 @@ def _and_no_curtain(simulation: Simulation) -> None:
 
 
 def _platform_from_afar(simulation: Simulation) -> None:
-    """Platform and gate are granted to the robot of the next ride wherever the lift is."""
+    """Platform and gate are granted to the robot of the next ride wherever the lift is, and it asks for no proof."""
 
     def plant(lift: Any) -> None:
         replace(lift, "_stands_at", lambda old: lambda index: not lift._gate_was_out or old(index))
 
     in_behaviour(simulation, KindCode.LIFT, plant)
+    in_behaviour(simulation, KindCode.ROBOT, _no_proof)
+
+
+def _no_proof(robot: Any) -> None:
+    """A robot takes the gate alone for proof that the platform is there."""
+    replace(robot.carriage.sill, "lacks", lambda _: lambda _slot, _floor: Reason.NONE)
+    replace(robot.carriage.sill, "refuse", lambda _: lambda _lift, _floor, _now_us: [])
 
 
 def _leaves_at_any_floor(simulation: Simulation) -> None:

@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
+from deploy.image.needs import BASE_PACKAGES, PACKAGES
 from deploy.wheels import DeployError
 
 ARCHITECTURE = "arm64"
@@ -13,16 +14,6 @@ SUITE = "bookworm"
 _BUILD_S = 3_600
 #: apt's settings that decide whether a mirror can be reached. Its hooks stay on the host.
 _TRANSPORT = re.compile(r"Acquire::(https?|ftp|tor|Check-|Retries|Force|Proxy|AllowInsecure)", re.IGNORECASE)
-#: Of tools that are not called as their packages are.
-_PACKAGES = {
-    "mksquashfs": " (apt-get install squashfs-tools)",
-    "unsquashfs": " (apt-get install squashfs-tools)",
-    "mcopy": " (apt-get install mtools)",
-    "mkfs.vfat": " (apt-get install dosfstools)",
-    "mkfs.ext4": " (apt-get install e2fsprogs)",
-    "depmod": " (apt-get install kmod)",
-    **dict.fromkeys(("dtc", "fdtget", "fdtput"), " (apt-get install device-tree-compiler)"),
-}
 
 
 class Apt:
@@ -82,7 +73,8 @@ def run_tool(words: Sequence[str], folder: Path | None = None, source: Path | No
                 check=False,
             )
     except FileNotFoundError:
-        raise DeployError(f"{words[0]} is not installed{_PACKAGES.get(words[0], '')}") from None
+        package = {**PACKAGES, **BASE_PACKAGES}.get(words[0], words[0])
+        raise DeployError(f"{words[0]} is not installed (apt-get install {package})") from None
     if done.returncode:
         last = (done.stderr.strip().splitlines() or ["it said nothing"])[-1]
         raise DeployError(f"{words[0]}: {last}")

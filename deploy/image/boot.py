@@ -9,7 +9,7 @@ from deploy.image.apt import run_tool
 from deploy.image.debian import EPOCH_S, Debian, unpack
 from deploy.image.layer import FILES
 from deploy.image.root import Root
-from deploy.image.trees import write_overlays, write_tree
+from deploy.image.trees import check_config, write_overlays, write_tree
 from deploy.update.slots import SLOTS, STATE_NAME, Slots, to_block
 
 #: Two kernels of 33 MB, one more while an update is written, and room for a person's files.
@@ -36,6 +36,7 @@ def boot_files(debian: Debian, root: Root, to: Path, pi_firmware: Path | None = 
     for tree in sorted(debian.kernel.rglob("*.dtb")):
         write_tree(tree, to / tree.name)
     write_overlays(to / "overlays")
+    check_config((to / "config.txt").read_text(encoding="utf-8"), sorted(to.glob("*.dtb")), to / "overlays")
     if pi_firmware is not None:
         unpack(pi_firmware, to.parent / "pi", ["./usr/lib/raspi-firmware/*"])
         for name in _PI_FIRMWARE:

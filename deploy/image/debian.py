@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from deploy.image.apt import ARCHITECTURE, SUITE, Apt, run_tool
+from deploy.image.needs import check_needs
 from deploy.wheels import DeployError
 
 STORE = Path(__file__).parents[2] / "build" / "image"
@@ -32,6 +33,7 @@ _KERNEL_PARTS = (
     ),
     *("drivers/usb/host", "drivers/usb/dwc2", "drivers/usb/storage", "drivers/usb/core", "drivers/usb/common"),
     *("drivers/usb/gadget/udc", "drivers/usb/roles", "drivers/usb/phy", "drivers/char/hw_random"),
+    *("drivers/rtc", "drivers/i2c/busses"),
     *("fs/squashfs", "fs/ext4", "fs/jbd2", "fs/fat", "fs/nls", "crypto", "lib", "arch/arm64/crypto"),
 )
 _SINGLE_PARTS = (
@@ -57,7 +59,8 @@ class Debian:
 
 
 def fetch_debian(store: Path = STORE) -> Debian:
-    """Fetch and unpack what the store lacks. Raises ``DeployError``."""
+    """Fetch and unpack what the store lacks. Raises ``DeployError``, first of all for what this computer lacks."""
+    check_needs(store / "base.tar", is_root=os.geteuid() == 0)
     store.mkdir(parents=True, exist_ok=True)
     found = Debian(store / "base.tar", *(store / name for name in ("kernel", "busybox", "grub", "u-boot")))
     apt = Apt(store / "apt")
@@ -96,8 +99,6 @@ def _fetch_packages(apt: Apt, to: Debian) -> None:
 
 
 def _make_base(apt: Apt, to: Path) -> None:
-    if os.geteuid() != 0:
-        raise DeployError("the root file system is made by mmdebstrap, which needs root here; use sudo")
     if not Path("/proc/sys/fs/binfmt_misc/qemu-aarch64").exists() and not _runs_arm():
         raise DeployError(
             "this host cannot run ARM programs; apt-get install qemu-user-static binfmt-support arch-test"

@@ -4,11 +4,13 @@ Debian's 6.1 trees carry no symbols, so an overlay would find nothing in them by
 written in.
 """
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from deploy.image.apt import run_tool
+from deploy.image.config_txt import merged
+from deploy.image.hats import names, overlay_source
 
-HATS = Path(__file__).with_name("hats")
 #: What our overlays name, and where the trees of all boards have it (Linux arch/arm/boot/dts/bcm283x.dtsi).
 _NAME, _PLACE = "gpio", "/soc/gpio@7e200000"
 
@@ -23,11 +25,19 @@ def write_tree(tree: Path, to: Path) -> Path:
 
 
 def write_overlays(to: Path) -> list[Path]:
-    """Compile every HAT's overlay. Raises ``DeployError``."""
+    """Compile the overlay of every HAT that is known. Raises ``DeployError``."""
     to.mkdir(parents=True, exist_ok=True)
     made = []
-    for source in sorted(HATS.glob("*.dts")):
-        overlay = to / f"{source.stem}.dtbo"
+    for name in names():
+        source, overlay = to / f"{name}.dts", to / f"{name}.dtbo"
+        source.write_text(overlay_source(name), encoding="utf-8")
         run_tool(["dtc", "-@", "-q", "-I", "dts", "-O", "dtb", "-o", str(overlay), str(source)])
+        source.unlink()
         made.append(overlay)
     return made
+
+
+def check_config(config: str, trees: Iterable[Path], overlays: Path) -> None:
+    """Raise ``DeployError`` where the overlays of a ``config.txt`` do not fit one of the trees."""
+    for tree in trees:
+        merged(config, tree, overlays)

@@ -7,11 +7,20 @@ from pathlib import Path
 from deploy.update.manifest import UpdateError
 
 SIGNATURE_BYTES = 64
+#: What tells a checkout's topmost folder.
+_MARKS = (".git", ".hg", ".svn", ".jj")
 _LIMIT_S = 60
 
 
 def make_keys(secret: Path, public: Path) -> None:
-    """Write a pair of keys as PEM files. Raises ``UpdateError``, also where a secret key is there already."""
+    """Write a pair of keys as PEM files.
+
+    Raises ``UpdateError``, also where a secret key is there already, or would lie in a checkout: whoever adds all
+    files there hands it to everybody, and boards take what it signs.
+    """
+    checkout = next((one for one in secret.resolve().parents if any((one / mark).exists() for mark in _MARKS)), None)
+    if checkout is not None:
+        raise UpdateError(f"{secret}: is inside the checkout {checkout}; name a place outside with --out")
     if secret.exists():
         raise UpdateError(f"{secret}: is there already, and boards may know its public key; name another with --out")
     _openssl("genpkey", "-algorithm", "ed25519", "-out", str(secret))

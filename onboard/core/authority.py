@@ -11,20 +11,19 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.core.backoff import BackOff
 from onboard.core.belief import Belief, Beliefs, Key
 from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
-from onboard.core.site import Segment, Site
+from onboard.core.site import Site
 from onboard.core.token_keys import TokenKey, car_token, genesis_holder, may_exist, segment_token, station_token
 
 __all__ = [
     "Claim",
-    "MotionState",
     "TokenBook",
     "TokenKey",
-    "authorised",
     "car_token",
     "genesis_holder",
     "may_exist",
@@ -87,6 +86,8 @@ class TokenBook:
     #: Tokens given away while somebody who was started again waited for an answer.
     gifts: set[TokenKey] = field(default_factory=set)
     beliefs: Beliefs = field(init=False)
+    #: When what waits for an answer is said again.
+    backoff: BackOff = field(init=False)
     wanted: dict[TokenKey, int] = field(default_factory=dict)
     refused: dict[TokenKey, Reason] = field(default_factory=dict)
     #: What to say with a request for a token, from this node's plan and mirror.
@@ -114,6 +115,7 @@ class TokenBook:
     _said_us: dict[tuple[TokenKey, type[Message]], int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.backoff = BackOff(self.site.timing.token_repeat_us)
         self.beliefs = Beliefs(self._first_holder)
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
@@ -203,8 +205,18 @@ class TokenBook:
         """Stop asking. A grant that still arrives is accepted and can be given back."""
         self.changes += 1
         self.wanted.pop(key, None)
+        self.backoff.forget(("wanted", key))
         self.refused.pop(key, None)
         self.behind_since_us.pop(key, None)
+
+    def begin_anew(self, now_us: int) -> None:
+        """A machine has come back, or was started: what waits may wait for it, and is said soon again."""
+        self.backoff.begin_anew()
+        soon_us = now_us + self.site.timing.token_repeat_us
+        self.wanted = {key: min(due_us, soon_us) for key, due_us in self.wanted.items()}
+        self.leaving = {
+            key: grant._replace(repeat_at_us=min(grant.repeat_at_us, soon_us)) for key, grant in self.leaving.items()
+        }
 
     def give(self, key: TokenKey, to: int, now_us: int) -> list[Effect]:
         """Move a held token to node ``to``: erase, journal, then send.
@@ -222,7 +234,8 @@ class TokenBook:
         self.given[key] = Belief(version, to)
         self.gifts.add(key)
         self.beliefs.take_up(key, version, to)
-        self.leaving[key] = Grant(version, to, now_us + self.site.timing.token_repeat_us)
+        self.backoff.forget(("leaving", key))
+        self.leaving[key] = Grant(version, to, self.backoff.say(("leaving", key), now_us))
         return [self._record("token_given", key, version, to), Send(self._grant(key, version, to))]
 
     # --- words of others ---------------------------------------------------------------------------------------
@@ -232,7 +245,8 @@ class TokenBook:
         key = TokenKey(request.token_kind, request.token)
         pending = self.leaving.get(key) if self.is_synced else None
         if pending is not None and pending.holder == request.sender:
-            if now_us < pending.repeat_at_us - self.site.timing.token_repeat_us + IN_FLIGHT_US:
+            said_us = self.backoff.last_us(("leaving", key))
+            if said_us is not None and now_us < said_us + IN_FLIGHT_US:
                 return []
             return self._grant_again(key, pending)
         if not self.holds(key):
@@ -302,7 +316,9 @@ class TokenBook:
                 self.behind_since_us.setdefault(key, now_us)
             else:
                 self.behind_since_us.pop(key, None)
-            self.wanted[key] = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
+            asked_us = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
+            is_behind = refusal.reason is Reason.MIRROR_BEHIND
+            self.wanted[key] = asked_us if is_behind else max(asked_us, self.wanted[key])
             self.changes += 1
 
     # --- what is said without being asked --------------------------------------------------------------------------
@@ -320,15 +336,17 @@ class TokenBook:
         effects: list[Effect] = []
         if not self.is_synced:
             return effects
-        repeat_us = self.site.timing.token_repeat_us
+        waiting = len(self.wanted) + len(self.leaving)
         for key, due_us in self.wanted.items():
             if due_us <= now_us:
-                self.wanted[key] = now_us + repeat_us
                 claim = no_claim(key) if key in self.unordered else self.claim(key)
+                longest_us = self.backoff.longest_us if claim.itinerary_version else self.backoff.unordered_us
+                self.wanted[key] = self.backoff.say(("wanted", key), now_us, waiting, longest_us)
                 effects.append(Send(TokenRequest(self.node_id, *key, _told(self.version_of(key)), *claim)))
         for key, grant in self.leaving.items():
             if grant.repeat_at_us <= now_us:
-                self.leaving[key] = grant._replace(repeat_at_us=now_us + repeat_us)
+                due_us = self.backoff.say(("leaving", key), now_us, waiting)
+                self.leaving[key] = grant._replace(repeat_at_us=due_us)
                 effects += self._grant_again(key, grant)
         return effects
 
@@ -412,6 +430,7 @@ class TokenBook:
         # Its receiver says that it holds the token, or that it gave it on: either proves that it had it.
         if pending is not None and (confirmed or version > pending.version):
             del self.leaving[key]
+            self.backoff.forget(("leaving", key))
             self.given[key] = Belief(pending.version, pending.holder, confirmed=True)
             effects.append(self._record("token_gone", key, pending.version, pending.holder))
         disputed = self._disputed.pop(key, None)
@@ -467,30 +486,6 @@ class TokenBook:
         return Record(
             {"record": record, "kind": int(key.kind), "number": key.number, "version": version, "holder": holder}
         )
-
-
-@dataclass(frozen=True, slots=True)
-class MotionState:
-    """What ``authorised`` looks at: the tokens held and whether the machine may move at all."""
-
-    tokens: TokenBook
-    position_known: bool
-    stopped: bool
-
-
-def authorised(state: MotionState, segment: Segment) -> tuple[bool, Reason]:
-    """Whether this machine's body may be in ``segment`` now, and if not, why not.
-
-    Asked before every movement order and again while the movement runs; nothing else permits motion.
-    """
-    if state.stopped:
-        return False, Reason.OPERATOR
-    if not state.position_known:
-        return False, Reason.POSITION_UNKNOWN
-    key = segment_token(segment)
-    if not state.tokens.holds(key):
-        return False, state.tokens.refused.get(key, Reason.NOT_AUTHORISED)
-    return True, Reason.NONE
 
 
 def _told(version: int) -> int:

@@ -2,9 +2,15 @@
 
 A clock that is far off is no clock: it counts as lost, so that its machine neither calls nor bids, and is set anew
 once a second time message confirms the error.
+
+**Bus time never goes back** on one machine, but by a slew. One that has to be set back is set forward by the rest of
+the way round: the wire shows bus time modulo ``BUS_TIME_MODULUS``, so that is the same time. What was due in the wrong
+future is due now, and the machine has slept, for 8.8 years as it were: the one thing to do about both is the same.
 """
 
 from dataclasses import dataclass
+
+from onboard.core.serial import BUS_MS_MODULUS, away
 
 #: Largest correction that one time message makes, us: with one message in 5 s this follows drifts up to 400 ppm.
 MAX_SLEW_US = 2_000
@@ -18,8 +24,9 @@ MISSED_LIMIT = 4
 #: Who has sent bus time for less than this takes up that of another which is ahead, us: it has just been started, and
 #: its own time began with it. Ours; two periods of the message.
 YOUNG_US = 10_000_000
-#: Bus time on the wire has 48 bits of microseconds: 8.9 years.
-BUS_TIME_MODULUS = 1 << 48
+#: Bus time on the wire counts the microseconds of 65 rounds of its milliseconds, 8.8 years, and begins anew: the most
+#: whole rounds that 48 bits hold, so that us and ms always tell the same time, also to who hears it for the first time.
+BUS_TIME_MODULUS = 65 * BUS_MS_MODULUS * 1000
 
 
 @dataclass
@@ -56,11 +63,14 @@ class BusClock:
 
         One that is far off loses the clock, and the next sets it if it says the same.
         """
-        error_us = bus_time_us - self.bus_us(local_us)
-        confirmed = self.far_us is not None and abs(error_us - self.far_us) <= SAME_US
-        if self.heard_at_us is None or confirmed:
+        error_us = self._error_us(bus_time_us, local_us)
+        confirmed = self.far_us is not None and abs(away(error_us, self.far_us, BUS_TIME_MODULUS)) <= SAME_US
+        if self.heard_at_us is None:
             self.far_us = None
             self.offset_us += error_us
+        elif confirmed:
+            self.far_us = None
+            self.offset_us += error_us % BUS_TIME_MODULUS
         elif abs(error_us) > FAR_US:
             self.far_us = error_us
         else:
@@ -83,7 +93,7 @@ class BusClock:
 
         It is answered once, with the time as this machine knows it: a source that says so again means it.
         """
-        error_us = bus_time_us - self.bus_us(local_us)
+        error_us = self._error_us(bus_time_us, local_us)
         if not self.is_set or self.far_us is not None or error_us > -FAR_US:
             return False
         self.far_us, self.heard_at_us = error_us, local_us
@@ -91,12 +101,19 @@ class BusClock:
 
     def adopt(self, bus_time_us: int, local_us: int) -> bool:
         """Take up the time of the bus, where this machine has just begun to send its own and that is behind."""
-        ahead_us = bus_time_us - self.bus_us(local_us)
+        ahead_us = self._error_us(bus_time_us, local_us)
         is_young = self.source_since_us is not None and local_us - self.source_since_us < YOUNG_US
         if not (self.is_source and is_young and ahead_us > FAR_US):
             return False
         self.offset_us += ahead_us
         return True
+
+    def said_us(self, local_us: int) -> int:
+        """Bus time as it goes on the wire."""
+        return self.bus_us(local_us) % BUS_TIME_MODULUS
+
+    def _error_us(self, bus_time_us: int, local_us: int) -> int:
+        return away(bus_time_us, self.said_us(local_us), BUS_TIME_MODULUS)
 
     def is_lost(self, local_us: int) -> bool:
         """Whether deadlines can no longer be trusted; such a machine does not bid."""

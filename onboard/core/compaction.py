@@ -53,17 +53,23 @@ _Group = tuple[str, tuple[str | int | None, ...]]
 
 _TOKEN = ("kind", "number")
 _SEGMENT = ("track", "index")
-#: Records that the core writes. ``token_given`` is kept beside what came after it: "I gave it to X under v" outlives
-#: everything (docs/contract-2.md). ``blocked`` and ``clear`` are both told again.
+#: Records that the core writes. The last give of a token, and that it has come, are kept beside what came after:
+#: "I gave it to X under v" outlives everything (docs/contract-2.md). ``blocked`` and ``clear`` are both told again.
 CORE_RULES: Rules = {
     "boot": (Keep("boot"),),
     "token_held": (Keep("token", _TOKEN),),
-    "token_given": (Keep("token", _TOKEN), Keep("give", _TOKEN)),
-    "token_gone": (Keep("token", _TOKEN),),
-    "car_left": (End(("token", "give"), _TOKEN), End(("car_at", "winner", "ticket"), ("car_origin", "car"))),
+    "token_given": (Keep("token", _TOKEN), Keep("given", _TOKEN)),
+    "token_gone": (Keep("token", _TOKEN), Keep("gone", _TOKEN)),
+    "car_left": (End(("token", "given", "gone"), _TOKEN), End(("car_at", "winner", "ticket"), ("car_origin", "car"))),
     "blocked": (Keep("blocked", _SEGMENT),),
     "clear": (Keep("clear", _SEGMENT),),
     "manual": (Keep("manual"),),
+    "assigned": (Keep("assigned", _TOKEN),),
+    "read_back": (Keep("read_back"),),
+    "epoch": (Keep("epoch"),),
+    # The first hold for a person stands until it is released.
+    "held": (Keep("held", which=Which.FIRST_AND_NEWEST),),
+    "released": (End(("held",)),),
 }
 
 

@@ -11,10 +11,14 @@ from typing import Any
 from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
-from onboard.core.bus_time import BUS_TIME_MODULUS, BusClock
-from onboard.core.codes import CONTRACT_VERSION, MOBILE_KINDS, NOBODY, KindCode, MachineState, Reason
+from onboard.core.blocked_words import BlockedWords
+from onboard.core.bus_time import BUS_TIME_MODULUS
+from onboard.core.car_words import CarWords
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
+from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.holding import RIGHTS_LOST, Hold, Holding
+from onboard.core.holds import Holds
 from onboard.core.journal_state import INTACT, JournalCondition, reason_of
 from onboard.core.messages import (
     Award,
@@ -24,23 +28,27 @@ from onboard.core.messages import (
     CallForProposals,
     CarAt,
     Clear,
-    Diagnostic,
     EmergencyStop,
     Heartbeat,
     Itinerary,
+    LeftOut,
     Message,
     Progress,
     Speakers,
     SyncRequest,
     TaskReport,
+    TokenGrant,
+    TokenHeld,
 )
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted
+from onboard.core.regeneration import Regenerating
 from onboard.core.rights import Rights
 from onboard.core.site import Machine, Site
+from onboard.core.timekeeper import Heard, Timekeeper
 from onboard.core.witness import Witness
 
 #: Most effects that one event may cause before the holon counts as running away.
@@ -74,25 +82,24 @@ class Holon:
         #: Input dropped here, and below by the shell's decoders and queues, by reason.
         self.drops: Counter[Reason] = Counter()
         self.wire_drops: Counter[Reason] = Counter()
-        self._told_drops: Counter[Reason] = Counter()
+        self._told = ToldDrops()
         self.admission = Admission(site)
-        self.clock = BusClock(site.timing.bus_time_us)
         self.tokens = TokenBook(site, machine.node_id)
         entries = tuple(entries)
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
         self.mirror = Mirror(site, machine.node_id)
-        for entry in entries:
-            if entry.get("record") in ("blocked", "clear"):
-                word = Blocked if entry["record"] == "blocked" else Clear
-                told = word(machine.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
-                self.mirror.on_word(told, 0)
+        self.blocked_words = BlockedWords(site, machine.node_id, self.mirror)
+        self.blocked_words.replay(entries)
+        self.time = Timekeeper(site, machine, self.mirror, self.drops)
+        self.clock = self.time.clock
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
         self.holding = Holding(machine.node_id, site.timing.heartbeat_us)
         self.holding.replay(entries)
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
-        self._own_number = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        own = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
         estimator = factory.estimator(site, machine, self.mirror)
         self.negotiation = Negotiation(
             machine.node_id,
@@ -101,35 +108,46 @@ class Holon:
             estimator,
             boot=boot,
             slot=slot_of(site, machine.node_id),
+            is_obstacle=self.mirror.obstacles.machines.__contains__,
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
+        self.regeneration = Regenerating(self.tokens, lambda: self.mirror.cars, self._statements, self._thaw)
+        self.regeneration.cars_told = self.fleet.cars_told
+        self.regeneration.replay(entries)
+        self.rights.is_frozen = lambda: self.regeneration.is_frozen
         self._heartbeat_due_us: int | None = None
-        self._bus_time_due_us: int | None = None
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             **self.rights.handlers(),
+            **self.regeneration.handlers(),
             CallForProposals: self._negotiate,
             Bid: self._negotiate,
             Award: self._negotiate,
             TaskReport: self._negotiate,
+            LeftOut: self._negotiate,
             Itinerary: self._on_itinerary,
             Progress: self._on_progress,
             CarAt: self._on_car,
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self._on_emergency_stop,
-            Go: self._on_go,
-            Halted: self._on_halted,
-            Blocked: self._on_word,
-            Clear: self._on_word,
+            Go: self.holds.on_go,
+            Halted: self.holds.on_halted,
+            Blocked: self.blocked_words.hear,
+            Clear: self.blocked_words.hear,
         }
 
     # --- events in ---------------------------------------------------------------------------------------------
+
+    def bus_us(self, local_us: int) -> int:
+        """Bus time as this machine believes it to be at loop time ``local_us``, for who looks from outside."""
+        return self.time.bus_us(local_us)
 
     def start(self, local_us: int) -> list[Effect]:
         """First effects after power-up: the boot counter to the journal, then the first heartbeat.
@@ -138,13 +156,15 @@ class Holon:
         """
         if not self.journal.is_reliable:
             return self._without_journal()
+        local_us = self.time.steady(local_us)
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
-        self._elect_time_source(local_us)
+        self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
         self._heartbeat_due_us = now_us
         effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
         effects += self.behaviour.start(now_us)
         effects += self._beat(now_us)
+        self.presence.begins(now_us)
         effects += self.witness.begin(now_us)
         return self._settle(effects, now_us)
 
@@ -159,9 +179,10 @@ class Holon:
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
+        local_us = self.time.steady(local_us)
         now_us = self.clock.bus_us(local_us)
         if message.sender == self.node_id:
-            return self._on_own_number(message, now_us)
+            return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
         if why is not Reason.NONE:
             return self._pass_over(message, why)
@@ -174,12 +195,16 @@ class Holon:
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
         effects = self._awake(now_us)
+        self.presence.standing.hear(message, now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects += handler(message, now_us) if handler is not None else []
         if isinstance(message, Itinerary | Heartbeat):
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
+        if isinstance(message, TokenGrant | TokenHeld):
+            proven = self.car_words.settle(message.token_kind, message.token)
+            effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
 
     def _pass_over(self, message: Message, why: Reason) -> list[Effect]:
@@ -191,6 +216,7 @@ class Holon:
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
+        local_us = self.time.steady(local_us)
         if not self.clock.is_set:
             # Plans made before bus time is known would be told in a time of one's own.
             self._sensed_early[type(message)] = message
@@ -200,14 +226,19 @@ class Holon:
 
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
-        self._elect_time_source(local_us)
+        local_us = self.time.steady(local_us)
+        # Who has slept counts nobody as silent, so that it does not take itself for the time source.
+        effects = self._awake(self.clock.bus_us(local_us))
+        self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
-        effects = self._awake(now_us)
-        effects += self._apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        effects += self.regeneration.wake(now_us)
         if not self.holding.is_apart:
-            effects += self.witness.wake(now_us) + self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
+            effects += self.witness.wake(now_us)
+        if self._deals:
+            effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
-        if self.presence.is_admitted(now_us):
+        if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self._heartbeat_due_us = now_us
@@ -220,23 +251,26 @@ class Holon:
         """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
         times = [
             self._heartbeat_due_us,
-            self._bus_time_due_us,
+            self.time.due_us,
             self.holding.next_wake(),
             None if self.holding.is_apart else self.witness.next_wake(),
-            None if self.holding.is_apart else self.tokens.next_wake(),
-            None if self.holding.is_apart else self.rights.petition_due(),
+            self.regeneration.next_wake(),
+            self.tokens.next_wake() if self._deals else None,
+            self.rights.petition_due() if self._deals else None,
             self.presence.held_until_us,
             self._negotiation_due() if self._begins else None,
             self.behaviour.next_wake() if self._begins else None,
         ]
-        due = [self.clock.local_us(time) for time in times if time is not None]
-        return min(due) if due and self.halted is None else None
+        due = [time for time in times if time is not None]
+        return self.time.loop_us(min(due)) if due and self.halted is None else None
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
         if self._heartbeat_due_us is None or not self.presence.awake(now_us):
             return []
         self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+        self.holding.slept(now_us)
+        self.witness.slept(now_us)
         # One by one: all are asked at power-up only.
         asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
@@ -244,44 +278,42 @@ class Holon:
     def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
         if message.sender in self.presence.foreign:
             return []
-        if not self._is_time_source(message.sender):
-            # At power-up every fixed machine speaks until it hears a lower one: that is no mistake.
-            machine = self.site.machines.get(message.sender)
-            if machine is None or machine.kind in MOBILE_KINDS:
-                self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-                return []
-            before_us = self.clock.bus_us(local_us)
-            if self.clock.adopt(message.bus_time_us, local_us):
-                self.witness.shift(self.clock.bus_us(local_us) - before_us)
-                self._heartbeat_due_us = self._bus_time_due_us = self.clock.bus_us(local_us)
+        if message.bus_time_us >= BUS_TIME_MODULUS:
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return []
-        if self.machine.kind not in MOBILE_KINDS and self.clock.refutes(message.bus_time_us, local_us):
-            return [Send(BusTime(self.node_id, self.clock.bus_us(local_us) % BUS_TIME_MODULUS))]
-        first = not self.clock.is_set
-        self._bus_time_lost = False
         before_us = self.clock.bus_us(local_us)
-        self.clock.heard(message.bus_time_us, local_us)
-        self.witness.shift(self.clock.bus_us(local_us) - before_us)
+        heard = self.time.hear(message, local_us)
+        now_us = self.clock.bus_us(local_us)
+        self.witness.shift(now_us - before_us)
+        self._bus_time_lost &= heard in (Heard.NOTHING, Heard.REFUTED)
+        match heard:
+            case Heard.REFUTED:
+                return [self._bus_time(now_us)]
+            case Heard.FIRST:
+                return self._begin(now_us)
+            case Heard.SET_ANEW:
+                return self._set_anew(now_us)
+        return []
+
+    def _begin(self, now_us: int) -> list[Effect]:
+        """Bus time is known: the first word, and what was sensed before."""
+        self.presence.begins(now_us)
+        self._heartbeat_due_us = now_us
         effects: list[Effect] = []
-        if first:
-            now_us = self.clock.bus_us(local_us)
-            self._heartbeat_due_us = now_us
-            for early in self._sensed_early.values():
-                effects += self._settle(self.behaviour.sense(early, now_us), now_us)
-            self._sensed_early.clear()
+        for early in self._sensed_early.values():
+            effects += self._settle(self.behaviour.sense(early, now_us), now_us)
+        self._sensed_early.clear()
         return effects
+
+    def _set_anew(self, now_us: int) -> list[Effect]:
+        """Bus time was far off, and is set: what was read of plans meanwhile was read in the wrong time."""
+        self.mirror.retime(now_us)
+        return self._awake(now_us)
 
     def _negotiation_due(self) -> int | None:
         """Nothing is due in the negotiation while bus time is lost: its deadlines mean nothing then."""
         # The last loop time is not known here; what ``wake`` found holds until the next time message.
         return None if self._bus_time_lost else self.negotiation.next_wake()
-
-    def _is_time_source(self, sender: int) -> bool:
-        """Whether bus time from ``sender`` counts: a fixed machine of the site, below me if I am one myself."""
-        machine = self.site.machines.get(sender)
-        if machine is None or machine.kind in MOBILE_KINDS:
-            return False
-        return self.machine.kind in MOBILE_KINDS or sender < self.node_id
 
     # --- handlers ----------------------------------------------------------------------------------------------
 
@@ -311,21 +343,27 @@ class Holon:
         return []
 
     def _on_car(self, statement: CarAt, now_us: int) -> list[Effect]:
-        self.mirror.on_car(statement)
+        hear = self.regeneration.on_car if self.regeneration.is_frozen else self.car_words.hear
+        hear(statement)
         return []
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
-        if beat.contract != CONTRACT_VERSION or beat.site_digest != self.site.digest:
-            reason = Reason.OTHER_CONTRACT if beat.contract != CONTRACT_VERSION else Reason.OTHER_SITE
+        news = self.regeneration.on_heartbeat(beat, now_us)
+        reason = self.regeneration.strange(beat)
+        if reason is not Reason.NONE:
             self.drops[reason] += 1
             self.presence.heard_foreign(beat.sender, reason, now_us)
-            return []
+            return news
         self.presence.foreign.pop(beat.sender, None)
         self.presence.heard_beat(beat)
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
-            self._elect_time_source(self.clock.local_us(now_us))
-        return self.witness.on_heartbeat(beat, is_fresh=fresh)
+            self.time.elect(self.clock.local_us(now_us))
+        if self.holding.is_apart:
+            return news
+        if fresh:
+            self.tokens.begin_anew(now_us)
+        return news + self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
@@ -333,87 +371,56 @@ class Holon:
         effects = self.witness.on_request(request, now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
-            effects = [Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)), *effects]
+            effects = [self._bus_time(now_us), *effects]
         return effects
 
     def _statements(self, now_us: int) -> list[Effect]:
-        return self.behaviour.statements(now_us) + self._blocked_again()
-
-    def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
-        """A segment is blocked, or clear again; what I am steward of is in my journal."""
-        is_mine = self.site.stewards.get(word.track) == self.node_id
-        if not self.mirror.on_word(word, now_us) or not is_mine:
-            return []
-        record = "blocked" if isinstance(word, Blocked) else "clear"
-        return [Record({"record": record, "track": word.track, "index": word.index, "reason": int(word.reason)})]
-
-    def _blocked_again(self) -> list[Effect]:
-        tracks = [track for track, steward in self.site.stewards.items() if steward == self.node_id]
-        return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
+        return self.behaviour.statements(now_us) + self.blocked_words.statements()
 
     def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
         """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
-        return self._apply(self.holding.stop(stop.sender, now_us), now_us)
-
-    def _on_go(self, go: Go, now_us: int) -> list[Effect]:
-        return self._apply(self.holding.go(go.stopper), now_us)
-
-    def _on_halted(self, halted: Halted, now_us: int) -> list[Effect]:
-        self.presence.heard_halted(halted, now_us)
-        return []
+        return self.holds.apply(self.holding.stop(stop.sender, now_us), now_us)
 
     # --- holds -------------------------------------------------------------------------------------------------
 
     @property
     def _is_still(self) -> bool:
         """Whether this machine is an obstacle: it neither moves nor bids."""
-        return self.presence.is_held or self.holding.is_held
+        return self.presence.is_held or self.holding.is_held or self.regeneration.is_frozen
+
+    @property
+    def _deals(self) -> bool:
+        """Whether this machine asks for rights and gives them away."""
+        return not (self.holding.is_apart or self.regeneration.is_frozen)
+
+    def _thaw(self, lost: int, now_us: int) -> list[Effect]:
+        """Rights were made anew, or it was broken off: who lost its own begins as after a restart, all others look."""
+        if lost not in (NOBODY, self.node_id):
+            self.fleet.forgetful.add(lost)
+        elif lost == self.node_id:
+            self.witness.doubt, self.witness.has_past, self.fleet.has_no_rights = None, True, False
+            self.fleet.slots_told = self.regeneration.slots()
+            if self.holding.why.reason in RIGHTS_LOST:
+                return self.holds.apply(self.holding.go(self.node_id), now_us)
+        self.presence.listen_anew(now_us)
+        return self.holds.words()
 
     @property
     def _begins(self) -> bool:
         """Whether this machine may begin anything: whoever was started again waits until all have answered."""
         return not (self._is_still or self.witness.is_waiting)
 
-    def _on_own_number(self, message: Message, now_us: int) -> list[Effect]:
-        """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
-        self.drops[Reason.DUPLICATE_NODE_ID] += 1
-        return self._apply(self.holding.own_frame(now_us, is_right=self._own_number.is_right(message)), now_us)
-
     def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Who is held gives no right away: it may be one that it does not have any more."""
-        if self.holding.is_held:
-            return self.holding.why.reason
+        if self.holding.is_held or self.regeneration.is_frozen:
+            return self.holding.why.reason if self.holding.is_held else Reason.REGENERATION
         return self.behaviour.may_grant(key, requester, now_us)
 
-    def _apply(self, outcome: Outcome, now_us: int) -> list[Effect]:
-        """What follows from an event of the holds."""
-        match outcome:
-            case Outcome.HOLDS:
-                reason, cause, needs_person = self.holding.why
-                told = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
-                is_lasting = self.holding.hold is Hold.PERSON
-                effects: list[Effect] = [Record(self.holding.record())] if is_lasting else []
-                return [*effects, Report(told), *self._words()]
-            case Outcome.GOES_ON:
-                self.presence.listen_anew(now_us)
-                return [Report("goes on"), *self._words()]
-            case Outcome.COMES_BACK:
-                return self._come_back(now_us)
-            case _:
-                return []
-
-    def _come_back(self, now_us: int) -> list[Effect]:
-        """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
+    def _new_life(self, now_us: int) -> tuple[int, list[Effect]]:
+        """As after a restart: the boot counter, and the question to all what they know."""
         self.boot = self.witness.boot = self.boot % 255 + 1
-        self.presence.listen_anew(now_us)
-        records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": self.boot})]
-        told = Report("comes back: nobody sends under its number any more")
-        return [*records, told, *self._words(), *self.witness.begin(now_us)]
-
-    def _words(self) -> list[Effect]:
-        """My sign of life, and why I do not act where I do not."""
-        held: list[Effect] = [Send(self.holding.word(self.boot))] if self.holding.is_held else []
-        return [Send(self._heartbeat()), *held]
+        self.witness.has_past = True
+        return self.boot, self.witness.begin(now_us)
 
     def last_word(self, reason: Reason) -> Halted:
         """What is said before the process ends: ``reason`` where none was given before."""
@@ -436,13 +443,16 @@ class Holon:
         else:
             if self._begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
-        self._own_number.note(effects)
+        self.holds.own.note(effects)
         return effects
 
     def _doubts(self) -> list[Effect]:
         """Somebody knows that the journal is old: nothing of it is used any more."""
         doubt = self.witness.doubt
-        return [] if doubt is None else self._halt(doubt.text, doubt.reason, doubt.cause)
+        if doubt is None or self.holding.why.reason in RIGHTS_LOST:
+            return []
+        self.fleet.has_no_rights = True
+        return [Report(doubt.text), *self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), 0)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -458,12 +468,16 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects += self._words() + self._diagnostics() + self.fleet.forgotten()
+            effects += self.holds.words() + self.fleet.forgotten()
+            effects += self._told.words(self.node_id, self.drops + self.wire_drops)
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
-        if self._bus_time_due_us is not None and self._bus_time_due_us <= now_us:
-            self._bus_time_due_us = now_us + self.site.timing.bus_time_us
-            effects.append(Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS)))
+        if self.time.due_us is not None and self.time.due_us <= now_us:
+            self.time.due_us = now_us + self.site.timing.bus_time_us
+            effects.append(self._bus_time(now_us))
         return effects
+
+    def _bus_time(self, now_us: int) -> Effect:
+        return Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS))
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(
@@ -474,25 +488,8 @@ class Holon:
             self.boot,
             self.machine.kind,
             MachineState.OBSTACLE if self._is_still else self.behaviour.state,
+            self.regeneration.epoch,
         )
-
-    def _elect_time_source(self, local_us: int) -> None:
-        """The lowest live fixed node sends bus time (design, section 5)."""
-        if self.machine.kind in MOBILE_KINDS:
-            return
-        now_us = self.clock.bus_us(local_us)
-        lower = [
-            node
-            for node in self.mirror.alive(now_us)
-            if node < self.node_id and self.mirror.peers[node].kind not in (*MOBILE_KINDS, KindCode.OBSERVER)
-        ]
-        if lower:
-            self.clock.follow(local_us)
-            self._bus_time_due_us = None
-            return
-        self.clock.lead(local_us)
-        if self._bus_time_due_us is None:
-            self._bus_time_due_us = now_us
 
     def _halt(self, why: str, reason: Reason, cause: int = NOBODY) -> list[Effect]:
         if self.halted is not None:
@@ -500,10 +497,3 @@ class Holon:
         self.halted = why
         self.holding.halt(reason, cause)
         return [Halt(why, reason)]
-
-    def _diagnostics(self) -> list[Effect]:
-        """One message for each reason whose count has grown, so that the bus itself shows what was dropped and why."""
-        totals = self.drops + self.wire_drops
-        grown = [reason for reason in sorted(totals) if totals[reason] != self._told_drops[reason]]
-        self._told_drops = totals
-        return [Send(Diagnostic(self.node_id, reason, totals[reason] & 0xFFFFFFFF)) for reason in grown]

@@ -5,11 +5,17 @@ it holds the gate, and the lift moves only while it holds it itself, so nothing 
 the platform moves. On an alley's axis the platform is the position before index 1 or behind the last.
 """
 
+from onboard.core.messages import Progress
 from onboard.core.site import Segment, Site
 
 #: Index of the platform's token on a lift's track, and of its gate's.
 PLATFORM_INDEX = 0
 GATE_INDEX = 255
+#: A platform stands at a floor's mark within this, mm (fine sensor, dbc/device.dbc).
+MARK_TOLERANCE_MM = 5
+#: Lowest bits of its gate's version that a lift says with its place: 8 and 5 of them (dbc/fleet.dbc, Progress). They
+#: come again after 8,192 moves of the gate, days later.
+_LOW_BITS, _HIGH_BITS = 8, 5
 
 
 def platform(lift_track: int) -> Segment:
@@ -52,3 +58,20 @@ def platform_on(site: Site, lift_track: int, floor: int) -> Segment | None:
 def lift_at(site: Site, position: Segment) -> int | None:
     """The lift whose platform is meant by an alley position before index 1 or behind the last; None for all others."""
     return site.platforms.get(position)
+
+
+def under_gate(version: int) -> tuple[int, int]:
+    """A version of the gate's token as a lift's ``Progress`` says it, in ``itinerary_version`` and ``leg``."""
+    return version & ((1 << _LOW_BITS) - 1), version >> _LOW_BITS & ((1 << _HIGH_BITS) - 1)
+
+
+def says_standing(word: Progress | None, gate_version: int) -> int | None:
+    """The lift index at whose mark a lift said that it stands, under this version of its gate; None for no such word.
+
+    The lift moves only while it holds the gate itself. So its word under the version by which it gave the gate away
+    holds for as long as the gate is away, whatever any clock shows; a word under any other version proves nothing.
+    """
+    if word is None or (word.itinerary_version, word.leg) != under_gate(gate_version):
+        return None
+    is_still = word.speed_mm_s == 0 and abs(word.offset_mm) <= MARK_TOLERANCE_MM
+    return word.index if is_still else None

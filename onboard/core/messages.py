@@ -34,6 +34,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
+from onboard.core.serial import ms_after
 
 
 class Reference(NamedTuple):
@@ -206,6 +207,14 @@ class Stamp(NamedTuple):
     award_ms: int
     initiator: int
     call: int
+
+    def ranks_before(self, other: "Stamp") -> bool:
+        """Whether this plan keeps its windows before the other's; of two stamps that differ always exactly one does."""
+        after_ms = ms_after(self.award_ms, other.award_ms)
+        if after_ms == ms_after(other.award_ms, self.award_ms):
+            # The same time, or half the way round, where nobody can say which came first.
+            return self < other
+        return after_ms < 0
 
 
 @dataclass(frozen=True, slots=True)

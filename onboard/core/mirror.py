@@ -15,7 +15,7 @@ from onboard.core.occupancy import final_position, itinerary_windows, lift_uses,
 from onboard.core.passing import Plan, next_plan
 from onboard.core.passing_order import PassingOrder
 from onboard.core.reservations import Reservations
-from onboard.core.serial import is_newer
+from onboard.core.serial import is_newer, reread_us
 from onboard.core.site import Segment, Site, Station
 
 #: Heartbeats missed before a node counts as silent.
@@ -133,6 +133,19 @@ class Mirror:
             itinerary_windows(self.site, itinerary, now_us, plan.first_begin_us),
             lift_uses(self.site, itinerary, now_us, plan.first_begin_us),
         )
+
+    def retime(self, now_us: int) -> None:
+        """My clock was set anew: read the times of all plans again, as the nearest to ``now_us`` that they can be."""
+        self.reservations, self.order = Reservations(), PassingOrder(self.site)
+        for plans in (self.plans, self.replaced):
+            for node, plan in plans.items():
+                plans[node] = plan._replace(first_begin_us=reread_us(plan.first_begin_us, now_us))
+        for node, plan in self.plans.items():
+            if node not in self.obstacles.machines:
+                self._count_on(plan, now_us)
+        for progress in self.progress.values():
+            self.order.on_progress(progress)
+        self.obstacles.retime(now_us)
 
     def on_word(self, word: Blocked | Clear, now_us: int) -> bool:
         """Take up that a segment is blocked, or clear again; True where it is news."""

@@ -86,6 +86,14 @@ class Obstacles:
         found += [Clear(node, *one, why) for one, why in sorted(self.cleared.items())]
         return [word for word in found if word.track in tracks]
 
+    def retime(self, now_us: int) -> None:
+        """All that is in the way is so from now on: since when it was in a time of before is not known any more."""
+        for node, obstacle in self.machines.items():
+            self.machines[node] = obstacle._replace(since_us=now_us)
+            self._put(node, obstacle.slots, now_us)
+        if self.blocked:
+            self._put(BLOCKED, self.blocked, now_us)
+
     def _put(self, owner: int, slots: Iterable[Segment], now_us: int) -> None:
         reservations = self.reservations()
         reservations.release(owner)

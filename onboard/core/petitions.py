@@ -7,7 +7,8 @@ its request only to cover lost frames, and a request that is not repeated lapses
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.authority import REFUSED_REPEATS, TokenKey
+from onboard.core.authority import TokenKey
+from onboard.core.backoff import BackOff
 from onboard.core.messages import TokenRequest
 
 #: Itinerary version of a request without an agreed order of passing (dbc/fleet.dbc).
@@ -97,5 +98,5 @@ class Petitions:
             self.close(key, requester)
 
     def _is_over(self, petition: Petition, now_us: int) -> bool:
-        # Two repeats may be lost.
-        return petition.heard_us + (2 * REFUSED_REPEATS + REFUSED_REPEATS // 2) * self.repeat_us < now_us
+        lapses_us = BackOff(self.repeat_us).lapses_us(is_ordered=petition.itinerary_version != UNORDERED)
+        return petition.heard_us + lapses_us < now_us

@@ -16,6 +16,7 @@ from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
 from onboard.core.obstacles import STILL, holder_in
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
+from onboard.core.standing import Standing
 
 #: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word. Ours.
 SLEPT_BEATS = 2
@@ -37,8 +38,12 @@ class Presence:
     held_until_us: int | None = None
     #: Last word of machines that say themselves that they do not act.
     halts: dict[int, Halted] = field(default_factory=dict)
+    standing: Standing = field(init=False)
     _active_us: int | None = None
     _listening_since_us: int | None = None
+
+    def __post_init__(self) -> None:
+        self.standing = Standing(self.site, self.mirror)
 
     @property
     def patience_us(self) -> int:
@@ -49,6 +54,10 @@ class Presence:
     def is_held(self) -> bool:
         """Whether this machine is an obstacle: it neither moves nor bids."""
         return self.held_until_us is not None
+
+    def begins(self, now_us: int) -> None:
+        """I live from now on, in the time that is known now."""
+        self._active_us = now_us
 
     def awake(self, now_us: int) -> bool:
         """Note that this machine lives; True where it finds that it has slept. Before its first beat it tells nothing.
@@ -66,11 +75,11 @@ class Presence:
         self._begin_anew(now_us)
         self.held_until_us = now_us + SETTLING_US
 
-    def is_admitted(self, now_us: int) -> bool:
-        """Whether the time as an obstacle has just ended."""
+    def is_admitted(self, now_us: int, *, in_time: bool = True) -> bool:
+        """Whether the time as an obstacle has just ended; not before the clock is ``in_time`` again."""
         if self.held_until_us is None or now_us < self.held_until_us:
             return False
-        if self._is_outvoted(now_us):
+        if not in_time or self._is_outvoted(now_us):
             self.held_until_us = now_us + SETTLING_US
             return False
         self.held_until_us = None
@@ -168,5 +177,7 @@ class Presence:
             return Reason.NONE if heard_us is None else Reason.NODE_SILENT
         if peer is not None and peer.state in STILL:
             return Reason.ACTUATOR_FAULT if peer.state is MachineState.STOPPED else Reason.POSITION_UNKNOWN
+        if self.standing.stands(node, now_us):
+            return Reason.FALSE_STATEMENT
         planless = machine.kind in MOBILE_KINDS and node not in self.mirror.itineraries
         return Reason.NONE if known is None or not planless else known.reason

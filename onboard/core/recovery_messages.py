@@ -4,6 +4,8 @@ As in ``messages.py``: field names are the signal names of ``dbc/fleet.dbc``, an
 ``version`` is the number of its transfer, 1 to 2**28 - 1; it never wraps.
 """
 
+import zlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from onboard.core.codes import Reason, RegenerationPhase, TokenKind
@@ -100,3 +102,13 @@ class SyncDone(Message):
 
     whom: int
     boot: int
+
+
+def assignment_digest(assigned: Iterable[TokenAssigned]) -> int:
+    """What ``Regeneration`` and ``RegenerationState`` tell as ``digest``, 16 bits.
+
+    The low half of the CRC-32 over kind, token, version and holder of each as big-endian words of 32 bits, in the order
+    of kind and token; the same whatever the order in which they came.
+    """
+    ordered = sorted((one.token_kind, one.token, one.version, one.holder) for one in assigned)
+    return zlib.crc32(b"".join(word.to_bytes(4, "big") for one in ordered for word in one)) & 0xFFFF

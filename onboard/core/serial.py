@@ -23,11 +23,29 @@ def to_bus_ms(time_us: int) -> int:
     return -(-time_us // 1000) % BUS_MS_MODULUS
 
 
+def ms_after(bus_ms: int, other_ms: int) -> int:
+    """How long after ``other_ms`` a bus time is, both in ms as on the wire: by the shorter way round, so 24.8 days.
+
+    Every comparison of two such times is one of this with 0: they wrap after 49.7 days, and ``<`` then lies.
+    """
+    return away(bus_ms, other_ms, BUS_MS_MODULUS)
+
+
+def away(value: int, other: int, modulus: int) -> int:
+    """``value`` - ``other`` by the shorter way round, from -``modulus`` / 2 to one less than its half (RFC 1982)."""
+    half = modulus >> 1
+    return (value - other + half) % modulus - half
+
+
+def reread_us(time_us: int, near_us: int) -> int:
+    """The time nearest to ``near_us`` that is told on the wire as ``time_us`` is: what was read while a clock lied."""
+    return near_us + away(time_us, near_us, BUS_MS_MODULUS * 1000)
+
+
 def from_bus_ms(bus_ms: int, near_us: int) -> int:
     """The bus time in us nearest to ``near_us`` that reads ``bus_ms`` on the wire (within 24.8 days of it)."""
     near_ms = near_us // 1000
-    half = BUS_MS_MODULUS >> 1
-    return ((bus_ms - near_ms + half) % BUS_MS_MODULUS - half + near_ms) * 1000
+    return (near_ms + ms_after(bus_ms, near_ms)) * 1000
 
 
 def last_boot(entries: Iterable[Mapping[str, str | int]]) -> int:

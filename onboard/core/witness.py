@@ -102,6 +102,8 @@ class Witness:
         self._since_us = now_us
         self._ask_at_us = now_us + self.site.timing.heartbeat_us
         self.tokens.asked = set(self._others)
+        # Who comes back after a hold asks anew: what was answered before that is old.
+        self.answered.clear()
         # All answer me now and ask me: what they say in it need not be told to them.
         self._quiet_until_us = now_us + ANSWER_PERIOD_US
         for node in self._others:
@@ -114,6 +116,11 @@ class Witness:
         self._ask_at_us = _later(self._ask_at_us, by_us)
         self._answer_at_us = _later(self._answer_at_us, by_us)
         self._quiet_until_us = _later(self._quiet_until_us, by_us)
+
+    def slept(self, now_us: int) -> None:
+        """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
+        if not self.is_over and self._since_us is not None:
+            self._since_us = self._ask_at_us = now_us
 
     def ask(self, node: int, boot_before: int = 0) -> list[Effect]:
         """Ask one machine for all that it vouches for; what it says that it holds is believed until it has done."""

@@ -24,7 +24,7 @@ from onboard.ports.broker import BrokerError
 from onboard.wire.codec import Codec, codecs
 
 EXAMPLES = """\
-exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the command line or in a file
+exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mistake in the command line or in a file
 
 examples:
   onboard gateway -i socketcan -c can0 --site mysite.toml --mqtt mqtt://127.0.0.1
@@ -80,7 +80,7 @@ def main(argv: Sequence[str]) -> int:
     except (ConfigError, BusOpenError, GatewayError, BrokerError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard gateway: {line}", file=sys.stderr)
-        return 2
+        return 1 if isinstance(error, BusOpenError) and error.may_come else 2
     except OSError as error:
         print(f"onboard gateway: --spool {args.spool}: {error.strerror or error}", file=sys.stderr)
         return 2

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import ClassVar, Generic, TypeVar
 
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState
+from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
@@ -133,8 +133,12 @@ class Counter(ABC, Generic[AnOrder]):
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """Reports about orders of mine."""
+        """Reports about orders of mine, by machines that can carry one out."""
         if not isinstance(message, TaskReport):
+            return []
+        machine = self.fleet.site.machines.get(message.sender)
+        if machine is None or machine.kind is self.kind:
+            self.fleet.drops[Reason.NOT_OF_KIND] += 1
             return []
         order = self.orders.get(message.task)
         return [] if order is None or order.state in OVER else self.on_report(order, message, now_us)

@@ -12,16 +12,21 @@ _YES = ("y", "yes")
 
 
 class Asker:
-    """Asks on standard input, but where ``is_agreed``; ``tell`` is given every line but the question."""
+    """Asks on standard input, but where ``is_agreed``; ``tell`` is given every line but the question.
 
-    def __init__(self, station: Station, tell: Callable[[str], None], *, is_agreed: bool = False) -> None:
-        self._station, self._tell, self._is_agreed = station, tell, is_agreed
+    A word that must be typed is not agreed to by that: ``typed`` is what was given in its place.
+    """
+
+    def __init__(
+        self, station: Station, tell: Callable[[str], None], *, is_agreed: bool = False, typed: str = ""
+    ) -> None:
+        self._station, self._tell, self._is_agreed, self._typed = station, tell, is_agreed, typed
         self._source: TextIO = sys.stdin
 
     async def agrees(self, order: Order) -> bool:
-        """Whether the person says yes, or types the word that the order asks for; --yes is no such word."""
-        if self._is_agreed and not order.answer:
-            return True
+        """Whether the person says yes, or types the word that the order asks for."""
+        if self._typed if order.answer else self._is_agreed:
+            return not order.answer or self._typed == order.answer
         wanted = f"type {order.answer} to go on" if order.answer else "y/N"
         print(f"{order.question} [{wanted}] ", end="", flush=True)
         line = await self._line()

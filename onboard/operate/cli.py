@@ -30,6 +30,7 @@ examples:
   onboard operate stop -i socketcan -c can0 --site mysite.toml           all stand, until Ctrl-C and 30 s more
   onboard operate go -i socketcan -c can0 --site mysite.toml             who stands and why; asks; they go on
   onboard operate block "p(1,3)" -i socketcan -c can0 --site mysite.toml
+  onboard operate regenerate MR1 --body 'p(1,3)' -i socketcan -c can0 --site mysite.toml
   onboard operate hold MR1 -i socketcand-asyncio -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site small.toml
       the same on a site served by: bus-sim run small --serve
 This bus is no safety channel: machines that can hurt somebody have an emergency stop of their own.
@@ -76,6 +77,20 @@ def build_parser() -> argparse.ArgumentParser:
     )
     command("hold", "a machine comes to rest, and stands").add_argument("machine", metavar="MACHINE")
     command("release", "a machine that is held goes on").add_argument("machine", metavar="MACHINE")
+    regenerate = command("regenerate", "the rights of a machine whose journal is lost are made anew")
+    regenerate.add_argument("machine", metavar="MACHINE", help="whose rights; it holds, or is --absent")
+    regenerate.add_argument("--absent", default="", metavar="MACHINE", help="a machine that is off and locked off")
+    for option, whose in (("--body", "the machine"), ("--absent-body", "another machine that is --absent")):
+        regenerate.add_argument(
+            option,
+            action="append",
+            default=[],
+            metavar="SLOT",
+            help=f"where the body of {whose} is: 'p(1,3)', or a lift's name for its platform; gone: nowhere",
+        )
+    regenerate.add_argument(
+        "--locked-off", default="", metavar="MACHINE", help="with --yes: the name that would have to be typed"
+    )
     return parser
 
 
@@ -108,6 +123,9 @@ def wish_of(args: argparse.Namespace) -> Wish:
         segment=getattr(args, "segment", ""),
         reason=getattr(args, "reason", "operator"),
         of=getattr(args, "of", None) or "",
+        absent=getattr(args, "absent", ""),
+        body=tuple(getattr(args, "body", ())),
+        absent_body=tuple(getattr(args, "absent_body", ())),
         for_us=None if seconds is None else round(seconds * 1e6),
     )
 
@@ -121,7 +139,7 @@ async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make
         loop.add_signal_handler(number, station.interrupt)
     lost = loop.create_task(_watch(bus.wait_lost, station))
     try:
-        asker = Asker(station, _tell, is_agreed=args.yes)
+        asker = Asker(station, _tell, is_agreed=args.yes, typed=getattr(args, "locked_off", ""))
         return await station.operate(make, args.node, asker.agrees)
     finally:
         lost.cancel()

@@ -49,6 +49,15 @@ def segment_of(site: Site, text: str) -> Segment:
     return segment
 
 
+def slot_of(site: Site, text: str) -> Segment:
+    """A slot in which a body can be: a segment, or a lift's platform by the lift's name. Raises ``OperateError``."""
+    lifts = {machine.name: machine for machine in site.machines.values() if machine.home.track in site.lifts}
+    if text not in lifts:
+        return segment_of(site, text)
+    floor = site.tracks[lifts[text].home.track].joins[0]
+    return Segment(floor.track, 0 if floor.index == 1 else site.tracks[floor.track].length + 1)
+
+
 def node_of(site: Site, text: str) -> int:
     """A node by its machine's name or by its number, 1 to 255. Raises ``OperateError``."""
     if text.isdecimal() and NOBODY < int(text) <= LAST_TOOL:

@@ -44,6 +44,14 @@ class Order:
         """The word that must be typed instead of yes; empty for yes."""
         return ""
 
+    @property
+    def has_question(self) -> bool:
+        """Whether ``question`` is to be asked now, while it goes on speaking; ``answered`` tells it the answer."""
+        return False
+
+    def answered(self, now_us: int, *, agrees: bool) -> None:
+        """The person's answer to a question that came up while it spoke."""
+
     def begin(self, now_us: int) -> None:
         """From now on it speaks."""
         self.began_us = self._wake_us = now_us

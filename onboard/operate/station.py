@@ -25,7 +25,7 @@ class Station:
         self.park = Park(site)
         self.node = 0
         self._codec, self._bus, self._tell = codec, bus, tell
-        self._decoder = Decoder(codec)
+        self._decoder = Decoder(codec, site.machines)
         self._loop = asyncio.get_running_loop()
         self._order: Order | None = None
         self._news = asyncio.Event()
@@ -76,17 +76,25 @@ class Station:
                 self._tell(line)
         if order.question and not await agrees(order):
             return MISTAKE
-        return await self.carry_out(order)
+        return await self.carry_out(order, agrees)
 
-    async def carry_out(self, order: Order) -> int:
-        """Do it; the exit status. Lines are told as they come."""
+    async def carry_out(self, order: Order, agrees: Callable[[Order], Awaitable[bool]]) -> int:
+        """Do it; the exit status. Lines are told as they come; while a question is open the order speaks on."""
         self._order = order
         order.begin(self.now_us())
+        asked: asyncio.Future[bool] | None = None
         while order.status is None:
             self._do(order)
+            if order.has_question and asked is None:
+                asked = asyncio.ensure_future(agrees(order))
+                asked.add_done_callback(lambda _: self._news.set())
+            if asked is not None and asked.done():
+                order.answered(self.now_us(), agrees=asked.result())
             due_us = order.next_wake()
             if order.status is None:
                 await self._wait(None if due_us is None else due_us - self.now_us())
+        if asked is not None:
+            asked.cancel()
         self._show(order)
         self._order = None
         await asyncio.sleep(LINGER_S)

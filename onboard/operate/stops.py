@@ -112,8 +112,9 @@ class GoAgain(Order):
         self.tell(f"go{self._of()}: said under node-ID {self.node}")
 
     def feed(self, message: Message, now_us: int) -> None:
-        """Somebody who still says stop undoes it."""
-        if isinstance(message, EmergencyStop) and self._stopper in (NOBODY, message.sender) and self.status is None:
+        """Somebody who still says stop undoes it; another ``stop`` of this tool ends when it hears the first Go."""
+        is_stop = isinstance(message, EmergencyStop) and self._stopper in (NOBODY, message.sender)
+        if is_stop and self.status is None and now_us > self.began_us + AGAIN_US:
             self.tell(f"{self.park.name(message.sender)} still says stop: end it there first")
             self.status = NOT_CONFIRMED
 

@@ -12,7 +12,6 @@ REMEDIES = {
     Reason.JOURNAL_FOREIGN: "put its own journal back, or onboard operate regenerate {name}",
     Reason.DUPLICATE_NODE_ID: "find who else speaks under its node-ID, then onboard operate release {name}",
     Reason.OPERATOR: "onboard operate release {name}",
-    Reason.NODE_SILENT: "go and see; onboard operate hold, block and regenerate as docs/operate.md says",
     Reason.REGENERATION: "onboard operate regenerate is under way, or was broken off: start it again",
 }
 
@@ -46,7 +45,7 @@ def state_words(park: Park, node: int, now_us: int) -> str:
     """One machine in one phrase."""
     known = park.machines[node]
     word = park.halted(node, now_us)
-    if word is not None:
+    if word is not None and word.reason is not Reason.NODE_SILENT:
         return halted_words(park, word)
     if not park.lives(node, now_us):
         return "is not heard: off, or not on this bus"

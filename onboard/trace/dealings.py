@@ -21,6 +21,7 @@ from onboard.core.messages import (
     TaskReport,
     Waiting,
 )
+from onboard.core.serial import ms_after
 
 TASKS = (Operation.PARK, Operation.RETRIEVE)
 #: A plan told anew so soon after another machine's plan is the answer to it, us. Machines answer within one turn, and a
@@ -28,7 +29,6 @@ TASKS = (Operation.PARK, Operation.RETRIEVE)
 ANSWER_US = 50_000
 #: Why a plan was told anew: in answer to another's.
 ANSWER = "another's plan"
-_HALF_MS = 1 << 31
 
 
 @dataclass
@@ -151,8 +151,7 @@ class Dealings:
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)
         if task.promised_ms is not None and task.owner == report.sender:
-            late_ms = (time_us - self._offset_us) // 1000 - task.promised_ms
-            self.counts.slack_ms.append(-((late_ms + _HALF_MS) % (2 * _HALF_MS) - _HALF_MS))
+            self.counts.slack_ms.append(-ms_after((time_us - self._offset_us) // 1000, task.promised_ms))
 
     # --- plans -------------------------------------------------------------------------------------------------
 

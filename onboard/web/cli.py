@@ -21,7 +21,7 @@ from onboard.web.serve import WebServer
 from onboard.wire.codec import Codecs, codecs
 
 EXAMPLES = """\
-exit status: 0 stopped by a person; 1 the bus is gone; 2 a mistake in the command line or in a file
+exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mistake in the command line or in a file
 
 examples:
   onboard web -i socketcan -c can0 -b 500000 --site mysite.toml     a real bus: listened to, never spoken on
@@ -71,7 +71,7 @@ def main(argv: Sequence[str]) -> int:
     except (ConfigError, BusOpenError, LogOpenError, WebError) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"onboard web: {line}", file=sys.stderr)
-        return 2
+        return 1 if isinstance(error, BusOpenError) and error.may_come else 2
 
 
 def _read(film: Film, name: str) -> None:

@@ -8,16 +8,15 @@ from hypothesis import strategies as st
 
 from onboard.core.authority import (
     MAX_VERSION,
-    MotionState,
     TokenBook,
     TokenKey,
-    authorised,
     car_token,
     segment_token,
 )
 from onboard.core.codes import Reason, TokenKind
 from onboard.core.effects import Effect, Record, Report
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
 from tests.core.token_words import hear, said

@@ -1,7 +1,8 @@
 """A clock that is far off is lost, not slewed for hours; the next message that says the same sets it."""
 
 from bus_sim.sites import find_site
-from onboard.core.bus_time import FAR_US, MAX_SLEW_US, BusClock
+from onboard.core.bus_time import BUS_TIME_MODULUS, FAR_US, MAX_SLEW_US, BusClock
+from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.holon import Holon
 from onboard.core.messages import BusTime
@@ -82,7 +83,9 @@ def test_a_source_that_says_again_that_it_is_behind_is_believed() -> None:
     lift.start(HOURS_US)
     assert times(lift.receive(BusTime(BAY, 0), HOURS_US))
     assert times(lift.receive(BusTime(BAY, 5_000_000), HOURS_US + 5_000_000)) == []
-    assert lift.clock.bus_us(HOURS_US + 5_000_000) == 5_000_000
+    now_us = lift.clock.bus_us(HOURS_US + 5_000_000)
+    assert now_us % BUS_TIME_MODULUS == 5_000_000
+    assert now_us > HOURS_US, "its own time goes forward only: what was due is due now"
 
 
 def test_a_source_that_has_led_for_long_goes_by_its_own_time() -> None:
@@ -90,3 +93,46 @@ def test_a_source_that_has_led_for_long_goes_by_its_own_time() -> None:
     bay.start(0)
     bay.receive(BusTime(LIFT, HOURS_US), 60_000_000)
     assert bay.clock.bus_us(60_000_000) == 60_000_000
+
+
+#: What the board's own clock does to each of these is a fault; bus time takes no notice of more than it must.
+TEN_YEARS_US = 315_576_000_000_000
+
+
+def test_a_clock_that_goes_back_stands_still_for_a_moment_and_goes_on() -> None:
+    lift = fixed(LIFT)
+    lift.start(HOURS_US)
+    due_us = lift.next_wake()
+    assert due_us is not None
+    lift.wake(due_us)
+    before_us = lift.bus_us(due_us)
+    again_us = lift.next_wake()
+    assert again_us is not None
+    lift.wake(due_us - HOURS_US)
+    assert lift.bus_us(due_us - HOURS_US) == before_us
+    assert lift.next_wake() == again_us - HOURS_US, "what was due in a second is due in a second"
+
+
+def test_a_clock_that_is_ten_years_ahead_is_set_by_the_second_message_and_nothing_is_due_in_ten_years() -> None:
+    lift = fixed(LIFT)
+    lift.start(0)
+    lift.receive(BusTime(BAY, 5_000_000), 5_000_000)
+    lift.wake(5_500_000)
+    ahead_us = TEN_YEARS_US + 6_000_000
+    lift.wake(ahead_us)
+    for number in (1, 2):
+        lift.receive(BusTime(BAY, 5_000_000 + number * 5_000_000), ahead_us + number * 5_000_000)
+    now_us = ahead_us + 10_000_000
+    assert not lift.clock.is_lost(now_us)
+    assert lift.clock.said_us(now_us) == 15_000_000
+    due_us = lift.next_wake()
+    assert due_us is not None and due_us < now_us + 2_000_000
+    assert lift.presence.is_held, "it has slept, for all that the others know"
+
+
+def test_bus_time_that_no_clock_shows_is_dropped() -> None:
+    lift = fixed(LIFT)
+    lift.start(0)
+    lift.receive(BusTime(BAY, BUS_TIME_MODULUS), 10)
+    assert not lift.clock.heard_at_us
+    assert lift.drops[Reason.VALUE_OUT_OF_RANGE] == 1

@@ -59,11 +59,14 @@ def test_open_requests_are_looked_at_again_oldest_first_and_at_once_when_the_tok
 def test_a_request_that_is_not_repeated_lapses() -> None:
     petitions = Petitions(REPEAT_US)
     petitions.hear(KEYS[0], request(BOB, KEYS[0], 3), 0)
-    assert petitions.due(KEYS[0], 13 * REPEAT_US) == []
+    assert petitions.due(KEYS[0], 62 * REPEAT_US) == [BOB], "two of the longest repeats may be lost"
+    assert petitions.due(KEYS[0], 63 * REPEAT_US) == []
+    petitions.hear(KEYS[0], request(BOB, KEYS[0], 0), 0)
+    assert petitions.due(KEYS[0], 13 * REPEAT_US) == [], "without an order it would stand before others"
     assert petitions.open == {}
     for number in range(1000):
         petitions.hear(TokenKey(TokenKind.CAR, number), request(BOB, KEYS[0], 3), number * REPEAT_US)
-    assert len(petitions.open) < 20, "also of tokens that are never held here"
+    assert len(petitions.open) < 70, "also of tokens that are never held here"
 
 
 def test_all_holders_serve_the_machine_that_has_asked_longest() -> None:

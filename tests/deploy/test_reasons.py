@@ -28,4 +28,6 @@ def test_codes_that_nobody_says_are_told_as_such() -> None:
     files = [file for file in onboard.rglob("*.py") if file.relative_to(onboard).parts[0] not in readers]
     text = "\n".join(file.read_text(encoding="utf-8") for file in files)
     unsaid = {code for code in Reason if f"Reason.{code.name}" not in text}
-    assert unsaid == {code for code, advice in ADVICE.items() if advice.meaning.startswith("kept in the contract")}
+    kept = {code for code, advice in ADVICE.items() if advice.meaning.startswith("kept in the contract")}
+    # While contract 2 is open its words come before those who say them.
+    assert kept == {code for code in unsaid if code < Reason.NOT_OF_SITE}

@@ -12,6 +12,7 @@ from bus_sim.campaign.runner import Plan, Point, run_point
 from bus_sim.can.faults import Fault
 from bus_sim.cli import main
 from bus_sim.faults.injection import AnyFault, Injection, parse_injection
+from bus_sim.faults.journals import HARMS
 from bus_sim.sites import find_site
 
 SITE = "level1"
@@ -72,3 +73,29 @@ def test_the_command_plays_a_sample_of_the_points(capsys: pytest.CaptureFixture[
 def test_a_sample_of_nothing_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["campaign", SITE, "--sample", "3"]) == 2
     assert "--sample 3: must be 1 or more, and goes with --exhaustive" in capsys.readouterr().err
+
+
+def test_every_write_of_every_machine_is_a_point_for_every_harm_to_its_journal() -> None:
+    found = [one for one in every(Single.JOURNAL) if isinstance(one, Injection)]
+    writes = counts().written["MR1"]
+    robot = [one for one in found if one.target == "MR1"]
+    assert sum(one.text("journal") == "torn" for one in robot) == writes
+    assert sum(one.text("journal") == "cut" for one in robot) == sum(min(50, n) for n in range(1, writes + 1))
+    assert {one.text("journal") for one in found} == HARMS.keys() - {"kept"}
+    assert all((one.text("durable") == "no") == (one.text("journal") == "torn") for one in found)
+
+
+@pytest.mark.parametrize("harm", ["torn", "cut,entries=1", "cut,entries=20", "zeroed", "flipped,entries=2"])
+def test_what_a_medium_loses_at_the_end_costs_nobody_the_car(harm: str) -> None:
+    durable = "no" if harm == "torn" else "yes"
+    fault = parse_injection(f"crash:target=MR1,at_s=0,restart_s=5,write=24,durable={durable},journal={harm}")
+    report = run_point(Plan(SITE, "journal", 3_600.0), Point(1, fault)).report
+    assert report.verdict is Verdict.SERVED, report.why()
+
+
+@pytest.mark.parametrize("harm", ["cut,entries=45", "unsealed", "foreign"])
+def test_a_machine_that_cannot_rely_on_its_journal_holds_and_is_told_of(harm: str) -> None:
+    fault = parse_injection(f"crash:target=MR1,at_s=0,restart_s=5,write=46,durable=yes,journal={harm}")
+    report = run_point(Plan(SITE, "journal", 3_600.0), Point(1, fault)).report
+    assert report.verdict is Verdict.HELD, report.why()
+    assert "a person must regenerate its rights" in report.halted[0]

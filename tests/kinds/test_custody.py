@@ -13,6 +13,8 @@ from onboard.core.codes import (
     DriveMode,
     LightColour,
     Operation,
+    ShuttleMode,
+    Side,
     TaskPhase,
     TokenKind,
 )
@@ -28,6 +30,7 @@ from onboard.core.messages import (
     DriveState,
     Message,
     Reference,
+    ShuttleState,
     SyncRequest,
     TaskReport,
     TokenGrant,
@@ -138,6 +141,7 @@ def test_rights_that_come_after_their_work_was_dropped_go_back_with_the_word_whe
     """A grant that is said again for long finds a robot that has given the task back: the car would be nobody's."""
     robot = machine(ROBOT)
     robot.sense(standing_at_home(robot), 10)
+    robot.sense(ShuttleState(ROBOT, 0, ShuttleMode.HOME, 0, Side.NEAR, 0, 2_500), 10)
     robot.receive(CarAt(BAY, CAR, PLACE, 1, WHEELBASE_MM), 20)
     place = station_token(Station.from_number(PLACE))
     got = said(robot.receive(TokenGrant(BAY, TokenKind.STATION, place.number, 1, ROBOT), 30))

@@ -4,96 +4,22 @@ import pytest
 
 from onboard.core.codes import (
     CallResult,
-    Criterion,
-    DriveMode,
     Grade,
-    KindCode,
     LegAction,
     MachineState,
-    Operation,
     Reason,
     ShuttleMode,
-    Side,
 )
-from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     Award,
-    BusTime,
-    CallForProposals,
-    DriveOrder,
-    DriveState,
-    Heartbeat,
     Itinerary,
     Reference,
-    ShuttleState,
     Stamp,
 )
-from onboard.core.site import Segment, Station
+from onboard.core.site import Segment
 from onboard.kinds.car_park.handling import Phase
-from onboard.kinds.car_park.program import Handling, Program, Step, Work, to_itinerary
-from onboard.kinds.car_park.recovery import award_record, handled_record
-from onboard.kinds.registry import factory_for
-from tests.sites import one_floor
-
-SITE = one_floor(2)
-STEWARD, ROBOT, OTHER = 1, 11, 12
-TASK = Reference(STEWARD, 1)
-BAY, PLACE = Station(1, 4, Side.NEAR), Station(1, 9, Side.FAR)
-CALL = CallForProposals(
-    STEWARD, 7, TASK, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, 1, 0, 1_000, BAY.number, 0, TASK, 2_700
-)
-AWARDED = {"record": "boot"}, award_record(CALL, BAY, PLACE, 1).entry
-TAKEN = handled_record(Work(Handling.TAKE, BAY, TASK, 2_700, CALL)).entry
-MOVED_US = 20_000_000
-
-
-class Board:
-    """One robot that was started again, with what its devices and the others say."""
-
-    def __init__(self, *entries: dict[str, str | int]) -> None:
-        factory = factory_for(SITE, KindCode.ROBOT)
-        self.holon = Holon(SITE, SITE.machines[ROBOT], factory, boot=2, entries=entries)
-        self.said: list[Effect] = list(self.holon.start(0))
-        self.said += self.holon.receive(BusTime(STEWARD, 0), 0)
-        self.holon.tokens.trust()
-        self.now_us = 0
-
-    def stands(self, index: int, mode: DriveMode = DriveMode.STANDING) -> None:
-        position_mm = (index - 1) * SITE.tracks[1].pitch_mm
-        self.said += self.holon.sense(DriveState(ROBOT, 0, position_mm, 0, mode, at_mark=True), self.now_us)
-
-    def shuttle(self, mode: ShuttleMode, load_kg: int = 0) -> None:
-        self.said += self.holon.sense(ShuttleState(ROBOT, 0, mode, 0, Side.FAR, load_kg, 2_500), self.now_us)
-
-    def hears(self, *messages: Itinerary | Award) -> None:
-        for message in messages:
-            self.said += self.holon.receive(message, self.now_us)
-
-    def lives(self, until_us: int) -> None:
-        """Wakes whenever it is due."""
-        while True:
-            due_us = self.holon.next_wake()
-            if due_us is None or due_us > until_us:
-                break
-            assert due_us > self.now_us or self.now_us == 0, "it wakes for ever at one moment"
-            self.now_us = max(due_us, self.now_us + 1)
-            self.said += self.holon.wake(self.now_us)
-        self.now_us = until_us
-
-    @property
-    def state(self) -> MachineState:
-        return [one.message.state for one in self.said if isinstance(one, Send) and isinstance(one.message, Heartbeat)][
-            -1
-        ]
-
-    @property
-    def plans(self) -> list[Itinerary]:
-        return [one.message for one in self.said if isinstance(one, Send) and isinstance(one.message, Itinerary)]
-
-    @property
-    def drives(self) -> list[DriveOrder]:
-        return [one.message for one in self.said if isinstance(one, Actuate) and isinstance(one.message, DriveOrder)]
+from onboard.kinds.car_park.program import Program, Step, to_itinerary
+from tests.kinds.board import AWARDED, BOOT, MOVED_US, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, Board, Entry
 
 
 def through(index: int) -> Itinerary:
@@ -124,7 +50,7 @@ def test_an_award_of_before_is_given_back_and_changes_nothing() -> None:
 
 
 def test_a_shuttle_that_is_out_without_a_handling_holds_the_robot_for_a_person() -> None:
-    board = Board({"record": "boot"})
+    board = Board(BOOT)
     board.stands(6)
     board.shuttle(ShuttleMode.REACHED)
     board.lives(MOVED_US)
@@ -136,7 +62,7 @@ def test_a_shuttle_that_is_out_without_a_handling_holds_the_robot_for_a_person()
 
 
 def test_with_the_shuttle_out_at_another_place_than_the_journals_nothing_moves() -> None:
-    step = {"record": "step", "phase": Phase.REACH.value, "handling": "leave", "station": PLACE.number, "car": 1}
+    step: Entry = {"record": "step", "phase": Phase.REACH.value, "handling": "leave", "station": PLACE.number, "car": 1}
     board = Board(*AWARDED, TAKEN, step)
     board.stands(6)
     board.shuttle(ShuttleMode.REACHED, load_kg=1_400)
@@ -146,7 +72,7 @@ def test_with_the_shuttle_out_at_another_place_than_the_journals_nothing_moves()
 
 @pytest.mark.parametrize(("entries", "load_kg"), [((*AWARDED, TAKEN), 0), (AWARDED, 1_400)])
 def test_a_car_aboard_that_the_journal_does_not_know_or_misses_holds_it(
-    entries: tuple[dict[str, str | int], ...], load_kg: int
+    entries: tuple[Entry, ...], load_kg: int
 ) -> None:
     board = Board(*entries)
     board.stands(6)
@@ -156,7 +82,7 @@ def test_a_car_aboard_that_the_journal_does_not_know_or_misses_holds_it(
 
 
 def test_nothing_goes_on_before_the_shuttle_was_seen() -> None:
-    board = Board({"record": "boot"})
+    board = Board(BOOT)
     board.stands(6)
     board.lives(MOVED_US)
     assert (board.state, board.drives) == (MachineState.STARTING, [])
@@ -165,8 +91,20 @@ def test_nothing_goes_on_before_the_shuttle_was_seen() -> None:
     assert board.state is MachineState.IDLE
 
 
+def test_a_first_life_too_takes_part_only_with_its_shuttle_seen_at_home() -> None:
+    board = Board()
+    board.stands(6)
+    assert board.holon.behaviour.state is MachineState.STARTING
+    board.shuttle(ShuttleMode.REACHED)
+    assert board.holon.behaviour.state is MachineState.STOPPED
+    board.shuttle(ShuttleMode.HOME)
+    assert board.holon.behaviour.state is MachineState.IDLE
+    board.shuttle(ShuttleMode.MOVING)
+    assert board.holon.behaviour.state is MachineState.STOPPED, "whoever moves it by hand makes it an obstacle"
+
+
 def test_pushed_away_while_it_listens_it_says_where_it_is_then() -> None:
-    board = Board({"record": "boot"})
+    board = Board(BOOT)
     board.stands(6)
     board.shuttle(ShuttleMode.HOME)
     board.stands(7)

@@ -82,6 +82,9 @@ def test_go_against_a_stop_that_is_still_said_names_who_says_it() -> None:
     hand = Hand(maker_of(SITE, Wish("go"), 1), [halted(MR1, STOPPED, 252)]).begin()
     hand.turn(1)
     hand.hear(EmergencyStop(252, Reason.OPERATOR))
+    assert not hand.is_over(), "it had not heard the Go yet"
+    hand.turn(1)
+    hand.hear(EmergencyStop(252, Reason.OPERATOR))
     assert hand.order.status == 1 and "node 252 still says stop: end it there first" in hand.order.news()
 
 

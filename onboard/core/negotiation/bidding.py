@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from onboard.core.codes import Criterion
-from onboard.core.serial import BUS_MS_MODULUS
+from onboard.core.serial import ms_after
 from onboard.core.site import Site, Timing
 
 #: How long a bidder waits: from its cost, the call's floor, the criterion and the site's times, in us.
@@ -17,13 +17,14 @@ _FRAMES_TO_HEAR = 3
 #: What a controller may take to read a bid, us. Ours.
 _READING_US = 500
 
-_HALF = BUS_MS_MODULUS >> 1
+#: A finishing time may be this much before the floor, ms: floors are worked out when a call is heard. Ours.
+FLOOR_SLACK_MS = 500
 
 
 def cost_difference(cost: int, other: int, criterion: Criterion) -> int:
     """``cost - other`` in the criterion's unit; finishing times wrap (RFC 1982), money and length do not."""
     if criterion is Criterion.FINISH_TIME:
-        return (cost - other + _HALF) % BUS_MS_MODULUS - _HALF
+        return ms_after(cost, other)
     return cost - other
 
 
@@ -31,6 +32,12 @@ def beats(cost: int, node: int, other_cost: int, other_node: int, criterion: Cri
     """Whether a bid is better than another: lower cost, then lower node-ID (decision on flag 10)."""
     difference = cost_difference(cost, other_cost, criterion)
     return difference < 0 or (difference == 0 and node < other_node)
+
+
+def is_below(cost: int, floor: int, criterion: Criterion) -> bool:
+    """Whether a bid is better than anybody could be; finishing times by more than what rounding and clocks make."""
+    slack = FLOOR_SLACK_MS if criterion is Criterion.FINISH_TIME else 0
+    return cost_difference(cost, floor, criterion) < -slack
 
 
 def delay_us(cost: int, floor: int, criterion: Criterion, timing: Timing) -> int:

@@ -9,7 +9,8 @@ class Counters:
 
     ``calls_of_other_kind`` cost nothing more than this count (row P06). ``searches_saved`` and ``bids_saved`` are calls
     in which a better bid, the deadline or the award came before the search or the bid. ``late_bids_ignored`` counts
-    bids of others that came after a call's cut-off, as initiator and as participant (row P05). Of the options that this
+    bids of others that came after a call's cut-off, as initiator and as participant (row P05), ``bids_of_no_account``
+    those of machines that are left out or in the way, and those that nobody could keep. Of the options that this
     machine was given, ``options_confirmed`` were awarded, ``options_given_up`` were not needed, and
     ``options_expired`` were not decided in time.
     """
@@ -26,6 +27,7 @@ class Counters:
     outbid: int = 0
     won: int = 0
     late_bids_ignored: int = 0
+    bids_of_no_account: int = 0
     beliefs_without_award: int = 0
     beliefs_lapsed: int = 0
     sub_calls_opened: int = 0

@@ -1,7 +1,7 @@
 """What the negotiation tells its machine, and what it asks of the machine's task-generation function."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
@@ -53,6 +53,8 @@ class CallTerms:
     part: int = 0
     ready_us: int = 0
     detail: tuple[Message, ...] = ()
+    #: What nobody can be better than, where the initiator knows it: a bid below it is no bid.
+    floor: Callable[[CallForProposals, int], int] | None = field(default=None, compare=False)
 
 
 class Answer(NamedTuple):

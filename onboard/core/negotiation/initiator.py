@@ -13,9 +13,10 @@ from enum import Enum
 from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, TaskReport
-from onboard.core.negotiation.bidding import beats, cut_off_us
+from onboard.core.negotiation.bidding import beats, cut_off_us, is_below
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import CallTerms, Closed, NegotiationEvent
+from onboard.core.negotiation.trust import Trust, left_out_words
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Timing
 
@@ -25,10 +26,21 @@ Outcome = list[Effect | NegotiationEvent]
 #: is enough. Ours.
 QUICK_AWARDS = 10
 SLOW_DOWN = 10
+#: The longest pace, in award repeats: 16 s at the default of 100 ms. Ours.
+SLOWEST = 160
 
 #: Steps and largest values of a sub-call's two durations on the wire (dbc/fleet.dbc, CallParent), in ms.
 READY_STEP_MS, MAX_READY_MS = 100, 1_638_300
 HOLD_STEP_MS, MAX_HOLD_MS = 250, 255_750
+
+
+#: A winner that lives says so in less than this, us: its plan is one search and some frames. Ours.
+ACCEPT_WITHIN_US = 5_000_000
+
+
+def nobody_is(node: int) -> bool:
+    """No machine is in the way."""
+    return False
 
 
 class State(Enum):
@@ -107,14 +119,22 @@ class Initiator:
     number: Callable[[], int]
     silent: bool = False
     counters: Counters = field(default_factory=Counters)
+    trust: Trust = field(default_factory=Trust)
+    #: Whether a node's bids count for nothing, because it is in the way by its own word or by its silence.
+    is_obstacle: Callable[[int], bool] = nobody_is
     deadline_us: int | None = None
     hold_until_us: int = 0
     state: State = State.OPEN
     call: CallForProposals | None = None
     attempt: int = 0
     best: tuple[int, int] | None = None
+    #: Every node's newest bid, and the nodes whose bids for this attempt do not count.
+    bids: dict[int, int] = field(default_factory=dict)
+    left_out: frozenset[int] = frozenset()
+    floor: int | None = None
     due_us: int | None = None
     awards_sent: int = 0
+    awarded_us: int = 0
     _lost_reason: Reason = Reason.NONE
 
     # --- events ------------------------------------------------------------------------------------------------
@@ -122,6 +142,7 @@ class Initiator:
     def open(self, now_us: int) -> Outcome:
         """Send the call for the next attempt."""
         self.attempt += 1
+        self.bids.clear()
         terms = self.policy.step(self.attempt).changed(self.terms)
         deadline_us = self.deadline_us
         if deadline_us is None:
@@ -147,7 +168,11 @@ class Initiator:
             _in_steps_ms(terms.ready_us - self.due_us, READY_STEP_MS, MAX_READY_MS),
             _in_steps_ms(self.hold_until_us - self.due_us, HOLD_STEP_MS, MAX_HOLD_MS),
         )
-        return [*(Send(message) for message in self.terms.detail), Send(self.call)]
+        self.floor = None if terms.floor is None else terms.floor(self.call, now_us)
+        last = self.attempt >= self.timing.max_attempts
+        self.left_out = self.trust.left_out(terms.task, now_us, last_attempt=last)
+        before = [*left_out_words(self.node_id, self.call.call, self.left_out), *self.terms.detail]
+        return [*(Send(message) for message in before), Send(self.call)]
 
     def on_bid(self, bid: Bid, now_us: int) -> Outcome:
         """A bid counts if received before the deadline minus the guard, by my own bus time (decision on flag 11)."""
@@ -155,9 +180,27 @@ class Initiator:
         if self.state is not State.OPEN or now_us > cut_off_us(self.due_us, self.timing):
             self.counters.late_bids_ignored += 1
             return []
-        if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):
-            self.best = (bid.cost, bid.sender)
+        if bid.sender in self.left_out or self.is_obstacle(bid.sender) or self._is_below_floor(bid.cost):
+            self.counters.bids_of_no_account += 1
+            return []
+        self.bids[bid.sender] = bid.cost
+        self._choose()
         return []
+
+    def _choose(self) -> None:
+        """The best of the bids that count: whoever has become an obstacle since does not."""
+        assert self.call is not None
+        self.best = None
+        for node, cost in self.bids.items():
+            if self.is_obstacle(node):
+                continue
+            if self.best is None or beats(cost, node, *self.best, self.call.criterion):
+                self.best = (cost, node)
+
+    def _is_below_floor(self, cost: int) -> bool:
+        """Whether a bid is better than anybody could be."""
+        assert self.call is not None
+        return self.floor is not None and is_below(cost, self.floor, self.call.criterion)
 
     def on_itinerary(self, itinerary: Itinerary, now_us: int) -> Outcome:
         """The winner's firm itinerary whose stamp names this call ends the award."""
@@ -190,6 +233,11 @@ class Initiator:
         self._lost_reason = reason
         return self._fire(Event.ABANDON, now_us)
 
+    def unheard(self, now_us: int) -> int:
+        """The winner that was awarded the task long ago and has said nothing of it since; 0 for nobody."""
+        is_late = self.state is State.AWARDING and now_us - self.awarded_us >= ACCEPT_WITHIN_US
+        return self.best[1] if is_late and self.best is not None else NOBODY
+
     def wake(self, now_us: int) -> Outcome:
         """Let the deadline pass, or say the award again."""
         if self.due_us is None or self.due_us > now_us:
@@ -198,6 +246,7 @@ class Initiator:
             return self._fire(Event.REPEAT, now_us)
         if self.state is State.HELD:
             return self._fire(Event.EXPIRE, now_us)
+        self._choose()
         if self.best is not None:
             option = self.deadline_us is not None
             return self._fire(Event.DEADLINE_WITH_OPTION if option else Event.DEADLINE_WITH_BID, now_us)
@@ -224,10 +273,16 @@ class Initiator:
         4). A person is told once.
         """
         assert self.best is not None
-        winner = self.best[1]
+        cost, winner = self.best
+        if not self.awards_sent:
+            self.awarded_us = now_us
+            if not self.terms.depth:
+                self.trust.given(self.terms.task, winner, cost, self.terms.criterion)
         self.awards_sent += 1
-        slow = self.awards_sent > QUICK_AWARDS
-        self.due_us = now_us + self.timing.award_repeat_us * (SLOW_DOWN if slow else 1)
+        slow = self.awards_sent - QUICK_AWARDS
+        # Ever more slowly: what a winner that is down needs to hear it hears when it is back and asks.
+        factor = min(SLOWEST, SLOW_DOWN << min(slow, 10)) if slow > 0 else 1
+        self.due_us = now_us + self.timing.award_repeat_us * factor
         outcome: Outcome = [Send(self._closing(winner, CallResult.AWARDED, Reason.NONE))]
         if self.awards_sent == QUICK_AWARDS + 1:
             task = self.terms.task

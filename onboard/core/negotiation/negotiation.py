@@ -1,18 +1,20 @@
 """All calls of one machine at once, in both roles (rows P02 to P04)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from onboard.core.codes import KindCode, Reason
+from onboard.core.codes import NOBODY, KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, Reference, TaskReport
+from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, LeftOut, Message, Reference, TaskReport
 from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import Awarded, CallKey, CallTerms, Estimator, NegotiationEvent, PreAssigned
-from onboard.core.negotiation.initiator import Initiator, RestartPolicy
+from onboard.core.negotiation.initiator import Initiator, RestartPolicy, nobody_is
 from onboard.core.negotiation.initiator import State as InitiatorState
 from onboard.core.negotiation.participant import Participant
 from onboard.core.negotiation.sub_calls import SubCalls
-from onboard.core.serial import from_bus_ms, successor
+from onboard.core.negotiation.trust import Trust
+from onboard.core.serial import from_bus_ms, is_newer, successor
 from onboard.core.site import Timing
 
 #: A participation that is over, or in which this machine never bid, is forgotten this long after its deadline: frames
@@ -20,6 +22,8 @@ from onboard.core.site import Timing
 FORGET_US = 60_000_000
 #: Most participations remembered at once. A fleet has tens of calls open, not hundreds.
 MAX_CALLS = 256
+#: No call is open for more of the site's call windows than this: one that ends later was told by a wrong clock. Ours.
+MAX_WINDOWS = 60
 
 Outcome = list[Effect | NegotiationEvent]
 
@@ -44,6 +48,11 @@ class Negotiation:
     boot: int = 0
     delay: DelayRule = delay_us
     slot: Slot = ANY_TIME
+    trust: Trust = field(default_factory=Trust)
+    #: Whether a node's bids count for nothing, by this machine's mirror.
+    is_obstacle: Callable[[int], bool] = nobody_is
+    #: The newest word of each initiator about whom it leaves out: the call, and the nodes.
+    _left_out: dict[int, tuple[int, frozenset[int]]] = field(default_factory=dict)
     _last_call: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -52,7 +61,15 @@ class Negotiation:
     def open(self, terms: CallTerms, now_us: int) -> list[Effect]:
         """Call for a task. The answer comes as a ``Closed`` event from ``receive`` or ``wake``."""
         initiator = Initiator(
-            self.node_id, terms, self.timing, self.policy, self._next_call, self.silent, self.counters
+            self.node_id,
+            terms,
+            self.timing,
+            self.policy,
+            self._next_call,
+            self.silent,
+            self.counters,
+            self.trust,
+            self.is_obstacle,
         )
         self.initiators.append(initiator)
         return [item for item in initiator.open(now_us) if not isinstance(item, NegotiationEvent)]
@@ -72,8 +89,14 @@ class Negotiation:
         for initiator in self.initiators:
             if initiator.terms.task == task and not initiator.terms.depth:
                 outcome += initiator.abandon(reason, now_us)
+        self.trust.forfeited(task, now_us)
         self._forget(now_us)
         return outcome
+
+    def unheard(self, task: Reference, now_us: int) -> int:
+        """Who was awarded a whole ``task`` of mine long ago and is not heard acting on it; 0 for nobody."""
+        found = [one.unheard(now_us) for one in self.initiators if one.terms.task == task and not one.terms.depth]
+        return max(found, default=NOBODY)
 
     def standing_bid(self, key: CallKey) -> tuple[int, int] | None:
         """Cost and node-ID of the best bid heard for another machine's call; after the deadline, the winner (P11).
@@ -93,6 +116,8 @@ class Negotiation:
                 outcome = self._on_call(message, now_us)
             case Bid():
                 outcome = self._on_bid(message, now_us)
+            case LeftOut():
+                self._on_left_out(message)
             case Award():
                 participant = self.participants.get(CallKey(message.sender, message.call))
                 outcome = self._spread(participant.on_award(message, now_us), now_us) if participant is not None else []
@@ -102,6 +127,7 @@ class Negotiation:
             case TaskReport():
                 for initiator in self.initiators:
                     outcome += initiator.on_report(message, now_us)
+                self._judge(message, now_us)
         self._forget(now_us)
         return outcome
 
@@ -142,11 +168,11 @@ class Negotiation:
         if known is not None and known.call == call:
             return []
         deadline_us = from_bus_ms(call.deadline_ms, now_us)
-        if now_us >= last_bid_us(deadline_us, self.timing):
+        if now_us >= last_bid_us(deadline_us, self.timing) or deadline_us > now_us + self._longest_us:
             self.counters.calls_too_late += 1
             return []
         older = [one for one in self.participants.values() if one.key == key or _is_for_same_task(one.call, call)]
-        if any(one.deadline_us > deadline_us and not one.is_over for one in older):
+        if any(one.deadline_us > deadline_us and not one.is_over and not _is_behind(one.call, call) for one in older):
             self.counters.calls_stale += 1
             return []
         outcome: Outcome = []
@@ -165,9 +191,33 @@ class Negotiation:
             SubCalls(call, deadline_us, self.timing, self._open_sub_call),
             self.delay,
             self.slot,
+            self.is_obstacle,
+            self._out_of(call),
         )
         self.participants[key] = participant
         return outcome + participant.open(now_us)
+
+    def _on_left_out(self, word: LeftOut) -> None:
+        """Whom the next call of its sender leaves out; a second frame for the same call names more."""
+        named = {word.node_a, word.node_b, word.node_c, word.node_d, word.node_e, word.node_f} - {NOBODY}
+        call, nodes = self._left_out.get(word.sender, (word.call, frozenset()))
+        self._left_out[word.sender] = word.call, (nodes if call == word.call else frozenset()) | named
+
+    def _out_of(self, call: CallForProposals) -> frozenset[int]:
+        number, nodes = self._left_out.get(call.sender, (call.call, frozenset()))
+        return nodes if number == call.call else frozenset()
+
+    def _judge(self, report: TaskReport, now_us: int) -> None:
+        """What a winner says of its task is what it is worth in the next calls."""
+        is_winners = self.trust.winner(report.task) == report.sender
+        if report.phase is TaskPhase.DONE:
+            self.trust.done(report.task, report.sender, now_us)
+        elif report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED) and is_winners:
+            self.trust.forfeited(report.task, now_us)
+
+    @property
+    def _longest_us(self) -> int:
+        return MAX_WINDOWS * self.timing.call_window_us
 
     def _spread(self, outcome: Outcome, now_us: int) -> Outcome:
         """Tell all other participations of a bid or an award: their searches knew nothing of it."""
@@ -194,6 +244,7 @@ class Negotiation:
             self.policy,
             self._next_call,
             counters=self.counters,
+            is_obstacle=self.is_obstacle,
             deadline_us=deadline_us,
             hold_until_us=hold_until_us,
         )
@@ -231,6 +282,11 @@ class Negotiation:
     def _next_call(self) -> int:
         self._last_call = successor(self._last_call, 16)
         return self._last_call
+
+
+def _is_behind(one: CallForProposals, other: CallForProposals) -> bool:
+    """Whether ``other`` was opened after ``one`` by its number: a deadline tells less where a clock was set anew."""
+    return one.sender == other.sender and is_newer(other.call, one.call, 16)
 
 
 def _is_for_same_task(one: CallForProposals, other: CallForProposals) -> bool:

@@ -24,6 +24,7 @@ from onboard.core.negotiation.bidding import (
     cut_off_us,
     delay_us,
     in_slot,
+    is_below,
     last_bid_us,
 )
 from onboard.core.negotiation.counters import Counters
@@ -38,6 +39,7 @@ from onboard.core.negotiation.events import (
     Proposal,
     Released,
 )
+from onboard.core.negotiation.initiator import nobody_is
 from onboard.core.negotiation.sub_calls import SubCalls
 from onboard.core.site import Timing
 
@@ -94,6 +96,9 @@ class Participant:
     subs: SubCalls
     delay: DelayRule = delay_us
     slot: Slot = ANY_TIME
+    #: Whose bids do not count: obstacles, by my mirror, and those that the initiator named.
+    is_obstacle: Callable[[int], bool] = nobody_is
+    left_out: frozenset[int] = frozenset()
     state: State = State.WAITING_BOUND
     due_us: int | None = None
     heard_us: int = 0
@@ -138,7 +143,7 @@ class Participant:
         """Hear the call: compute floor and bound and start waiting, or stay silent for good."""
         self.counters.calls_heard += 1
         self.heard_us = now_us
-        bound = self.estimator.lower_bound(self.call, now_us)
+        bound = None if self.node_id in self.left_out else self.estimator.lower_bound(self.call, now_us)
         if bound is None:
             return self._fire(Event.IMPOSSIBLE, now_us)
         self.bound = bound
@@ -150,6 +155,9 @@ class Participant:
         """A bid of another machine; one received after the cut-off is ignored and counted, as the initiator does."""
         if now_us > self.cut_off_us:
             self.counters.late_bids_ignored += 1
+            return []
+        if self.is_obstacle(bid.sender) or bid.sender in self.left_out or self._is_below_floor(bid.cost):
+            self.counters.bids_of_no_account += 1
             return []
         if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):
             self.best = (bid.cost, bid.sender)
@@ -361,6 +369,10 @@ class Participant:
         if self.best is None or self.best[1] == self.node_id:
             return False
         return not beats(self.bound, self.node_id, *self.best, self.call.criterion)
+
+    def _is_below_floor(self, cost: int) -> bool:
+        """Whether a bid is better than anybody could be; only who could bid itself has worked that out."""
+        return bool(self.floor) and is_below(cost, self.floor, self.call.criterion)
 
     def _delay_us(self, cost: int) -> int:
         return in_slot(self.delay(cost, self.floor, self.call.criterion, self.timing), self.slot)

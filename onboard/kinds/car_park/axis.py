@@ -40,6 +40,12 @@ class TrackAxis:
         length = self.track.length
         return length if lift_at(self.site, Segment(self.number, length + 1)) is None else length + 1
 
+    @cached_property
+    def lifts(self) -> tuple[int, ...]:
+        """Lifts, by track, whose platforms are at the ends of this axis."""
+        ends = (lift_at(self.site, Segment(self.number, index)) for index in (0, self.track.length + 1))
+        return () if self.mouth is not None else tuple(lift for lift in ends if lift is not None)
+
     def position_mm(self, index: int) -> int:
         """Centre of an index."""
         return (index - 1) * self.track.pitch_mm

@@ -1,6 +1,7 @@
 """The one task that uses a compartment's bay, and what is said about it: its call and its award."""
 
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -16,7 +17,7 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, BayState, Reference, TaskReport
+from onboard.core.messages import Award, BayState, CallForProposals, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms
 from onboard.kinds.car_park.site import CarLimits
@@ -66,8 +67,8 @@ class BayTask:
     retry_at_us: int | None = None
     reminders: int = 0
 
-    def terms(self, source: int, sink: int) -> CallTerms:
-        """The call for it, between two stations by number."""
+    def terms(self, source: int, sink: int, floor: Callable[[CallForProposals, int], int]) -> CallTerms:
+        """The call for it, between two stations by number; no robot can be better than ``floor``."""
         return CallTerms(
             task=self.task,
             operation=self.operation,
@@ -78,6 +79,7 @@ class BayTask:
             car=self.car,
             wheelbase_mm=self.wheelbase_mm,
             task_version=self.version,
+            floor=floor,
         )
 
     def award(self, sender: int) -> Award:

@@ -12,6 +12,7 @@ from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     ANY_STATION,
+    NOBODY,
     OUTSIDE,
     TASK_VERSION_BITS,
     CallResult,
@@ -32,6 +33,7 @@ from onboard.core.codes import (
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import (
     BayState,
+    CarAt,
     DeskEvent,
     DoorState,
     Message,
@@ -40,37 +42,18 @@ from onboard.core.messages import (
     TaskReport,
     TokenRequest,
 )
-from onboard.core.mirror import Mirror
-from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, Estimator, NegotiationEvent
+from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.serial import successor
-from onboard.core.site import Machine, Site, Station
+from onboard.core.site import Station
 from onboard.kinds.car_park import bay_task, custody
 from onboard.kinds.car_park.bay_generation import BayGeneration
-from onboard.kinds.car_park.bay_memory import (
-    BayMemory,
-    job_over_record,
-    job_record,
-    next_reference,
-    ticket_record,
-)
+from onboard.kinds.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
 from onboard.kinds.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask, withdrawal
+from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.outputs import BayOutputs
+from onboard.kinds.car_park.program import Program
 from onboard.kinds.car_park.site import car_park
 from onboard.kinds.car_park.stewardship import Stewardship
-
-
-class CompartmentFactory:
-    """Makes compartments."""
-
-    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
-        """The compartment's task-generation function."""
-        return BayGeneration(site, machine)
-
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Compartment":
-        """The compartment's steps; ``estimator`` is the one made above."""
-        if not isinstance(estimator, BayGeneration):
-            raise TypeError("a compartment needs its own task-generation function")
-        return Compartment(fleet, estimator)
 
 
 @dataclass
@@ -96,6 +79,8 @@ class Compartment:
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
         self.outputs = BayOutputs(self.fleet.node_id)
+        site, machine = self.fleet.site, self.fleet.machine
+        self._robots = CarParkGeneration(site, machine, self.fleet.mirror, Program(site))
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
@@ -157,11 +142,11 @@ class Compartment:
             urgent = message.action is OperatorAction.URGENT_TICKET
             return self._at_desk(DESK_INPUT[message.action], message.car, urgent=urgent)
         if isinstance(message, TaskReport):
-            return self._on_report(message, now_us)
+            return self.stewardship.hear(message, now_us) + self._on_report(message, now_us)
         if isinstance(message, TokenRequest) and self.job is not None:
             wanted = TokenKey(message.token_kind, message.token)
             return self._remind(self.job, message.sender) if wanted == car_token(*self.job.car) else []
-        return self.stewardship.hear(message)
+        return self.stewardship.hear(message, now_us)
 
     def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
         """What its winner, or who has won it once, says of a task of mine; or the custodian of its car."""
@@ -181,6 +166,8 @@ class Compartment:
         """The winner gives the task back, or the custodian of the car has taken the right to it back."""
         record = self.fleet.mirror.cars.get(job.car)
         if job.winner and sender == job.winner:
+            return self._call_again(job, now_us)
+        if not job.winner and self._is_unheard(job, now_us) and record is not None and sender == record.custodian:
             return self._call_again(job, now_us)
         if not job.winner or record is None or sender != record.custodian:
             return []
@@ -244,7 +231,7 @@ class Compartment:
             if requester != self.job.winner:
                 return Reason.TOKEN_NOT_GRANTABLE_YET
             self._robot_waits = True
-            if self.phase is not BayPhase.SERVING:
+            if self.phase is not BayPhase.SERVING or not self._is_open_to_machines():
                 return Reason.DOOR_NOT_READY
             self.job.was_granted |= key.kind is TokenKind.STATION
             return Reason.NONE
@@ -265,7 +252,13 @@ class Compartment:
         job = self.job
         if job is not None and job.winner and effects and self.stewardship.is_given_back(job.car):
             effects += self._call_again(job, now_us)
+        elif job is not None and not job.winner and self._is_unheard(job, now_us):
+            # Nobody has a right by the award that was not heard: its car is mine, and goes to the winner only.
+            effects += self._call_again(job, now_us)
         return effects
+
+    def _is_unheard(self, job: BayTask, now_us: int) -> bool:
+        return custody.is_mine(self.fleet, job.car) and self.fleet.negotiation.unheard(job.task, now_us) != NOBODY
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""
@@ -304,6 +297,12 @@ class Compartment:
             return effects
         return effects + self._to_free()
 
+    def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
+        """My journal is lost and my rights were made anew: whatever was meant with the car in my bay, it is parked."""
+        self.stewardship.left = None
+        self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        return [job_record(*self.memory.job), *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
         assert self.memory.job is not None
@@ -335,6 +334,8 @@ class Compartment:
         assert self.bay is not None and self.doors is not None
         if not self._is(DoorName.INPUT, DoorPosition.OPEN):
             return []
+        if self.stewardship.left is not None and self.bay.load_kg:
+            return self._park_again(self.stewardship.left, now_us)
         if self._key_pressed:
             self._key_pressed = False
             return self._admit(now_us)
@@ -471,11 +472,15 @@ class Compartment:
         return effects + self._to_free()
 
     def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
-        return list(self.fleet.negotiation.open(job.terms(source, sink), now_us))
+        return list(self.fleet.negotiation.open(job.terms(source, sink, self._robots.floor), now_us))
 
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None
         return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
+
+    def _is_open_to_machines(self) -> bool:
+        """Whether a shuttle can come in and a person cannot, by what the doors say now."""
+        return self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
 
     def _go(self, phase: BayPhase) -> None:
         self.phase = phase

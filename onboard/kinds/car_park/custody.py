@@ -112,3 +112,10 @@ def give_back(fleet: Fleet, needed: Container[TokenKey], now_us: int) -> list[Ef
             effects += state(fleet, car, station.number, record.wheelbase_mm)
             effects += fleet.tokens.give(key, keeper(fleet.site, station), now_us)
     return effects
+
+
+def is_mine(fleet: Fleet, car: Reference) -> bool:
+    """Whether a car is in my custody: by the mirror, and by its token."""
+    record = fleet.mirror.cars.get(car)
+    is_custodian = record is not None and record.custodian == fleet.node_id
+    return is_custodian and fleet.tokens.holds(car_token(*car))

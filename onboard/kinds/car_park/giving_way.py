@@ -64,7 +64,7 @@ class GivingWay:
             # A right in hand outranks stamps: whoever has it is about to be there.
             return holder == sender
         plans = self.fleet.mirror.itineraries
-        return plans[self.fleet.node_id].stamp > plans[sender].stamp
+        return plans[sender].stamp.ranks_before(plans[self.fleet.node_id].stamp)
 
     def _come_behind(self, meetings: list[Meeting]) -> Answer:
         """Move each of my steps so far that it begins when the others' turns are over."""

@@ -15,6 +15,7 @@ from onboard.core.effects import Effect, Report, Send
 from onboard.core.lifts import gate, lift_at
 from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
 from onboard.core.occupancy import itinerary_windows
+from onboard.core.reservations import FOREVER, Window
 from onboard.core.site import Segment
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.generation import CarParkGeneration
@@ -58,6 +59,8 @@ class GoingAround:
     _heard: int = 0
     _places_seen: tuple[int, int] = (-1, -1)
     _place_at_us: int | None = None
+    #: Since when somebody stands in my way for ever, by its plan.
+    _stands_since_us: int | None = None
 
     def __post_init__(self) -> None:
         self.places = Places(self.fleet, self.generation, self.shuttle)
@@ -69,7 +72,8 @@ class GoingAround:
 
     def next_wake(self) -> int | None:
         """When to try again, or to say again what was given back."""
-        times = [self.next_word(), self._retry_at_us, self._place_at_us]
+        stands_us = None if self._stands_since_us is None else self._stands_since_us + KEEP_US
+        times = [self.next_word(), self._retry_at_us, self._place_at_us, stands_us]
         return min((time for time in times if time is not None), default=None)
 
     def next_word(self) -> int | None:
@@ -88,9 +92,38 @@ class GoingAround:
             if self._since_us is not None or self._is_hindered(self.program.remaining, now_us):
                 self._since_us = now_us if self._since_us is None else self._since_us
                 self._retry_at_us = now_us
+        if self._stood_for_us(now_us) >= KEEP_US:
+            return effects + self._make_room(now_us)
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             effects += self._try(now_us)
         return effects + self._leave_elsewhere(now_us)
+
+    def _stood_for_us(self, now_us: int) -> int:
+        """How long whoever has the slot that I wait for has stood there for ever by its own plan, us; 0 where nobody.
+
+        Who only stands gives way (``giving_way``); one that does not finds no way around what I plan.
+        """
+        slot, me = self.carriage.blocked, self.fleet.node_id
+        stands = False
+        if slot is not None and self.carriage.refresh_at_us is None:
+            holder = self.fleet.tokens.holder_of(segment_token(slot))
+            window = Window(slot, now_us, FOREVER)
+            stands = holder != me and holder in self.fleet.mirror.reservations.standing_in(me, [window])
+        if not stands:
+            self._stands_since_us = None
+            return 0
+        self._stands_since_us = now_us if self._stands_since_us is None else self._stands_since_us
+        return now_us - self._stands_since_us
+
+    def _make_room(self, now_us: int) -> list[Effect]:
+        """Another way; where there is none, stand without a plan until the other has gone: it plans around mine."""
+        self._stands_since_us = None
+        works = self.program.works()
+        kept, origin, start_us = self._turning((), now_us)
+        steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
+        if steps is None:
+            self.turn_later(now_us)
+        return self.take_up(kept, steps or (), works, now_us)
 
     def watch_drive(self, now_us: int) -> list[Effect]:
         """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks.

@@ -81,6 +81,11 @@ class ShuttleWork:
         """Whether the shuttle may be outside the carrier: then the carrier must not move (row P32)."""
         return self.phase in (Phase.REACH, Phase.CLAMP, Phase.RETRACT)
 
+    @property
+    def is_astray(self) -> bool:
+        """Whether its sensor sees it out though nothing in hand has sent it there: the carrier gets no orders then."""
+        return self.sensed is not None and not self.is_home and not self.is_out
+
     def drop(self) -> None:
         """The handling in hand, which was not begun, is not to be: its rights are asked for no more."""
         if self.work is not None:

@@ -9,11 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
-from onboard.core.lifts import gate, platform
+from onboard.core.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
 from onboard.core.messages import (
     Award,
     DriveOrder,
@@ -26,6 +26,7 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine, Site
@@ -34,8 +35,6 @@ from onboard.kinds.car_park.bay_memory import BayMemory
 from onboard.kinds.car_park.lift_generation import LiftGeneration
 from onboard.kinds.car_park.stewardship import Stewardship
 
-#: The platform stands at a floor's mark within this, mm (fine sensor, dbc/device.dbc).
-MARK_TOLERANCE_MM = 5
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
 OFF_LIMIT_MM = 20_000
 
@@ -91,7 +90,7 @@ class Lift:
     _sequence: int = 0
     _target: int | None = None
     _refresh_at_us: int | None = None
-    _told: tuple[int, DriveMode] | None = None
+    _told: tuple[int, DriveMode, int] | None = None
     _gate_was_out: bool = False
     _made: dict[int, int] = field(default_factory=dict)
     _rides_with_me: dict[int, tuple[Itinerary, bool]] = field(default_factory=dict)
@@ -119,7 +118,9 @@ class Lift:
     def state(self) -> MachineState:
         """Heartbeat state."""
         if self.phase is LiftPhase.STARTING:
-            return MachineState.STARTING
+            # Who knows where it stands takes part, though it waits for the robot that has its platform to be heard.
+            stands = self.drive is not None and self.drive.mode is DriveMode.STANDING
+            return MachineState.WAITING if stands and self.platform is not None else MachineState.STARTING
         if self._is_stuck:
             return MachineState.STOPPED
         return MachineState.IDLE if self.phase is LiftPhase.FREE else MachineState.WORKING
@@ -148,16 +149,31 @@ class Lift:
         self.drive = message
         self.stall.sensed(message.position_mm, now_us)
         self.generation.index = self._index()
-        told = (self._index(), message.mode)
+        return self._tell()
+
+    def _tell(self) -> list[Effect]:
+        """Say where the platform is, once for each floor, mode and version of the gate."""
+        assert self.drive is not None
+        told = (self._index(), self.drive.mode, self._gate_version)
         if told == self._told:
             return []
         self._told = told
-        offset_mm = message.position_mm - self._position_mm(told[0])
-        return [Send(Progress(self.fleet.node_id, 0, 0, self.track, told[0], offset_mm, message.speed_mm_s))]
+        return [self._word(self.drive)]
+
+    @property
+    def _gate_version(self) -> int:
+        return self.fleet.tokens.seen.get(segment_token(gate(self.track)), 0)
+
+    def _word(self, drive: DriveState) -> Effect:
+        """Where the platform is, under the version of the gate: whoever holds it under this one may go by it."""
+        index = self._index()
+        offset_mm = drive.position_mm - self._position_mm(index)
+        under = under_gate(self._gate_version)
+        return Send(Progress(self.fleet.node_id, *under, self.track, index, offset_mm, drive.speed_mm_s))
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """As steward of alleys: awards tell who may fetch a stored car, and a car given to me is stated anew."""
-        effects = self.stewardship.hear(message)
+        effects = self.stewardship.hear(message, now_us)
         if not isinstance(message, Award) or message.result is not CallResult.AWARDED:
             return effects
         known = self.fleet.negotiation.knows(message.sender, message.call)
@@ -202,7 +218,11 @@ class Lift:
         self._is_stuck = self.stall.is_stuck(now_us)
         if self.drive is None or self.platform is None:
             return effects
-        return effects + self._table[self.phase](now_us)
+        effects += self._table[self.phase](now_us)
+        if not self._holds_gate():
+            # Who has it goes by no word but one that was said since.
+            effects += self._tell()
+        return effects
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or a winner counts as lost."""
@@ -213,9 +233,7 @@ class Lift:
         """Where the platform is, and the tokens that this node holds."""
         effects = self.stewardship.car_statements() + self.fleet.tokens.statements()
         if self.drive is not None and self.drive.mode is DriveMode.STANDING:
-            index = self._index()
-            offset_mm = self.drive.position_mm - self._position_mm(index)
-            effects.append(Send(Progress(self.fleet.node_id, 0, 0, self.track, index, offset_mm, 0)))
+            effects.append(self._word(self.drive))
         return effects
 
     # --- grants ------------------------------------------------------------------------------------------------
@@ -251,7 +269,7 @@ class Lift:
             ride
             for node, itinerary in self.fleet.mirror.itineraries.items()
             if self._ride_legs(itinerary) and not self._is_absent(node)
-            for ride in rides_of(self.track, node, itinerary, now_us)
+            for ride in self._rides(node, itinerary, now_us)
         ]
         rides = [ride for ride in rides if self._made.get(ride.robot) != ride.begin_us]
         return min(rides, key=lambda ride: (ride.begin_us, ride.robot), default=None)
@@ -264,8 +282,14 @@ class Lift:
     def _as_planned_now(self, ride: Ride, now_us: int) -> Ride:
         """The ride of whoever is aboard by its newest plan: a restarted robot may want to go elsewhere."""
         itinerary = self.fleet.mirror.itineraries.get(ride.robot)
-        planned = rides_of(self.track, ride.robot, itinerary, now_us) if itinerary is not None else []
+        planned = self._rides(ride.robot, itinerary, now_us)
         return next((one for one in planned if one.board == ride.board), ride)
+
+    def _rides(self, robot: int, itinerary: Itinerary | None, now_us: int) -> list[Ride]:
+        """Rides on this lift that a robot's plan still has before it, by its own word for where in the plan it is."""
+        if itinerary is None:
+            return []
+        return rides_of(self.track, robot, itinerary, self.fleet.mirror.progress.get(robot), now_us)
 
     def _ride_legs(self, itinerary: Itinerary) -> bool:
         """Whether an itinerary rides with this lift at all: few do, and it is asked for at every message."""
@@ -300,7 +324,7 @@ class Lift:
             self.phase = LiftPhase.LEAVING if there else LiftPhase.RIDING
         else:
             itinerary = self.fleet.mirror.itineraries.get(robot)
-            planned = rides_of(self.track, robot, itinerary, now_us) if itinerary is not None else []
+            planned = self._rides(robot, itinerary, now_us)
             here = next((one for one in planned if self._stands_at(one.board)), None)
             if here is None:
                 return []
@@ -370,10 +394,10 @@ class Lift:
         itinerary, seen = self.fleet.mirror.itineraries.get(robot), self.fleet.mirror.progress.get(robot)
         if itinerary is None or seen is None or seen.itinerary_version != itinerary.version:
             return None
-        leg = next(iter(itinerary.legs[seen.leg : seen.leg + 1]), None)
+        leg = leg_in_hand(itinerary, seen)
         if leg is None or (leg.action, leg.track, leg.from_index) != (LegAction.RIDE, self.track, self.ride.leave):
             return None
-        planned = rides_of(self.track, robot, itinerary, now_us)
+        planned = self._rides(robot, itinerary, now_us)
         return next((one for one in planned if (one.board, one.leave) == (leg.from_index, leg.to_index)), None)
 
     def _end_ride(self, now_us: int) -> list[Effect]:
@@ -388,9 +412,11 @@ class Lift:
     def _begin_as_told(self, ride: Ride, now_us: int) -> int:
         """When a ride began by its robot's newest plan: who wins a task while aboard tells the same ride anew."""
         itinerary = self.fleet.mirror.itineraries.get(ride.robot)
-        planned = rides_of(self.track, ride.robot, itinerary, now_us) if itinerary is not None else []
-        same = (one for one in planned if (one.board, one.leave) == (ride.board, ride.leave) and one.begin_us <= now_us)
-        return next((one.begin_us for one in same), ride.begin_us)
+        leg = leg_in_hand(itinerary, self.fleet.mirror.progress.get(ride.robot)) if itinerary is not None else None
+        told = (LegAction.RIDE, self.track, ride.board, ride.leave)
+        if leg is None or (leg.action, leg.track, leg.from_index, leg.to_index) != told:
+            return ride.begin_us
+        return self._rides(ride.robot, itinerary, now_us)[0].begin_us
 
     # --- inner works -------------------------------------------------------------------------------------------
 
@@ -414,7 +440,8 @@ class Lift:
 
     def _stands_at(self, index: int) -> bool:
         drive = self.drive
-        if drive is None or drive.mode is not DriveMode.STANDING:
+        if drive is None or drive.mode is not DriveMode.STANDING or drive.sequence != self._sequence:
+            # One that has not taken up the last order yet may still go by it.
             return False
         return abs(drive.position_mm - self._position_mm(index)) <= MARK_TOLERANCE_MM
 
@@ -444,24 +471,27 @@ class Lift:
         return [Actuate(order)]
 
 
-def rides_of(track: int, robot: int, itinerary: Itinerary, now_us: int) -> list[Ride]:
-    """Rides on one lift that an itinerary still plans: those that its robot has not told to be over."""
+def rides_of(track: int, robot: int, itinerary: Itinerary, seen: Progress | None, now_us: int) -> list[Ride]:
+    """Rides on one lift that a firm itinerary still plans: those in its leg in hand, as its robot said it, and later.
+
+    Whether a ride is over is the robot's word alone: planned times say only in which order rides were planned.
+    """
     if itinerary.grade is not Grade.FIRM:
         return []
-    rides = []
+    current, rides = _current(itinerary, seen), []
     begin_us = from_bus_ms(itinerary.stamp.award_ms, now_us)
-    for leg in itinerary.legs:
-        end_us = from_bus_ms(leg.end_ms, now_us)
-        if leg.action is LegAction.RIDE and leg.track == track and not _is_over(leg, itinerary, end_us, now_us):
+    for number, leg in enumerate(itinerary.legs):
+        if number >= current and leg.action is LegAction.RIDE and leg.track == track:
             rides.append(Ride(robot, leg.from_index, leg.to_index, begin_us))
-        begin_us = end_us
+        begin_us = from_bus_ms(leg.end_ms, now_us)
     return rides
 
 
-def _is_over(leg: Leg, itinerary: Itinerary, end_us: int, now_us: int) -> bool:
-    """A ride whose planned end is long past was made, or given up; a late robot tells its plan anew before that."""
-    return end_us + RIDE_GRACE_US < now_us
+def leg_in_hand(itinerary: Itinerary, seen: Progress | None) -> Leg | None:
+    """The leg that a robot is in by its own word, the first where it said nothing yet; None where all are done."""
+    current = _current(itinerary, seen)
+    return itinerary.legs[current] if current < len(itinerary.legs) else None
 
 
-#: How long after its planned end a ride that was not told anew counts as over, us. Ours.
-RIDE_GRACE_US = 5_000_000
+def _current(itinerary: Itinerary, seen: Progress | None) -> int:
+    return seen.leg if seen is not None and seen.itinerary_version == itinerary.version else 0

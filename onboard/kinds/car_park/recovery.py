@@ -119,6 +119,7 @@ class Recovery:
                 self.works = [work for work in self.works if not _is(work, entry)]
                 self.phase = None
                 if entry["handling"] == Handling.LEAVE.value:
+                    self.versions.pop(_task(entry), None)
                     self.last_done, self.is_news = (_task(entry), int(entry.get("station", 0))), True
             case "riding":
                 self.riding = (int(entry["lift"]), int(entry["board"]), int(entry["leave"]))

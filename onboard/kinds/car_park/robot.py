@@ -33,8 +33,7 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import to_bus_ms
-from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.core.site import Machine, Site, TrackKind
 from onboard.kinds.car_park import custody
 from onboard.kinds.car_park.asking import AskingGeneration
 from onboard.kinds.car_park.generation import CarParkGeneration, Solution, weighed
@@ -42,12 +41,12 @@ from onboard.kinds.car_park.giving_way import Answer, GivingWay
 from onboard.kinds.car_park.going_around import GoingAround
 from onboard.kinds.car_park.handling import Phase, ShuttleWork, handle
 from onboard.kinds.car_park.holding import Holding
-from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work, ends_at
+from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work
 from onboard.kinds.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
 from onboard.kinds.car_park.ride_calls import call_lifts
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.site import RideCalls, car_park
-from onboard.kinds.car_park.starting import Stage, Starting
+from onboard.kinds.car_park.starting import Body, Stage, Starting
 from onboard.kinds.car_park.travel import Carriage
 from onboard.kinds.car_park.way import way_to_refuge
 
@@ -104,8 +103,9 @@ class Robot:
         self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
         self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
         self.holding = Holding(self.fleet, self.generation, self.carriage, self.shuttle)
+        machine = Body(self.carriage, self.shuttle, self.riding)
         self.starting = Starting(
-            self.fleet, self.generation, self.carriage, self.shuttle, self.recovery, self._say_what_is_mine, self._go_on
+            self.fleet, self.generation, machine, self.recovery, self._say_what_is_mine, self._started
         )
         if self.recovery.floor is not None:
             self.carriage.track = self.recovery.floor
@@ -118,7 +118,8 @@ class Robot:
     @property
     def state(self) -> MachineState:
         """Heartbeat state."""
-        is_held_back = self.starting.stage is Stage.HELD or self.going_around.is_stuck
+        is_astray = self.starting.is_over and self.shuttle.is_astray
+        is_held_back = self.starting.stage is Stage.HELD or self.going_around.is_stuck or is_astray
         if self._fault is not Reason.NONE or is_held_back:
             return MachineState.STOPPED
         if self.holding.is_at_rest:
@@ -126,7 +127,7 @@ class Robot:
         if not self.starting.is_over:
             return MachineState.STARTING
         if self.program.step is None:
-            return MachineState.IDLE
+            return MachineState.WAITING if self.program.unplanned else MachineState.IDLE
         return MachineState.WAITING if self.carriage.blocked is not None else MachineState.WORKING
 
     @property
@@ -200,6 +201,7 @@ class Robot:
             self._begun = False
         if not rest and self.carriage.standing_at is not None:
             self.program.standing = self.carriage.standing_at
+            self.carriage.go(self.carriage.standing_at)
         planned = [step.work for step in rest]
         self.program.replace(rest, self.program.stamp, [work for work in works if work not in planned])
         effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
@@ -351,38 +353,18 @@ class Robot:
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
         return mine
 
-    def _go_on(self, place: Segment, in_hand: tuple[Step, ...], now_us: int) -> list[Effect]:
-        """The start is over: go on from ``place`` with what the journal says is mine, by a new way (rows P14, P20)."""
-        works, self.recovery.works = self.recovery.works, []
-        stamp = Stamp(to_bus_ms(now_us), self.fleet.node_id, 0)
-        if not self.recovery.is_restart:
-            self.program.begin(place, [], stamp)
-            return self._publish(now_us)
-        origin, start_us, ahead = place, now_us, works
-        for step in in_hand:
-            origin, start_us = ends_at(self.fleet.site, step), step.end_us
-            ahead = ahead if step.work is None else ahead[1:]
-        more = self.generation.reroute(origin, start_us, ahead, now_us)
-        if in_hand:
-            self._resume(in_hand[0])
-        calls = [work.call for work in works]
-        if calls:
-            stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF)
-        self.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
-        if more is None:
-            # Somebody is in the way: it is tried again, and what was not touched is given back if that lasts.
+    def _started(self, planned: tuple[Step, ...] | None, calls: list[CallForProposals], now_us: int) -> list[Effect]:
+        """The start is over, and the program taken up: tell the plan, and call for rides in what was planned now."""
+        # What a restart has left in hand is the first step, and was begun before.
+        self._begun = len(planned or ()) < len(self.program.steps)
+        effects: list[Effect] = []
+        if self.recovery.is_restart:
+            effects.append(Report("goes on after a restart: " + "; ".join(str(step) for step in self.program.steps)))
+        if planned is None:
+            # Somebody is in the way, of work or to a refuge: it is tried again, and what was not touched is given back.
             self.going_around.turn_later(now_us)
-        planned = "; ".join(str(step) for step in self.program.steps)
-        effects: list[Effect] = [Report("goes on after a restart: " + planned), *self._publish(now_us)]
-        return effects + (call_lifts(self.fleet, calls[0], more or (), now_us) if calls else [])
-
-    def _resume(self, step: Step) -> None:
-        """The step in hand goes on from where the journal and the sensors say that it was."""
-        self._begun = True
-        if step.work is not None and self.recovery.phase is not None:
-            self.shuttle.resume(step.work, self.recovery.phase)
-        elif step.action is LegAction.RIDE:
-            self.riding.begin(step.track, step.to_index)
+        effects += self._publish(now_us)
+        return effects + (call_lifts(self.fleet, calls[0], planned or (), now_us) if calls else [])
 
     def _take_on(
         self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], version: int, now_us: int
@@ -466,8 +448,9 @@ class Robot:
             self.carriage.ride_to(floor)
         self._begun = False
         self.program.over()
-        late_us = now_us - step.end_us
-        if self.program.step is not None and abs(late_us) > REPLAN_TOLERANCE_US:
+        following = self.program.step
+        late_us = now_us - (step.end_us if following is None else following.begin_us)
+        if following is not None and abs(late_us) > REPLAN_TOLERANCE_US:
             self.program.shift(late_us)
             effects += self._publish(now_us)
         return effects

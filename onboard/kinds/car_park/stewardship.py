@@ -11,7 +11,8 @@ from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import NOBODY, OUTSIDE, TASK_VERSION_BITS, CallResult, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, CallForProposals, CarAt, Message, Reference, TaskReport, TokenGrant
+from onboard.core.messages import Award, CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
+from onboard.core.obstacles import Obstacle
 from onboard.core.petitions import UNORDERED
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
@@ -25,8 +26,16 @@ MOST_GONE = 4
 #: A winner that is an obstacle for so long is lost, us: a restart takes some seconds, and its task is in its journal.
 #: Ours.
 LOST_AFTER_US = 8_000_000
+#: A winner that has said nothing for so long since its award does not know of it, or does not act on it, us: a little
+#: longer than its initiator says the award again at a quick pace. Ours.
+UNHEARD_AFTER_US = 6_000_000
 #: FORFEITED is said again this often until the task is awarded anew, us. Ours.
 SAY_AGAIN_US = 2_000_000
+
+
+def _patience_us(obstacle: Obstacle) -> int:
+    """How long a winner may be an obstacle: one that lives, and stands where it said that it goes, restarts nothing."""
+    return 0 if obstacle.reason is Reason.FALSE_STATEMENT else LOST_AFTER_US
 
 
 @dataclass
@@ -38,7 +47,11 @@ class Stewardship:
     #: The task that each car's winner has won and its version.
     tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
+    #: A car in my own bay, compartment, that I know nothing of but by others since my rights were made anew.
+    left: CarAt | None = None
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
+    #: Since when the winner of each car has said nothing that shows that it knows of its award.
+    _unheard_us: dict[Reference, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.fleet.tokens.before_taking = self._before_taking
@@ -56,20 +69,31 @@ class Stewardship:
         self.tasks.update({car: task for car, task in memory.tasks.items() if is_mine(car)})
         custody.replay(self.fleet, memory.cars.values())
 
-    def hear(self, message: Message) -> list[Effect]:
-        """Learn from calls and awards; state a car anew when its token has come to me."""
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Learn from calls and awards, and who acts on them; state a car anew when its token has come to me."""
         match message:
-            case CallForProposals() if message.operation in (Operation.PARK, Operation.RETRIEVE):
+            case TaskReport() | Itinerary():
+                for won in [won for won in self._unheard_us if self.winners.get(won) == message.sender]:
+                    if isinstance(message, Itinerary) or self.tasks[won][0] == message.task:
+                        del self._unheard_us[won]
+            case CallForProposals() if self._is_for_a_car(message):
                 self._cars_of_calls[message.sender, message.call] = message.car
                 while len(self._cars_of_calls) > MAX_CALLS:
                     del self._cars_of_calls[next(iter(self._cars_of_calls))]
             case Award() if message.result is CallResult.AWARDED:
                 car = self._cars_of_calls.get((message.sender, message.call))
                 if car is not None and self._is_news(car, message):
+                    self._unheard_us[car] = now_us
                     return self.won(car, message.winner, message.task, message.task_version)
             case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
                 return self._state_anew(custody.car_of(message), message.version)
         return []
+
+    def _is_for_a_car(self, call: CallForProposals) -> bool:
+        """Whether its winner may fetch a stored car: only a compartment, or a person's station, calls for that."""
+        machine = self.fleet.site.machines.get(call.sender)
+        is_from_whom = machine is None or call.sender in self.fleet.site.compartments
+        return is_from_whom and call.operation in (Operation.PARK, Operation.RETRIEVE)
 
     def won(self, car: Reference, winner: int, task: Reference, version: int) -> list[Effect]:
         """``winner`` may fetch a car, or with 0 nobody may, for ``task`` under ``version``."""
@@ -78,6 +102,7 @@ class Stewardship:
             self._say_at_us.pop(car, None)
         else:
             self.winners.pop(car, None)
+            self._unheard_us.pop(car, None)
         self.tasks[car] = task, version
         return [winner_record(car, winner, task, version)]
 
@@ -91,12 +116,22 @@ class Stewardship:
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
         effects: list[Effect] = []
-        lost = {winner for winner in self.fleet.mirror.obstacles.machines if self._is_lost(winner, now_us)}
-        for car in [car for car, winner in self.winners.items() if winner in lost] if lost else []:
+        obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
+        lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
+        deaf = {car for car, since_us in self._unheard_us.items() if now_us - since_us >= UNHEARD_AFTER_US}
+        of_lost = [car for car, winner in self.winners.items() if winner in lost or car in deaf]
+        for car in of_lost if lost or deaf else []:
             if car in self.tasks and self._is_untouched(car):
                 task, version = self.tasks[car]
                 effects += self.won(car, NOBODY, task, version)
                 self._say_at_us[car] = now_us
+        forgetful &= set(obstacles)
+        for car, told in list(self.fleet.cars_told.items()):
+            if self.fleet.tokens.holds(car_token(*car)):
+                del self.fleet.cars_told[car]
+                effects += custody.state(self.fleet, car, told.station, told.wheelbase_mm)
+                own = self.fleet.site.compartments.get(self.fleet.node_id)
+                self.left = told if own is not None and told.station == own.number else self.left
         for car in [car for car, due_us in self._say_at_us.items() if due_us <= now_us]:
             record = self.fleet.mirror.cars.get(car)
             gone = record is None or record.station == OUTSIDE
@@ -118,14 +153,16 @@ class Stewardship:
         """When ``review`` has something to do, bus time in us; None where nobody is lost."""
         obstacles = self.fleet.mirror.obstacles.machines
         times = list(self._say_at_us.values())
+        waited = [car for car in self._unheard_us if car in self.tasks and self._is_untouched(car)]
+        times += [self._unheard_us[car] + UNHEARD_AFTER_US for car in waited]
         for car, winner in self.winners.items() if obstacles else ():
             if winner in obstacles and car in self.tasks and self._is_untouched(car):
-                times.append(obstacles[winner].since_us + LOST_AFTER_US)
+                times.append(obstacles[winner].since_us + _patience_us(obstacles[winner]))
         return min(times, default=None)
 
     def _is_lost(self, winner: int, now_us: int) -> bool:
         obstacle = self.fleet.mirror.obstacles.machines.get(winner)
-        return obstacle is not None and now_us - obstacle.since_us >= LOST_AFTER_US
+        return obstacle is not None and now_us - obstacle.since_us >= _patience_us(obstacle)
 
     def _is_untouched(self, car: Reference) -> bool:
         """Whether I hold the car and its station, and nobody has a right to the front as its winner."""
@@ -167,7 +204,7 @@ class Stewardship:
         return effects
 
     def _forget(self, car: Reference) -> None:
-        for table in (self.winners, self.tasks, self._say_at_us):
+        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us):
             table.pop(car, None)
 
     def _state_anew(self, car: Reference, version: int) -> list[Effect]:

@@ -12,25 +12,25 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from onboard.core.all_or_none import AllOrNone
-from onboard.core.authority import MotionState, TokenKey, authorised, segment_token
+from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.lifts import gate
+from onboard.core.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
+from onboard.core.motion_authority import MotionState, authorised, needs_no_proof
 from onboard.core.refuges import refuges
 from onboard.core.serial import successor
 from onboard.core.site import Segment, TrackKind
 from onboard.core.stall import Stall
 from onboard.kinds.car_park.axis import TrackAxis
+from onboard.kinds.car_park.sill import SillProof
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
 #: journal writes and frames. Ours.
 LOOKAHEAD_US = 3_000_000
 #: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us. Ours.
 ORDER_PATIENCE_US = 5_000_000
-#: A machine stands at a segment's centre within this, mm (fine sensor, dbc/device.dbc).
-MARK_TOLERANCE_MM = 5
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
 OFF_LIMIT_MM = 20_000
 
@@ -53,17 +53,19 @@ class Carriage:
     _axes: dict[int, TrackAxis] = field(default_factory=dict)
     #: What ``advance`` looked at when it last found nothing to do.
     _settled: tuple[object, ...] | None = None
-    #: Where the carrier stood by the last word of its sensors.
-    _stood: tuple[DriveState | None, int, Segment | None] | None = None
+    #: Where the carrier stood by the last word of its sensors, on which track and after which order.
+    _stood: tuple[DriveState | None, tuple[int, int], Segment | None] | None = None
     #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
     way_on: Callable[[], list[Segment]] = list
     #: Whether nothing stands out of the carrier, by its sensors: it gets no order to move else (row P32).
     is_clear: Callable[[], bool] = lambda: True
     whole: AllOrNone = field(init=False)
+    sill: SillProof = field(init=False)
     stall: Stall = field(default_factory=Stall)
 
     def __post_init__(self) -> None:
         self.whole = AllOrNone(self.fleet.tokens)
+        self.sill = SillProof(self.fleet)
 
     @property
     def axis(self) -> TrackAxis:
@@ -83,13 +85,17 @@ class Carriage:
 
         On a lift's platform it is index 0 or length + 1 of the alley, turned in a spur's mouth index 0 of the spur.
         """
-        if self._stood is None or self._stood[0] is not self.sensed or self._stood[1] != self.track:
-            self._stood = (self.sensed, self.track, self._mark())
+        now = (self.track, self.sequence)
+        if self._stood is None or self._stood[0] is not self.sensed or self._stood[1] != now:
+            self._stood = (self.sensed, now, self._mark())
         return self._stood[2]
 
     def _mark(self) -> Segment | None:
         state = self.sensed
         if state is None or state.mode is not DriveMode.STANDING or not state.at_mark:
+            return None
+        if state.sequence != self.sequence:
+            # It has not taken up the last order yet, and may still go by it.
             return None
         index = self.axis.index_at(state.position_mm)
         off_mm = abs(state.position_mm - self.axis.position_mm(index))
@@ -102,6 +108,19 @@ class Carriage:
             raise ValueError("no position is known yet")
         index = self.axis.index_at(self.sensed.position_mm)
         return Segment(self.track, index) if index or self.axis.mouth is None else self.axis.mouth
+
+    @property
+    def way_out(self) -> Segment | None:
+        """The alley's position beside the sill that the body is across, where its lift is an obstacle; else None.
+
+        The gate in hand keeps the lift where the body came from: that way it can always leave, and aboard it cannot.
+        """
+        obstacles, site = self.fleet.mirror.obstacles.machines, self.fleet.site
+        here = self.occupied()
+        lifts = {slot.track for slot in here if slot.index == GATE_INDEX and slot.track in site.lifts}
+        if not any(site.stewards[lift] in obstacles for lift in lifts):
+            return None
+        return next((slot for slot in here if slot.track == self.track), None)
 
     @property
     def arrived(self) -> bool:
@@ -183,8 +202,11 @@ class Carriage:
         return abs(state.position_mm - axis.position_mm(axis.index_at(state.position_mm))) > OFF_LIMIT_MM
 
     def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
-        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known."""
-        if self.sensed is None:
+        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known.
+
+        A journal that is lost knew the track; the drive alone knows only where on it.
+        """
+        if self.sensed is None or self.fleet.has_no_rights:
             return []
         here, offset_mm = self._told_at(self.sensed)
         self._reported = here
@@ -234,8 +256,9 @@ class Carriage:
 
     def _outlook(self) -> tuple[object, ...]:
         """All that decides what is to be done, but the time: each message on the bus asks, and few change anything."""
+        words = [self.sill.word(lift) for lift in self.axis.lifts]
         clear = self.is_clear()
-        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped, clear
+        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped, clear, *words
 
     def _go_on(self, now_us: int) -> list[Effect]:
         if self.goal is None or self.sensed is None or self.arrived:
@@ -249,7 +272,7 @@ class Carriage:
         for slot in self.occupied():
             # Pushed there by hand, or found there after a restart: a body asks for what it is in.
             effects += self.fleet.tokens.want(segment_token(slot), now_us)
-        effects += self._ask(ahead, now_us)
+        effects += self._ask(ahead, now_us) + self._ask_lifts(ahead, now_us)
         reach, reason = self._reach(ahead)
         if self.whole.slots and not self.whole.is_complete:
             reach, reason = None, Reason.NOT_AUTHORISED
@@ -265,8 +288,9 @@ class Carriage:
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or something is to be done about missing tokens."""
-        asks = self.goal is not None and self.sensed is not None and not self.arrived
-        times = [self.refresh_at_us, *([self.whole.due_us, self._patience_over_us()] if asks else [])]
+        asks = self.goal is not None and self.sensed is not None and not self.arrived and self.is_clear()
+        asking = [self.whole.due_us, self._patience_over_us(), self.sill.next_wake()]
+        times = [self.refresh_at_us, *(asking if asks else [])]
         due = [time for time in times if time is not None]
         return min(due) if due else None
 
@@ -282,6 +306,19 @@ class Carriage:
         for slots in self.axis.rights(ahead)[: self._lookahead_segments()]:
             for slot in slots:
                 effects += self.fleet.tokens.want(segment_token(slot), now_us)
+        return effects
+
+    def _ask_lifts(self, ahead: list[int], now_us: int) -> list[Effect]:
+        """Have the word of the lift at the end of this way while its gate is held; one that is elsewhere waits for us.
+
+        Whoever is on the sill or the platform keeps them: it stands until the lift says that it may go on.
+        """
+        line = {slot for slots in self.axis.rights(ahead) for slot in slots}
+        lifts = [lift for lift in self.axis.lifts if gate(lift) in line]
+        effects = self.sill.ask(lifts, now_us)
+        for lift in lifts:
+            if platform(lift) not in self.occupied():
+                effects += self.sill.refuse(lift, self.track, now_us)
         return effects
 
     def _patience_over_us(self) -> int | None:
@@ -327,7 +364,10 @@ class Carriage:
 
     def _reach(self, ahead: list[int]) -> tuple[Segment | None, Reason]:
         """The last position of the unbroken authorised line, or None and why not even the first step is allowed."""
-        state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped)
+        # Out of a sill, to the side from where the body came, nothing need be proved.
+        is_out = self.goal is not None and self.goal == self.way_out
+        proof = needs_no_proof if is_out else lambda slot: self.sill.lacks(slot, self.track)
+        state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped, proof)
         for slot in self.occupied():
             allowed, reason = authorised(state, slot)
             if not allowed:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from onboard.core.messages import Reference
+from onboard.core.serial import ms_after
 from onboard.kinds.cell.geometry import Area, Point, shortest_way, way_length_m
 from onboard.kinds.cell.offers import OFFERS, OfferRule, via_points
 
@@ -27,6 +28,19 @@ class Arm:
 
 
 @dataclass(frozen=True, slots=True)
+class Urgency:
+    """Order among goals (row C15): the earlier time limit first, none last; then by name, alike on every robot."""
+
+    time_limit_ms: int
+    part: Reference
+
+    def __lt__(self, other: "Urgency") -> bool:
+        if (self.time_limit_ms == NO_LIMIT) != (other.time_limit_ms == NO_LIMIT):
+            return other.time_limit_ms == NO_LIMIT
+        return (ms_after(self.time_limit_ms, other.time_limit_ms), self.part) < (0, other.part)
+
+
+@dataclass(frozen=True, slots=True)
 class Goal:
     """Bring ``part`` from ``start`` to ``end`` (row C03). ``task`` is the goal's own name: its manager and a number.
 
@@ -47,9 +61,9 @@ class Goal:
         return len(self.path)
 
     @property
-    def urgency(self) -> tuple[int, Reference]:
-        """Order among goals (row C15): the earlier time limit first, none last; then by name, alike on every robot."""
-        return (self.time_limit_ms or 1 << 32, self.part)
+    def urgency(self) -> "Urgency":
+        """Rank among goals (row C15)."""
+        return Urgency(self.time_limit_ms, self.part)
 
     def part_of(self, robot: int, number: int, via: Point) -> "Goal":
         """The sub-goal that ``robot`` makes of it when it puts the part down at ``via``."""

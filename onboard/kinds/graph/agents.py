@@ -101,6 +101,9 @@ class NodeAgents:
                 self.fleet.drops[Reason.NOT_AUTHORISED] += 1
             case EdgeNotice() if message.other not in self.site.graph.neighbours.get(message.node, ()):
                 self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            case EdgeNotice() if self.site.hosts.get(message.node) != message.sender:
+                # Only an agent itself tells what becomes of an edge of its node.
+                self.fleet.drops[Reason.NOT_AUTHORISED] += 1
             case TurnSignal():
                 return self._on_signal(message, now_us)
             case RobotAt():

@@ -152,6 +152,10 @@ class OrderDesk:
         if not isinstance(message, TaskReport) or message.task not in self.orders:
             return []
         order = self.orders[message.task]
+        machine = self.fleet.site.machines.get(message.sender)
+        if machine is None or machine.kind is not KindCode.VEHICLE:
+            self.fleet.drops[Reason.NOT_OF_KIND] += 1
+            return []
         if order.stage in (Stage.DONE, Stage.REFUSED):
             return []
         match message.phase:

@@ -6,13 +6,14 @@ asked for before the edge, so that nobody who holds an edge waits for anything b
 
 from dataclasses import dataclass, field
 
-from onboard.core.authority import MotionState, TokenKey, authorised
+from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.manual import Manual
 from onboard.core.messages import Award, CallForProposals, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
@@ -172,7 +173,7 @@ class GraphRobot:
         match message:
             case NodeAnswer() if message.robot == self.fleet.node_id:
                 self._on_answer(message, now_us)
-            case Heartbeat(kind=KindCode.NODE):
+            case Heartbeat() if message.sender in self.site.hosts.values():
                 self.has_other_map = message.site_digest != self.fleet.site.digest
             case RobotAt():
                 self.planning.others[message.sender] = message

@@ -355,6 +355,9 @@ class Desk:
     def _reported(self, report: TaskReport, now_us: int) -> list[Effect]:
         if report.task not in self.orders.open:
             return []
+        if report.sender not in self.site.vehicles:
+            self.fleet.drops[Reason.NOT_OF_KIND] += 1
+            return []
         if report.phase is TaskPhase.DONE and self.orders.finish(report.task):
             self._won_at_us.pop(report.task, None)
             self._look_at_us = now_us

@@ -7,12 +7,13 @@ section 5), so a wrong mirror costs time and nothing else. In an area every vehi
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import MotionState, TokenKey, authorised, car_token, segment_token
+from onboard.core.authority import TokenKey, car_token, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Segment, Site
 from onboard.kinds.terminal.body import Body

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, TokenKind
 from onboard.core.messages import BusTime, Itinerary, Leg, Progress, TokenGrant, TokenHeld
+from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site
 from onboard.trace.chart.svg import Drawing, colour, dashes
 from onboard.trace.listener import Said
@@ -20,7 +21,6 @@ _WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 1200, 90, 20, 46, 30, 14
 _ROW, _MOST_HEIGHT = 14.0, 260.0
 _STEPS_S = (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1_200, 1_800, 3_600, 7_200, 14_400)
 _MOST_TICKS = 14
-_MS_MODULUS, _HALF_MS = 1 << 32, 1 << 31
 
 
 class Point(NamedTuple):
@@ -148,8 +148,7 @@ class Watcher:
         self.picture.authority.append(Band(node, segment.track, since_us, time_us, around, around))
 
     def _moment_us(self, bus_ms: int, near_us: int) -> int:
-        away_ms = (bus_ms - (near_us - self._offset_us) // 1000) % _MS_MODULUS
-        return near_us + 1000 * (away_ms - _MS_MODULUS if away_ms >= _HALF_MS else away_ms)
+        return near_us + 1000 * ms_after(bus_ms, (near_us - self._offset_us) // 1000)
 
 
 def _segment(token: int) -> Segment:

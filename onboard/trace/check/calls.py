@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import NOBODY, CallResult, Criterion
-from onboard.core.messages import Award, Bid, CallForProposals
+from onboard.core.messages import Award, Bid, CallForProposals, LeftOut, Progress
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
@@ -19,6 +19,10 @@ REMEMBERED_US = 600_000_000
 CROSSING_US = 20_000
 #: Bus time in the log is told by frames that take up to a few of these to come through, us.
 CLOCK_TOLERANCE_US = 5_000
+#: Who has won something and has not moved for so long may be an obstacle for all: its bids do not count then, us.
+STANDS_US = 15_000_000
+#: Calls of which it is remembered who was left out.
+MOST_LEFT_OUT = 256
 _HALF_MS = 1 << 31
 
 
@@ -140,6 +144,9 @@ class BidsInTime(_CallRule):
         due_us = seen.due_us
         if times_us and (due_us is None or min(times_us) <= due_us + CLOCK_TOLERANCE_US):
             return
+        if times_us and seen.event.time_us < self.picture.clock_settles_us:
+            # The caller's deadline was over when its own clock said so.
+            return
         seen.told = True
         late_us = min(times_us) - (due_us or 0) if times_us else 0
         what = f"bid {late_us} us after the deadline" if times_us else "never bid"
@@ -154,12 +161,45 @@ class BidsGoDown(_CallRule):
     source = "rows P06 to P10; dbc/fleet.dbc, Bid"
     undisturbed = True
 
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._left_out: OrderedDict[tuple[int, int], set[int]] = OrderedDict()
+        self._places: dict[int, tuple[int, int, int]] = {}
+        #: Since when a machine has not moved though it has won something.
+        self._won_us: dict[int, int] = {}
+
+    def handlers(self) -> Handlers:
+        """Beside calls, whose bids do not count."""
+        return {**super().handlers(), LeftOut: self._on_left_out, Progress: self._on_progress}
+
+    def _on_left_out(self, event: Event[LeftOut]) -> None:
+        word = event.message
+        named = {word.node_a, word.node_b, word.node_c, word.node_d, word.node_e, word.node_f}
+        self._left_out.setdefault((word.sender, word.call), set()).update(named - {NOBODY})
+        while len(self._left_out) > MOST_LEFT_OUT:
+            self._left_out.popitem(last=False)
+
+    def _on_progress(self, event: Event[Progress]) -> None:
+        told = event.message
+        place = told.track, told.index, told.offset_mm
+        if self._places.get(told.sender) != place:
+            self._places[told.sender] = place
+            self._won_us.pop(told.sender, None)
+
+    def _counts(self, node: int, seen: CallSeen, now_us: int) -> bool:
+        """Whether a bid counts: not of who is left out, nor of who has won something and stands."""
+        since_us = self._won_us.get(node)
+        stands = since_us is not None and now_us - since_us >= STANDS_US
+        return not stands and node not in self._left_out.get((seen.call.sender, seen.call.call), ())
+
     def judge_bid(self, event: Event[Bid], seen: CallSeen) -> None:
         """Not better than one heard before."""
         bid = event.message
         for time_us, node, cost in seen.bids:
             if (node, cost) == (bid.sender, bid.cost):
                 return
+            if not self._counts(node, seen, event.time_us):
+                continue
             heard = event.time_us - time_us > CROSSING_US
             if heard and not _is_better(bid.cost, bid.sender, cost, node, seen.call.criterion):
                 what = f"bids {bid.cost} for call {bid.call} of {bid.initiator} after {node} bid {cost}"
@@ -169,9 +209,13 @@ class BidsGoDown(_CallRule):
     def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
         """Given to another than the best bidder."""
         award = event.message
+        if award.result is CallResult.AWARDED and award.winner:
+            self._won_us.setdefault(award.winner, event.time_us)
         if award.result not in (CallResult.AWARDED, CallResult.OPTION) or seen.told or seen.due_us is None:
             return
-        in_time = [(node, cost) for time_us, node, cost in seen.bids if time_us <= seen.due_us - CLOCK_TOLERANCE_US]
+        last_us = seen.due_us - CLOCK_TOLERANCE_US
+        counted = [bid for bid in seen.bids if self._counts(bid[1], seen, event.time_us)]
+        in_time = [(node, cost) for time_us, node, cost in counted if time_us <= last_us]
         seen.told = True
         best = _best(in_time, seen.call.criterion)
         if best is not None and best[0] != award.winner and award.winner in {node for node, _ in in_time}:

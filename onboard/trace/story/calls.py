@@ -15,11 +15,10 @@ from onboard.core.messages import (
     Reference,
     TaskReport,
 )
+from onboard.core.serial import ms_after
 from onboard.core.site import Station
 from onboard.trace.words import Words
 
-_MS_MODULUS = 1 << 32
-_HALF_MS = 1 << 31
 #: Calls of the first depth that are no customer's: for a part of a task, and for room.
 _NO_TASKS = (Operation.RIDE, Operation.GIVE_WAY)
 
@@ -94,8 +93,7 @@ class Calls:
         """Time of the log of a bus time in ms, which wraps; None before bus time was heard."""
         if self._offset_us is None:
             return None
-        away_ms = (bus_ms - (near_us - self._offset_us) // 1000) % _MS_MODULUS
-        return near_us + 1000 * (away_ms - _MS_MODULUS if away_ms >= _HALF_MS else away_ms)
+        return near_us + 1000 * ms_after(bus_ms, (near_us - self._offset_us) // 1000)
 
     def _on_call(self, terms: CallForProposals, time_us: int) -> None:
         key = (terms.sender, terms.call)

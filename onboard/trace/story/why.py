@@ -22,6 +22,7 @@ from onboard.core.messages import (
     TokenRefusal,
     Waiting,
 )
+from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site, Station
 from onboard.trace.story.calls import is_task
 from onboard.trace.words import Words
@@ -310,7 +311,7 @@ class Why:
         for node, other in self._bodies.items():
             if node != story.owner and any(
                 leg.track == following.track and low <= max(leg.from_index, leg.to_index)
-                and min(leg.from_index, leg.to_index) <= high and leg.end_ms <= following.end_ms
+                and min(leg.from_index, leg.to_index) <= high and ms_after(leg.end_ms, following.end_ms) <= 0
                 for leg in other.legs
             ):  # fmt: skip
                 return Cause("goes first, by plan", node)

@@ -1,0 +1,111 @@
+"""Seeds with a machine that bids and does not do what it wins, beside the same seeds without that machine."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from statistics import fmean
+
+from bus_sim.campaign.car_park import CarPark
+from bus_sim.campaign.engine import on_cores
+from bus_sim.campaign.judges import Judges
+from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.run import RunOptions, run_until
+from bus_sim.sites import find_site
+from bus_sim.stranger import Stranger, factories_with
+from bus_sim.virtual_time import VirtualTimeLoop, run_on
+from onboard.core.codes import KindCode
+from onboard.core.site import Site
+
+#: The mean wait of a seed may be so much longer than without the stranger, s.
+MOST_LONGER_S = 30.0
+#: Looks whether it is over, us.
+STEP_US = 1_000_000
+
+
+@dataclass(frozen=True)
+class StrangerPlan:
+    """What all seeds have in common; ``limit_s`` is the longest run."""
+
+    site: str
+    how: Stranger
+    arrivals: Arrivals
+    limit_s: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one run."""
+
+    served: int
+    told: int
+    waiting: int
+    mean_wait_s: float
+    broken: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One seed: with the stranger, and without that machine."""
+
+    seed: int
+    strange: Outcome
+    without: Outcome
+
+    @property
+    def longer_s(self) -> float:
+        """By how much the mean wait is longer."""
+        return self.strange.mean_wait_s - self.without.mean_wait_s
+
+    @property
+    def is_good(self) -> bool:
+        """Whether everybody was served as without it, soon enough, and nothing broke."""
+        served = self.strange.served >= self.without.served and not self.strange.waiting
+        return served and not self.strange.broken and self.longer_s <= MOST_LONGER_S
+
+    def line(self) -> str:
+        """One line for people."""
+        one, other = self.strange, self.without
+        told = f"served {one.served} of {other.served}, told {one.told}, waiting {one.waiting}"
+        head = f"{'' if self.is_good else 'FAILED '}seed {self.seed}: {told}, mean wait {one.mean_wait_s:.1f} s"
+        return f"{head}, {self.longer_s:+.1f} s; {'; '.join(one.broken)}".rstrip("; ")
+
+
+def play_pairs(plan: StrangerPlan, seeds: range, jobs: int) -> Iterator[Pair]:
+    """All seeds; each is played twice."""
+    return on_cores(jobs, partial(play_pair, plan), seeds)
+
+
+def play_pair(plan: StrangerPlan, seed: int) -> Pair:
+    """One seed."""
+    site = find_site(plan.site)
+    return Pair(seed, _play(plan, site, seed, strange=True), _play(plan, site, seed, strange=False))
+
+
+def _play(plan: StrangerPlan, site: Site, seed: int, *, strange: bool) -> Outcome:
+    loop = VirtualTimeLoop()
+    return run_on(loop, _run(plan, site, seed, loop, strange=strange))
+
+
+async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop, *, strange: bool) -> Outcome:
+    target = next(one for one in site.machines.values() if one.kind is KindCode.ROBOT)
+    options = RunOptions(seed=seed, without=frozenset() if strange else frozenset({target.name}))
+    stage = CarPark(site, Scenario(plan.site, seed, plan.limit_s, plan.arrivals), options, loop)
+    if strange:
+        stage.run.factories = factories_with(target.node_id, plan.how)
+    # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
+    stage.run.devices[target.node_id].attach("terminal block", None)
+    judges = Judges(stage.run, disturbed=False)
+    try:
+        stage.run.start()
+        await run_until(
+            stage.run,
+            lambda: stage.is_broken or judges.is_unsafe or stage.is_over,
+            round(plan.limit_s * 1e6),
+            STEP_US,
+        )
+    finally:
+        stage.run.close()
+    tally, summary = stage.tally(), stage.run.plant.street.summary()
+    waits = [us / 1e6 for us in (*summary.in_wait_us, *summary.out_wait_us)]
+    broken = (*stage.violations(), *(judges.finish()[0]))
+    return Outcome(tally.served, tally.told, tally.waiting, fmean(waits) if waits else 0.0, broken)

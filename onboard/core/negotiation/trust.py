@@ -1,0 +1,118 @@
+"""Who is left out of an initiator's calls, because it won tasks and did not do them (contract 2, Left out).
+
+Who forfeits a task is out of its next calls; who forfeits several in a row, with nothing done in between, is out of all
+calls of this initiator, each time for twice as long. A task that is done ends that. So does a restart of the initiator:
+whoever fails again is found again.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from onboard.core.codes import Criterion
+from onboard.core.messages import LeftOut, Reference
+from onboard.core.negotiation.bidding import cost_difference
+from onboard.core.serial import to_bus_ms
+
+#: How long who failed once is out of the calls for that task, us, doubled with each time. Ours.
+OUT_OF_TASK_US = 120_000_000
+#: How long who failed twice in a row is out of all calls, us, doubled with each time more. Ours.
+OUT_OF_ALL_US = 120_000_000
+#: No longer than this, us: a machine that was repaired needs nobody to say so. Ours.
+MOST_OUT_US = 3_600_000_000
+#: A task ended this much later than its winner bid counts against the winner where the others keep their dates, ms.
+#: Customers and traffic make half a minute. Ours.
+LATE_MS = 60_000
+#: Weight of the newest task in a machine's mean lateness, one in so many. Ours.
+MEAN_OF = 4
+#: Most nodes that one ``LeftOut`` names (dbc/fleet.dbc), and most tasks in hand that are remembered.
+MOST_NAMED = 6
+MOST_TASKS = 64
+
+
+@dataclass
+class _Record:
+    """What one machine's awards came to: fails in a row, until when it is out, and how late it is in the mean."""
+
+    fails: int = 0
+    out_until_us: int = 0
+    late_ms: int | None = None
+
+
+@dataclass
+class Trust:
+    """One initiator's memory of its winners. All times are bus time in us."""
+
+    _records: dict[int, _Record] = field(default_factory=dict)
+    #: For each task in hand: who won it, and the finishing time that it bid (bus ms), None for other criteria.
+    _given: dict[Reference, tuple[int, int | None]] = field(default_factory=dict)
+    #: How often, and until when, a machine is out of the calls for one task.
+    _out_of_task: dict[tuple[Reference, int], tuple[int, int]] = field(default_factory=dict)
+
+    def given(self, task: Reference, winner: int, cost: int, criterion: Criterion) -> None:
+        """A task was awarded."""
+        self._given.pop(task, None)
+        self._given[task] = winner, cost if criterion is Criterion.FINISH_TIME else None
+        while len(self._given) > MOST_TASKS:
+            del self._given[next(iter(self._given))]
+
+    def winner(self, task: Reference) -> int | None:
+        """Who was given a task that is neither done nor forfeited."""
+        found = self._given.get(task)
+        return None if found is None else found[0]
+
+    def forfeited(self, task: Reference, now_us: int) -> None:
+        """The winner of a task did not do it."""
+        winner, _ = self._given.pop(task, (None, None))
+        if winner is None:
+            return
+        times = self._out_of_task.get((task, winner), (0, 0))[0]
+        self._out_of_task[task, winner] = times + 1, now_us + min(MOST_OUT_US, OUT_OF_TASK_US << times)
+        while len(self._out_of_task) > MOST_TASKS:
+            del self._out_of_task[next(iter(self._out_of_task))]
+        self._fail(winner, now_us)
+
+    def done(self, task: Reference, by: int, now_us: int) -> None:
+        """A task is done: its winner's fails are forgotten, unless it was far later than it bid and others are not."""
+        winner, promised_ms = self._given.pop(task, (by, None))
+        for key in [key for key in self._out_of_task if key[0] == task]:
+            del self._out_of_task[key]
+        if winner != by:
+            return
+        record = self._records.setdefault(by, _Record())
+        if promised_ms is not None:
+            late_ms = max(0, cost_difference(to_bus_ms(now_us), promised_ms, Criterion.FINISH_TIME))
+            before_ms = late_ms if record.late_ms is None else record.late_ms
+            record.late_ms = before_ms + (late_ms - before_ms) // MEAN_OF
+        if self._is_liar(by):
+            self._fail(by, now_us)
+        else:
+            record.fails, record.out_until_us = 0, 0
+
+    def left_out(self, task: Reference, now_us: int, *, last_attempt: bool) -> frozenset[int]:
+        """Whose bids for ``task`` do not count; in the last attempt for it only who failed in others too."""
+        nodes = {node for node, record in self._records.items() if now_us < record.out_until_us}
+        if not last_attempt:
+            nodes |= {
+                node for (of, node), (_, until_us) in self._out_of_task.items() if of == task and now_us < until_us
+            }
+        return frozenset(nodes)
+
+    def _fail(self, node: int, now_us: int) -> None:
+        record = self._records.setdefault(node, _Record())
+        record.fails += 1
+        if record.fails > 1:
+            record.out_until_us = now_us + min(MOST_OUT_US, OUT_OF_ALL_US << record.fails - 2)
+
+    def _is_liar(self, node: int) -> bool:
+        """Whether it is late by far more than anybody else: where all are late, the park is full, not one a liar."""
+        own_ms = self._records[node].late_ms or 0
+        others = [one.late_ms for other, one in self._records.items() if other != node and one.late_ms is not None]
+        return bool(others) and own_ms > LATE_MS + 2 * max(others)
+
+
+def left_out_words(sender: int, call: int, nodes: frozenset[int]) -> Iterator[LeftOut]:
+    """What is said before a call, six nodes a frame."""
+    named = sorted(nodes)
+    for start in range(0, len(named), MOST_NAMED):
+        six = (*named[start : start + MOST_NAMED], *(0,) * MOST_NAMED)[:MOST_NAMED]
+        yield LeftOut(sender, call, *six)

@@ -1,0 +1,77 @@
+"""A place is one robot's: who has lost its place to another leaves its car elsewhere, and nobody brings a second."""
+
+from onboard.core.authority import station_token
+from onboard.core.codes import Grade, KindCode, LegAction, Reason, ShuttleMode
+from onboard.core.effects import Record
+from onboard.core.holon import Holon
+from onboard.core.messages import CarAt, Itinerary, Reference, Stamp
+from onboard.core.site import Station
+from onboard.kinds.car_park.program import Handling, Step, Work, to_itinerary
+from onboard.kinds.car_park.recovery import Recovery
+from onboard.kinds.registry import factory_for
+from tests.kinds.board import AWARDED, CALL, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, TASK, Board
+
+#: When a robot that was started again goes on, us.
+GOES_ON_US = 3_000_000
+RIVAL = Reference(STEWARD, 2)
+
+
+def carrying() -> Board:
+    """A car is aboard for PLACE, and the way there is planned."""
+    board = Board(*AWARDED, TAKEN)
+    board.stands(6)
+    board.shuttle(ShuttleMode.HOME, load_kg=1_400)
+    board.lives(GOES_ON_US)
+    assert places_of(board.plans[-1]) == [PLACE]
+    return board
+
+
+def places_of(plan: Itinerary) -> list[Station]:
+    return [Station(leg.track, leg.to_index, leg.side) for leg in plan.legs if leg.action is LegAction.WORK]
+
+
+def rival(stamp_ms: int) -> Itinerary:
+    """The other brings its car to the same place."""
+    work = Work(Handling.LEAVE, PLACE, RIVAL, 2_700, CALL)
+    at = PLACE.index
+    steps = [
+        Step(LegAction.TRAVEL, 1, 11, at, 60_000_000, 70_000_000),
+        Step(LegAction.WORK, 1, at, at, 70_000_000, 90_000_000, work),
+        Step(LegAction.TRAVEL, 1, at, 12, 90_000_000, 99_000_000),
+    ]
+    return to_itinerary(OTHER, 1, Grade.FIRM, Stamp(stamp_ms, OTHER, 0), steps)
+
+
+def test_of_two_plans_for_one_place_the_lower_stamp_keeps_it() -> None:
+    board = carrying()
+    board.hears(rival(stamp_ms=0))
+    board.lives(board.now_us + 1)
+    (place,) = places_of(board.plans[-1])
+    assert place != PLACE
+    sinks = [dict(one.entry) for one in board.said if isinstance(one, Record) and one.entry.get("record") == "sink"]
+    assert [one["station"] for one in sinks] == [place.number]
+    works = Recovery.read(ROBOT, [*AWARDED, TAKEN, *sinks]).works
+    assert [work.station for work in works] == [place], "so it is after another restart"
+
+
+def test_the_older_plan_stays_where_it_is() -> None:
+    board = carrying()
+    board.hears(rival(stamp_ms=500_000))
+    board.lives(board.now_us + 1)
+    assert places_of(board.plans[-1]) == [PLACE]
+
+
+def test_a_place_in_which_another_car_is_put_meanwhile_is_lost() -> None:
+    board = carrying()
+    board.hears(CarAt(STEWARD, RIVAL, PLACE.number, 3, 2_700))
+    board.lives(board.now_us + 1)
+    assert places_of(board.plans[-1]) != [PLACE]
+
+
+def test_a_steward_gives_the_right_to_a_place_with_a_car_to_nobody_who_brings_another() -> None:
+    steward = Holon(SITE, SITE.machines[STEWARD], factory_for(SITE, KindCode.COMPARTMENT), boot=1)
+    steward.start(0)
+    key = station_token(PLACE)
+    assert steward.behaviour.may_grant(key, ROBOT, 0) is Reason.NONE
+    steward.receive(CarAt(OTHER, TASK, PLACE.number, 2, 2_700), 0)
+    assert steward.behaviour.may_grant(key, ROBOT, 0) is Reason.TOKEN_NOT_GRANTABLE_YET

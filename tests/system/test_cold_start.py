@@ -1,0 +1,40 @@
+"""After a common power cut every site starts by itself, also with any one machine missing (issue 13, point 1)."""
+
+import pytest
+
+from bus_sim.campaign.cold_start import MOMENTS_S, STARTS_S, Start, cold_start, cold_starts
+from bus_sim.cli import main
+from bus_sim.sites import find_site
+
+#: Sites of all systems that take little time; the rest by ``bus-sim campaign SITE --cold-start``.
+CHEAP = ("level1", "small", "graph", "turning", "terminal", "cell")
+
+
+@pytest.mark.parametrize("name", CHEAP)
+def test_every_machine_that_has_power_takes_part_in_time(name: str) -> None:
+    starts = list(cold_starts(find_site(name), name, MOMENTS_S[:1]))
+    assert len(starts) == 1 + len(find_site(name).machines)
+    assert [str(one) for one in starts if not one.is_good] == []
+    assert all(0 < one.longest_s <= STARTS_S for one in starts if one.missing is None)
+
+
+@pytest.mark.parametrize("missing", [None, "MR1"])
+def test_a_lift_takes_part_though_the_robot_that_has_its_platform_is_missing(missing: str | None) -> None:
+    """It waited in its start until that robot told a plan."""
+    start = cold_start(find_site("small"), "small", MOMENTS_S[2], missing)
+    assert start.is_good, str(start)
+
+
+def test_who_does_not_come_back_is_named() -> None:
+    start = Start("small", 45.0, None, 12.0, ("ER1",), ())
+    assert not start.is_good
+    assert "NOT in time: ER1" in str(start)
+
+
+def test_the_command_tells_each_start_and_fails_with_any(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["campaign", "level1", "--cold-start"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 3 * len(MOMENTS_S)
+    monkeypatch.setattr("bus_sim.campaign.cold_start.STARTS_S", 1.0)
+    assert main(["campaign", "level1", "--cold-start"]) == 1
