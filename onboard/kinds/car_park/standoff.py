@@ -1,7 +1,7 @@
 """Two robots face to face, each in the slot that the other wants next: one of them has to go where it did not mean to.
 
-No plan leads there; but plans that were made while clocks were wrong, or mirrors differed, are followed in an order that
-leads nowhere. Both know it by rights alone: I wait for a slot whose token the other holds, and it asks for the one
+No plan leads there; but plans that were made while clocks were wrong, or mirrors differed, are followed in an order
+that leads nowhere. Both know it by rights alone: I wait for a slot whose token the other holds, and it asks for the one
 that I am in. The time that this may last decides nothing but how soon somebody turns.
 """
 
