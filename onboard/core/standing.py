@@ -6,8 +6,8 @@ the end only its place counts.
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import MOBILE_KINDS, Grade, LegAction
-from onboard.core.messages import Itinerary, Leg, Message, Progress, TaskReport, TokenRequest, Waiting
+from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, ManualMode
+from onboard.core.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
 from onboard.core.mirror import Mirror
 from onboard.core.occupancy import final_position, turned_in
 from onboard.core.serial import from_bus_ms
@@ -46,6 +46,12 @@ class Standing:
             if known is None or known.place != place:
                 self._seen[message.sender] = _Seen(place, now_us, now_us)
             return
+        if isinstance(message, ManualOrder) and message.manual_mode is ManualMode.AUTOMATIC:
+            # A person lets it go: whoever did has seen why it stood, and it has to ask for its way first.
+            known = self._seen.get(message.machine)
+            if known is not None:
+                self._seen[message.machine] = _Seen(known.place, now_us, now_us)
+            return
         # Who asks for a right waits for it.
         speaks = isinstance(message, Waiting | TaskReport | TokenRequest)
         speaks = speaks or (isinstance(message, Itinerary) and message.grade is Grade.FIRM)
@@ -53,7 +59,7 @@ class Standing:
             self._seen[message.sender].spoke_us = now_us
 
     def stands(self, node: int, now_us: int) -> bool:
-        """Whether a machine has stood for too long where its plan does not leave it; only motion ends that."""
+        """Whether a machine has stood for too long where its plan does not leave it; motion or a person ends that."""
         seen = self._seen.get(node)
         machine = self.site.machines.get(node)
         if seen is None or machine is None or machine.kind not in MOBILE_KINDS:

@@ -160,3 +160,17 @@ def test_the_finding_names_time_machines_and_frame() -> None:
     (finding,) = verdict.findings
     assert (finding.time_us, finding.rule, finding.machines) == (20_000_000, "one-owner", (MR2, MR1))
     assert "task 1.1" in finding.what and "TaskReport" in finding.evidence
+
+
+@pytest.mark.parametrize(("rounds", "broken"), [(3, {}), (4, {"no-rounds": 1}), (8, {"no-rounds": 1})])
+def test_a_task_that_one_machine_wins_and_gives_back_again_and_again_is_found(
+    rounds: int, broken: dict[str, int]
+) -> None:
+    """As a machine did that only bids: 188 awards for one car, and every rule said held."""
+    tape = tell(STORY[:1])
+    at_s = 3.0
+    for number in range(2, 2 + rounds):
+        tape.say(at_s, call(number, at_s + 1)).say(at_s + 0.5, bid(MR1, 50_000, number))
+        tape.say(at_s + 1, award(MR1, number=number), report(MR1, TaskPhase.FORFEITED))
+        at_s += 2
+    assert {rule: count for rule, count in tape.broken().items() if rule == "no-rounds"} == broken

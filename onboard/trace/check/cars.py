@@ -11,8 +11,10 @@ from onboard.core.site import Station
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
-from onboard.trace.check.tokens_seen import VERSION_BITS, Token
+from onboard.trace.check.tokens_seen import Token
 
+#: Bits by which versions of cars' statements compare (``CarAt`` in dbc/fleet.dbc).
+VERSION_BITS = 16
 #: Cars remembered after they left; older ones are forgotten, since their numbers come again some day.
 MOST_CARS = 4_096
 #: The statement of a car may come so long after the report that names its place, us.

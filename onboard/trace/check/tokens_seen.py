@@ -10,7 +10,7 @@ from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, Station
 
 #: Bits of a token's version (dbc/fleet.dbc).
-VERSION_BITS = 16
+VERSION_BITS = 28
 #: Handovers of one token that are remembered, to tell a repeated frame from a second grant.
 MEMORY = 8
 #: Most tokens remembered: all of the largest site, and the cars of many days. The one longest silent is forgotten.
