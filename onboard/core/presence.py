@@ -179,5 +179,6 @@ class Presence:
             return Reason.ACTUATOR_FAULT if peer.state is MachineState.STOPPED else Reason.POSITION_UNKNOWN
         if self.standing.stands(node, now_us):
             return Reason.FALSE_STATEMENT
-        planless = machine.kind in MOBILE_KINDS and node not in self.mirror.itineraries
+        # Where machines do not move along tracks nobody plans around them, and they may have no plan to tell.
+        planless = bool(self.site.tracks) and machine.kind in MOBILE_KINDS and node not in self.mirror.itineraries
         return Reason.NONE if known is None or not planless else known.reason
