@@ -347,6 +347,7 @@ class Holon:
             return []
         if fresh:
             self.tokens.begin_anew(now_us)
+            self.negotiation.begin_anew(now_us)
         return self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
