@@ -366,6 +366,7 @@ class Holon:
             return news
         if fresh:
             self.tokens.begin_anew(now_us)
+            self.negotiation.begin_anew(now_us)
         return news + self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
