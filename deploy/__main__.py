@@ -13,6 +13,7 @@ from deploy.image.image import build_image, build_update
 from deploy.image.release import Release
 from deploy.image.root import build_root
 from deploy.package import build_package
+from deploy.replace import write_replacement
 from deploy.update.manifest import UpdateError, version_key
 from deploy.update.signature import make_keys
 from deploy.wheels import DeployError
@@ -63,6 +64,12 @@ def build_parser() -> argparse.ArgumentParser:
     machines.add_argument(
         "--device", default="can1", metavar="CHANNEL", help="of the device bus; may be the same (can1)"
     )
+    replace = commands.add_parser("replace", help="what a board needs that takes another's place")
+    replace.add_argument(
+        "--card", type=Path, required=True, metavar="DIR", help="the old board's boot partition, or dist/machines/NAME"
+    )
+    replace.add_argument("--journal", type=Path, metavar="DIR", help="its journal's folder, where it can be read")
+    replace.add_argument("--out", type=Path, default=Path("dist/replace"), metavar="DIR")
     return parser
 
 
@@ -123,6 +130,8 @@ def _build(args: argparse.Namespace) -> list[Path | str]:
             return [made.kernel, made.initrd, made.squashfs, f"sha256 {made.digest}"]
         case "machines":
             return [*write_fleet(args.site, args.out, args.fleet, args.device)]
+        case "replace":
+            return [*write_replacement(args.card, args.journal, args.out)]
         case "image":
             args.out.parent.mkdir(parents=True, exist_ok=True)
             version_key(args.version)

@@ -9,7 +9,13 @@ from tests.skips import pytest_make_collect_report, pytest_runtest_makereport
 
 __all__ = ["pytest_make_collect_report", "pytest_runtest_makereport"]
 
-# No deadline: a shared machine's pace is not a property of the code. No database: the same examples in every clone.
-hypothesis.settings.register_profile("repeatable", derandomize=True, deadline=None, database=None)
-hypothesis.settings.register_profile("explore", max_examples=2_000, deadline=None, database=None, print_blob=True)
+# No deadline, and no complaint about slow examples: a shared machine's pace is not a property of the code. No database:
+# the same examples in every clone.
+_PATIENT = [hypothesis.HealthCheck.too_slow]
+hypothesis.settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, database=None, suppress_health_check=_PATIENT
+)
+hypothesis.settings.register_profile(
+    "explore", max_examples=2_000, deadline=None, database=None, print_blob=True, suppress_health_check=_PATIENT
+)
 hypothesis.settings.load_profile("repeatable")

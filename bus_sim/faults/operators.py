@@ -27,7 +27,7 @@ def blocked(simulation: Simulation, injection: Injection) -> None:
 
 
 def emergency_stop(simulation: Simulation, _: Injection) -> None:
-    """Somebody presses the button: every machine stops until it is switched on again."""
+    """Somebody presses the button: every machine holds for half a minute, or until an operator lets it go on."""
     _say(simulation, EmergencyStop(STATION, Reason.OPERATOR))
 
 
@@ -71,7 +71,7 @@ def wish_of(injection: Injection) -> Wish:
         segment=segment,
         of=injection.text("target") if do == "go" else "",
         absent=injection.text("target") if is_absent else "",
-        body=(segment,) if is_absent else None,
+        body=(injection.text("body").replace(";", ",") or segment,),
         for_us=round(seconds * 1e6) if do == "stop" else None,
     )
 

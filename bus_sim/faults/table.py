@@ -264,7 +264,7 @@ KINDS: Final[Mapping[str, Kind]] = {
             "for_s": _seconds(120.0),
         },
     ),
-    "emergency_stop": Kind(Group.PEOPLE, "an operator stops all machines at once", {"at_s": _AT}),
+    "emergency_stop": Kind(Group.PEOPLE, "an operator holds all machines at once, for half a minute", {"at_s": _AT}),
     "operate": Kind(
         Group.PEOPLE,
         "a person gives a command of onboard operate and agrees; target: whom hold, release, go or regenerate name",
@@ -275,6 +275,7 @@ KINDS: Final[Mapping[str, Kind]] = {
             "track": _count("the number of a track, for block, clear and an absent body", 1, 1, 254),
             "index": _count("the index of a segment, for block, clear and an absent body", 1, 1, 255),
             "absent": _one_of("no", "yes"),
+            "body": Setting(str, "a slot such as p(1;5), or gone, for regenerate", ""),
             "for_s": _seconds(10.0),
         },
     ),

@@ -28,6 +28,7 @@ _PLACES = {
     SHARED / "onboard.service": f"{_UNITS}/onboard.service",
     SHARED / "onboard-clock.service": f"{_UNITS}/onboard-clock.service",
     SHARED / "clock": "usr/lib/onboard/clock",
+    FILES / "take-over": "usr/lib/onboard/take-over",
     SHARED / "70-can.link": "usr/lib/systemd/network/70-can.link",
     FILES / "image.conf": f"{_UNITS}/onboard.service.d/image.conf",
     **{FILES / name: f"{_UNITS}/{name}" for name in _OWN_UNITS},
@@ -58,7 +59,8 @@ def build_layer(debian: Debian, release: Release, to: Path) -> Path:
     files["etc/hostname"] = b"onboard\n"
     for name, content in {**files, **release.files()}.items():
         _put(to / name, content)
-    (to / "usr/lib/onboard/clock").chmod(0o755)
+    for name in ("clock", "take-over"):
+        (to / "usr/lib/onboard" / name).chmod(0o755)
     for name, module in _PROGRAMS.items():
         _put(to / "usr/bin" / name, _PROGRAM.format(module=module).encode())
         (to / "usr/bin" / name).chmod(0o755)

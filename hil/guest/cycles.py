@@ -2,7 +2,8 @@
 
 The machines of a small park run as on boards, each in a namespace of its own, on the Linux CAN stack; a car comes in
 before and is fetched after. Every cycle tells how long it took, in the guest's time, until all machines took part
-again and knew the same plans. The bounds: ``LIVES_ON_S`` where the process lives on, ``STARTS_S`` where it starts.
+again and knew the same plans. The bounds: ``LIVES_ON_S`` where the process lives on, ``STARTS_S`` where it starts,
+loading included.
 """
 
 import argparse
@@ -23,9 +24,12 @@ from onboard.trace.check.checks import Checks, check_records
 
 #: From the interface's return until all take part, s of the guest's time.
 LIVES_ON_S, STARTS_S = 10.0, 60.0
+#: Loading the program takes so long on the guest's processor, s. Processes are forked from one that has loaded it: read
+#: from the host's disk, whose pace is not the guest's, it would be measured with it. It is counted.
+LOAD_S = 10.0
 ROOT = Path(__file__).parents[2]
 #: What a cycle may take of the guest's time, s, and what everything else does.
-_CYCLE_S, _REST_S = 25, 240
+_CYCLE_S, _REST_S = 14, 300
 #: Added to the site: machines so fast that a car is in and out again in a minute and a half.
 _QUICK = """
 [carrier]
@@ -65,7 +69,7 @@ class Found:
 
 def bound_s(kind: str) -> float:
     """How long a cycle of this kind may take, s of the guest's time."""
-    return STARTS_S if kind == LATE else LIVES_ON_S
+    return STARTS_S - LOAD_S if kind == LATE else LIVES_ON_S
 
 
 def play_cycles(share: Path, cycles: int) -> Found:
@@ -76,7 +80,7 @@ def play_cycles(share: Path, cycles: int) -> Found:
     site = parse_site(text, "site.toml")
     nodes = {machine.name: node for node, machine in site.machines.items()}
     (share / "site.toml").write_text(text, encoding="utf-8")
-    # The car is fetched after the last cycle, so that rights to it and to its place lived through all of them.
+    # The car comes in before the first cycle and is fetched after the last one.
     plant_s = cycles * _CYCLE_S + _REST_S
     begin = ["--one-car", str(cycles * _CYCLE_S), "--seed", "3", "--for", str(plant_s), "--json", "figures.json"]
     (share / "order.json").write_text(json.dumps({"machines": list(nodes), "begin": begin}), encoding="utf-8")

@@ -4,11 +4,11 @@ import json
 import sys
 
 from hil.guest.ears import Ears
-from hil.guest.mesh import bring_up, inside, run
-from hil.guest.site_run import JOURNALS, TOOLS, SiteRun, play
-from onboard.core.codes import MachineState
+from hil.guest.mesh import bring_up, run
+from hil.guest.site_run import TOOLS, SiteRun, play
+from onboard.core.codes import MachineState, TaskPhase
 from onboard.core.frame import Frame
-from onboard.core.messages import Heartbeat
+from onboard.core.messages import Heartbeat, TaskReport
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 
@@ -34,6 +34,8 @@ class Watch:
         self._read = 0
         self._last: dict[int, Heartbeat] = {}
         self._counts = dict.fromkeys(nodes, 0)
+        #: Tasks that are done.
+        self.done = 0
 
     def take(self) -> None:
         """Look at all that has come."""
@@ -44,12 +46,19 @@ class Watch:
             if isinstance(message, Heartbeat) and message.sender in self._nodes:
                 self._last[message.sender] = message
                 self._counts[message.sender] += 1
+            elif isinstance(message, TaskReport) and message.phase is TaskPhase.DONE:
+                self.done += 1
             self._read += 1
 
     def count(self, node: int) -> int:
         """Heartbeats of a machine so far."""
         self.take()
         return self._counts[node]
+
+    def is_car_in(self) -> bool:
+        """Whether the one car that comes has been put away."""
+        self.take()
+        return self.done > 0
 
     def forget(self) -> None:
         """From now on only news counts."""
@@ -88,17 +97,12 @@ class Cycles:
             self._site.processes[name].wait()
         run("ip", "-n", name, "link", "set", channel, "netns", DRAWER)
         if kind == LATE:
-            self.start(name, number)
+            self._site.start_machine(name, f"{name}-{number + 1}.txt")
         self._pass_beats(witness, AWAY_BEATS[number % len(AWAY_BEATS)])
         run("ip", "-n", DRAWER, "link", "set", channel, "netns", name)
         # As the board's networkd does with an interface that has come.
         bring_up(name, channel)
         return {"machine": name, "kind": kind, "took_s": self.wait_until_all_agree(f"{number + 1}: {name}, {kind}")}
-
-    def start(self, name: str, number: int = 0) -> None:
-        """The ordinary program from nothing, as on a board; not forked from what has everything loaded."""
-        words = [sys.executable, "-m", "onboard", "--machine", f"{name}.toml", "--journal", f"{JOURNALS}/{name}"]
-        self._site.start(name, [*inside(name), *words], f"{name}-{number}.txt")
 
     def wait_until_all_agree(self, what: str) -> float:
         """Seconds of the guest from now on."""
@@ -123,10 +127,10 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.record()
     watch = Watch(Ears(TOOLS), set(nodes.values()))
     cycles = Cycles(site, nodes, watch)
-    site.start_machines(files_only=True)
-    for name in nodes:
-        cycles.start(name)
+    site.start_machines()
     site.start_plant()
+    # Rights to the car and to its place live through all cycles.
+    site.wait(watch.ears, "the car is in", watch.is_car_in, LIMIT_S)
     cycles.wait_until_all_agree("all take part")
     told = [cycles.play(number) for number in range(plan["cycles"])]
     status = site.statuses(["plant"], plan["plant_s"])

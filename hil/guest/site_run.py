@@ -90,18 +90,20 @@ class SiteRun:
         words = ["run", "site.toml", "--bus", "socketcan:can0"]
         for name in self.order.machines:
             words += ["--without", name, "--bus", f"{name}=socketcan:{device_channel(name)}"]
-        self._fork(PLANT, bus_sim, [*words, *self.order.begin])
+        self._fork(PLANT, bus_sim, [*words, *self.order.begin], f"{PLANT}.txt")
 
-    def start_machines(self, *, files_only: bool = False) -> None:
-        """Every machine runs the ordinary program with its own file; or only gets that file."""
+    def start_machines(self) -> None:
+        """Every machine runs the ordinary program with its own file."""
         for name in self.order.machines:
             (self.share / f"{name}.toml").write_text(_machine_file(name), encoding="utf-8")
-            if files_only:
-                continue
-            self._fork(name, onboard, ["--machine", f"{name}.toml", "--journal", f"{JOURNALS}/{name}"])
+            self.start_machine(name, f"{name}.txt")
 
-    def _fork(self, name: str, main: Main, words: Sequence[str]) -> None:
-        self.processes[name] = Forked(main, words, namespace=name, folder=self.share, output=f"{name}.txt")
+    def start_machine(self, name: str, output: str) -> None:
+        """One of them, for the first time or again; what it says goes to this file."""
+        self._fork(name, onboard, ["--machine", f"{name}.toml", "--journal", f"{JOURNALS}/{name}"], output)
+
+    def _fork(self, name: str, main: Main, words: Sequence[str], output: str) -> None:
+        self.processes[name] = Forked(main, words, namespace=name, folder=self.share, output=output)
 
     def start(self, name: str, words: Sequence[str], output: str) -> None:
         """Start a program in the shared folder; both its outputs go to one file there."""

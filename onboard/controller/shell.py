@@ -6,12 +6,12 @@ effects are carried out one after the other, so nothing is said before what must
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
 from onboard.controller.rest import Rest
 from onboard.core.codes import MachineState, Reason
-from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
+from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, Send
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.ports.bus import Bus
@@ -206,15 +206,17 @@ class Controller:
                 for frame in self._codecs[1].encode(message):
                     self.ports.device_bus.send(frame)
             case Record():
-                self._writing = self._loop.create_task(self._write(effect))
+                self._writing = self._loop.create_task(self._write(self.ports.journal.append(effect.entry)))
+            case Renew():
+                self._writing = self._loop.create_task(self._write(self.ports.journal.renew(effect.entries)))
             case Report(text):
                 self.ports.telemetry.event(self._now_us(), self.holon.machine.name, text)
             case Halt(why, reason):
                 self._halt(why, reason)
 
-    async def _write(self, record: Record) -> None:
+    async def _write(self, writing: Awaitable[None]) -> None:
         try:
-            await self.ports.journal.append(record.entry)
+            await writing
         except OSError as error:
             # What cannot be made durable must not be said: the machine stops where its authority still holds.
             self._outbox.clear()

@@ -83,6 +83,8 @@ class TokenBook:
     seen: dict[TokenKey, int] = field(default_factory=dict)
     #: To whom each token went that this node gave away last, and under which version: what it answers to a dispute.
     given: dict[TokenKey, Belief] = field(default_factory=dict)
+    #: Tokens given away while somebody who was started again waited for an answer.
+    gifts: set[TokenKey] = field(default_factory=set)
     beliefs: Beliefs = field(init=False)
     #: When what waits for an answer is said again.
     backoff: BackOff = field(init=False)
@@ -230,6 +232,7 @@ class TokenBook:
         self.changes += 1
         self.seen[key] = version
         self.given[key] = Belief(version, to)
+        self.gifts.add(key)
         self.beliefs.take_up(key, version, to)
         self.backoff.forget(("leaving", key))
         self.leaving[key] = Grant(version, to, self.backoff.say(("leaving", key), now_us))
@@ -272,7 +275,7 @@ class TokenBook:
             is_old = version < self.own_version(key)
             return self._tell_seen(key, now_us) if is_old else self._claimed(key, sender, now_us)
         belief = self.beliefs.of(key)
-        if belief == (version, sender, True):
+        if belief[:3] == (version, sender, True):
             return []
         if sender == belief.holder and version >= belief.version:
             return self._verified(key, version, sender, now_us, confirmed=True)
@@ -286,6 +289,11 @@ class TokenBook:
     def on_given(self, word: TokenGiven, now_us: int) -> list[Effect]:
         """Whoever was believed to hold a token says to whom it gave it: the chain of beliefs goes on from there."""
         return self._overheard(TokenKey(word.token_kind, word.token), word.sender, word.version, word.holder, now_us)
+
+    def drop_disputed(self, giver: int) -> None:
+        """A node was started again: what it gave before, and was disputed, counts only if it gives it again."""
+        for key in [key for key, grant in self._disputed.items() if grant.sender == giver]:
+            del self._disputed[key]
 
     def on_dispute(self, dispute: TokenDispute, now_us: int) -> list[Effect]:
         """Somebody believes that I hold a token which another gave away: say what my journal knows of it."""
@@ -316,15 +324,12 @@ class TokenBook:
     # --- what is said without being asked --------------------------------------------------------------------------
 
     def statements(self) -> list[Effect]:
-        """What this node holds away from the site file's first holders, said for a node that asks."""
-        return [Send(TokenHeld(self.node_id, key.kind, key.number, version)) for key, version in self.held.items()]
-
-    def testimony(self) -> list[Effect]:
-        """What the journal says that this node holds and has under way, for others to compare with what they know."""
+        """What this node holds away from the site file's first holders, and what it gave away and is under way."""
+        held = [Send(TokenHeld(self.node_id, *key, version)) for key, version in self.held.items()]
         gone = [
-            Send(TokenGiven(self.node_id, *key, grant.version, grant.holder)) for key, grant in self.leaving.items()
+            Send(TokenGiven(self.node_id, *key, given.version, given.holder)) for key, given in self.leaving.items()
         ]
-        return [*self.statements(), *gone]
+        return [*held, *gone]
 
     def wake(self, now_us: int) -> list[Effect]:
         """Say again what has waited long enough: wanted tokens, and grants whose receiver was not heard."""
@@ -409,17 +414,17 @@ class TokenBook:
             # What is given to me comes with its grant.
             return []
         if giver == belief.holder:
-            return self._verified(key, version, holder, now_us)
+            return self._verified(key, version, holder, now_us, giver=giver)
         self.beliefs.hint(key, version, holder)
         self.changes += 1
         return []
 
     def _verified(
-        self, key: TokenKey, version: int, holder: int, now_us: int, *, confirmed: bool = False
+        self, key: TokenKey, version: int, holder: int, now_us: int, *, confirmed: bool = False, giver: int = NOBODY
     ) -> list[Effect]:
         """The chain of beliefs goes on: my own grant has arrived with it, and a disputed one may be right now."""
         self.changes += 1
-        self.beliefs.take_up(key, version, holder, confirmed=confirmed)
+        self.beliefs.take_up(key, version, holder, confirmed=confirmed, giver=giver)
         effects: list[Effect] = []
         pending = self.leaving.get(key)
         # Its receiver says that it holds the token, or that it gave it on: either proves that it had it.
@@ -452,7 +457,7 @@ class TokenBook:
 
     def _tell_seen(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Somebody says that it holds a token under a version older than I know."""
-        version, holder, _ = self.beliefs.of(key)
+        version, holder, *_ = self.beliefs.of(key)
         if self.is_mine_by_journal(key):
             version, holder = self.own_version(key), self.node_id
         word = TokenSeen(self.node_id, key.kind, key.number, version, holder)

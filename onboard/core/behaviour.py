@@ -12,11 +12,11 @@ from typing import Protocol
 from onboard.core.authority import TokenBook, TokenKey, car_token
 from onboard.core.codes import KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Record
-from onboard.core.messages import CallForProposals, Message, Reference
+from onboard.core.messages import CallForProposals, CarAt, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.petitions import Petitions
-from onboard.core.site import Machine, Site
+from onboard.core.site import Machine, Segment, Site
 
 
 @dataclass
@@ -34,6 +34,14 @@ class Fleet:
     petitions: Petitions = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
     admissions: int = 0
+    #: After this machine's rights were made anew: the slots that it was given, which are those of its body.
+    slots_told: tuple[Segment, ...] = ()
+    #: Whether nobody knows this machine's rights, and so not where it is.
+    has_no_rights: bool = False
+    #: Where cars stand whose custody came to this machine so.
+    cars_told: dict[Reference, CarAt] = field(default_factory=dict)
+    #: Machines whose rights were made anew: of what was promised to them before they know nothing.
+    forgetful: set[int] = field(default_factory=set)
     _left: list[Reference] = field(default_factory=list)
 
     def __post_init__(self) -> None:

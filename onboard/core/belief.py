@@ -9,18 +9,22 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import TokenKind
+from onboard.core.codes import NOBODY, TokenKind
 
 #: A token, as in ``authority.TokenKey``.
 Key = tuple[TokenKind, int]
 
 
 class Belief(NamedTuple):
-    """``holder`` has had the token since version ``version``, 0 for ever; ``confirmed`` where it said so itself."""
+    """``holder`` has had the token since version ``version``, 0 for ever; ``confirmed`` where it said so itself.
+
+    ``giver`` is whose grant told of it, 0 where none did.
+    """
 
     version: int
     holder: int
     confirmed: bool = False
+    giver: int = NOBODY
 
 
 @dataclass
@@ -39,9 +43,9 @@ class Beliefs:
         """The newest that was heard, verified or not."""
         return self.hints.get(key) or self.of(key)
 
-    def take_up(self, key: Key, version: int, holder: int, *, confirmed: bool = False) -> None:
+    def take_up(self, key: Key, version: int, holder: int, *, confirmed: bool = False, giver: int = NOBODY) -> None:
         """What counts from now on; hints that are no newer end."""
-        self.verified[key] = Belief(version, holder, confirmed)
+        self.verified[key] = Belief(version, holder, confirmed, giver)
         hint = self.hints.get(key)
         if hint is not None and hint.version <= version:
             del self.hints[key]

@@ -64,6 +64,9 @@ CORE_RULES: Rules = {
     "blocked": (Keep("blocked", _SEGMENT),),
     "clear": (Keep("clear", _SEGMENT),),
     "manual": (Keep("manual"),),
+    "assigned": (Keep("assigned", _TOKEN),),
+    "read_back": (Keep("read_back"),),
+    "epoch": (Keep("epoch"),),
     # The first hold for a person stands until it is released.
     "held": (Keep("held", which=Which.FIRST_AND_NEWEST),),
     "released": (End(("held",)),),

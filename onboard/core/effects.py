@@ -29,6 +29,16 @@ class Record:
 
 
 @dataclass(frozen=True, slots=True)
+class Renew:
+    """Begin the journal anew with these entries, durably before anything that follows; what was there is kept aside.
+
+    For rights that were regenerated: the only write that a journal which is short or foreign takes.
+    """
+
+    entries: tuple[Mapping[str, str | int], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """Tell people: one line of text, never needed by a machine."""
 
@@ -43,4 +53,4 @@ class Halt:
     reason: Reason = Reason.INVARIANT_BROKEN
 
 
-Effect = Send | Actuate | Record | Report | Halt
+Effect = Send | Actuate | Record | Renew | Report | Halt

@@ -25,6 +25,10 @@ TWIN_BEATS = 600
 DEAF_BEATS = 2
 
 
+#: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
+RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
+
+
 class Hold(Enum):
     """Whether a machine acts, or what holds it."""
 
@@ -143,6 +147,12 @@ class Holding:
         if self._is_deaf(now_us):
             self._quiet_since_us = now_us
         self._heard_us = now_us
+
+    def slept(self, now_us: int) -> None:
+        """I heard nothing for a while, or my clock has jumped: what was to last so long lasts so long from now on."""
+        self.stops = dict.fromkeys(self.stops, now_us)
+        self._quiet_since_us = now_us
+        self._own_since_us = None if self._own_since_us is None else now_us
 
     def for_person(self, reason: Reason, cause: int) -> Outcome:
         """Only a person can know what is right: hold for ``reason``, brought about by node ``cause`` (0: nobody)."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.holding import RIGHTS_LOST, Hold, Holding, Outcome
 from onboard.core.messages import Heartbeat, Message
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
@@ -30,7 +30,9 @@ class Holds:
         return self.apply(self.holding.own_frame(now_us, is_right=self.own.is_right(message)), now_us)
 
     def on_go(self, go: Go, now_us: int) -> list[Effect]:
-        """A person lets me, or whom an emergency stop holds, go on."""
+        """A person lets me, or whom an emergency stop holds, go on; that gives nobody the rights back that it lost."""
+        if go.stopper == self.holding.node_id and self.holding.why.reason in RIGHTS_LOST:
+            return []
         return self.apply(self.holding.go(go.stopper), now_us)
 
     def on_halted(self, halted: Halted, now_us: int) -> list[Effect]:

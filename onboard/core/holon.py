@@ -17,7 +17,7 @@ from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Report, Send
-from onboard.core.holding import Hold, Holding
+from onboard.core.holding import RIGHTS_LOST, Hold, Holding
 from onboard.core.holds import Holds
 from onboard.core.journal_state import INTACT, JournalCondition, reason_of
 from onboard.core.messages import (
@@ -45,6 +45,7 @@ from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent,
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted
+from onboard.core.regeneration import Regenerating
 from onboard.core.rights import Rights
 from onboard.core.site import Machine, Site
 from onboard.core.timekeeper import Heard, Timekeeper
@@ -114,12 +115,17 @@ class Holon:
         self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
+        self.regeneration = Regenerating(self.tokens, lambda: self.mirror.cars, self._statements, self._thaw)
+        self.regeneration.cars_told = self.fleet.cars_told
+        self.regeneration.replay(entries)
+        self.rights.is_frozen = lambda: self.regeneration.is_frozen
         self._heartbeat_due_us: int | None = None
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             **self.rights.handlers(),
+            **self.regeneration.handlers(),
             CallForProposals: self._negotiate,
             Bid: self._negotiate,
             Award: self._negotiate,
@@ -158,6 +164,7 @@ class Holon:
         effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
         effects += self.behaviour.start(now_us)
         effects += self._beat(now_us)
+        self.presence.begins(now_us)
         effects += self.witness.begin(now_us)
         return self._settle(effects, now_us)
 
@@ -225,8 +232,11 @@ class Holon:
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
         effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        effects += self.regeneration.wake(now_us)
         if not self.holding.is_apart:
-            effects += self.witness.wake(now_us) + self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
+            effects += self.witness.wake(now_us)
+        if self._deals:
+            effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
             # What was planned before is old; the first word is that of a machine that takes part.
@@ -244,8 +254,9 @@ class Holon:
             self.time.due_us,
             self.holding.next_wake(),
             None if self.holding.is_apart else self.witness.next_wake(),
-            None if self.holding.is_apart else self.tokens.next_wake(),
-            None if self.holding.is_apart else self.rights.petition_due(),
+            self.regeneration.next_wake(),
+            self.tokens.next_wake() if self._deals else None,
+            self.rights.petition_due() if self._deals else None,
             self.presence.held_until_us,
             self._negotiation_due() if self._begins else None,
             self.behaviour.next_wake() if self._begins else None,
@@ -258,6 +269,8 @@ class Holon:
         if self._heartbeat_due_us is None or not self.presence.awake(now_us):
             return []
         self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+        self.holding.slept(now_us)
+        self.witness.slept(now_us)
         # One by one: all are asked at power-up only.
         asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
         return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
@@ -284,6 +297,7 @@ class Holon:
 
     def _begin(self, now_us: int) -> list[Effect]:
         """Bus time is known: the first word, and what was sensed before."""
+        self.presence.begins(now_us)
         self._heartbeat_due_us = now_us
         effects: list[Effect] = []
         for early in self._sensed_early.values():
@@ -329,26 +343,28 @@ class Holon:
         return []
 
     def _on_car(self, statement: CarAt, now_us: int) -> list[Effect]:
-        self.car_words.hear(statement)
+        hear = self.regeneration.on_car if self.regeneration.is_frozen else self.car_words.hear
+        hear(statement)
         return []
 
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
-        if beat.contract != CONTRACT_VERSION or beat.site_digest != self.site.digest:
-            reason = Reason.OTHER_CONTRACT if beat.contract != CONTRACT_VERSION else Reason.OTHER_SITE
+        news = self.regeneration.on_heartbeat(beat, now_us)
+        reason = self.regeneration.strange(beat)
+        if reason is not Reason.NONE:
             self.drops[reason] += 1
             self.presence.heard_foreign(beat.sender, reason, now_us)
-            return []
+            return news
         self.presence.foreign.pop(beat.sender, None)
         self.presence.heard_beat(beat)
         fresh = self.mirror.on_heartbeat(beat, now_us)
         if fresh or (self.clock.is_source and beat.sender < self.node_id):
             self.time.elect(self.clock.local_us(now_us))
         if self.holding.is_apart:
-            return []
+            return news
         if fresh:
             self.tokens.begin_anew(now_us)
             self.negotiation.begin_anew(now_us)
-        return self.witness.on_heartbeat(beat, is_fresh=fresh)
+        return news + self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):
@@ -371,7 +387,24 @@ class Holon:
     @property
     def _is_still(self) -> bool:
         """Whether this machine is an obstacle: it neither moves nor bids."""
-        return self.presence.is_held or self.holding.is_held
+        return self.presence.is_held or self.holding.is_held or self.regeneration.is_frozen
+
+    @property
+    def _deals(self) -> bool:
+        """Whether this machine asks for rights and gives them away."""
+        return not (self.holding.is_apart or self.regeneration.is_frozen)
+
+    def _thaw(self, lost: int, now_us: int) -> list[Effect]:
+        """Rights were made anew, or it was broken off: who lost its own begins as after a restart, all others look."""
+        if lost not in (NOBODY, self.node_id):
+            self.fleet.forgetful.add(lost)
+        elif lost == self.node_id:
+            self.witness.doubt, self.witness.has_past, self.fleet.has_no_rights = None, True, False
+            self.fleet.slots_told = self.regeneration.slots()
+            if self.holding.why.reason in RIGHTS_LOST:
+                return self.holds.apply(self.holding.go(self.node_id), now_us)
+        self.presence.listen_anew(now_us)
+        return self.holds.words()
 
     @property
     def _begins(self) -> bool:
@@ -380,8 +413,8 @@ class Holon:
 
     def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Who is held gives no right away: it may be one that it does not have any more."""
-        if self.holding.is_held:
-            return self.holding.why.reason
+        if self.holding.is_held or self.regeneration.is_frozen:
+            return self.holding.why.reason if self.holding.is_held else Reason.REGENERATION
         return self.behaviour.may_grant(key, requester, now_us)
 
     def _new_life(self, now_us: int) -> tuple[int, list[Effect]]:
@@ -417,7 +450,10 @@ class Holon:
     def _doubts(self) -> list[Effect]:
         """Somebody knows that the journal is old: nothing of it is used any more."""
         doubt = self.witness.doubt
-        return [] if doubt is None else self._halt(doubt.text, doubt.reason, doubt.cause)
+        if doubt is None or self.holding.why.reason in RIGHTS_LOST:
+            return []
+        self.fleet.has_no_rights = True
+        return [Report(doubt.text), *self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), 0)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -453,6 +489,7 @@ class Holon:
             self.boot,
             self.machine.kind,
             MachineState.OBSTACLE if self._is_still else self.behaviour.state,
+            self.regeneration.epoch,
         )
 
     def _halt(self, why: str, reason: Reason, cause: int = NOBODY) -> list[Effect]:

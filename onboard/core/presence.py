@@ -55,6 +55,10 @@ class Presence:
         """Whether this machine is an obstacle: it neither moves nor bids."""
         return self.held_until_us is not None
 
+    def begins(self, now_us: int) -> None:
+        """I live from now on, in the time that is known now."""
+        self._active_us = now_us
+
     def awake(self, now_us: int) -> bool:
         """Note that this machine lives; True where it finds that it has slept. Before its first beat it tells nothing.
 

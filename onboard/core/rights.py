@@ -38,6 +38,8 @@ class Rights:
     fleet: Fleet
     may_grant: Callable[[TokenKey, int, int], Reason]
     witness: Witness
+    #: Whether nothing is taken or given: rights are made anew.
+    is_frozen: Callable[[], bool] = bool
     _asked_again_us: dict[int, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -108,7 +110,7 @@ class Rights:
 
     def _on_grant(self, grant: TokenGrant, now_us: int) -> list[Effect]:
         key = TokenKey(grant.token_kind, grant.token)
-        if not self._may_move(key, grant.holder):
+        if not self._may_move(key, grant.holder) or (self.is_frozen() and grant.holder == self.node_id):
             return []
         self.witness.hear(grant)
         if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):

@@ -58,6 +58,8 @@ class Witness:
     mismatches: Counter[int] = field(default_factory=Counter)
     #: What machines that were started again held by their own word before, until they say so again.
     doubted: dict[int, dict[TokenKey, int]] = field(default_factory=dict)
+    #: Machines that were started again and were not answered since.
+    starting: set[int] = field(default_factory=set)
     _since_us: int | None = None
     _ask_at_us: int | None = None
     _askers: set[int] = field(default_factory=set)
@@ -102,7 +104,11 @@ class Witness:
         self.tokens.asked = set(self._others)
         # Who comes back after a hold asks anew: what was answered before that is old.
         self.answered.clear()
-        return [*self.tokens.testimony(), Send(SyncRequest(self.node_id, NOBODY))]
+        # All answer me now and ask me: what they say in it need not be told to them.
+        self._quiet_until_us = now_us + ANSWER_PERIOD_US
+        for node in self._others:
+            self._was_started(node)
+        return [*self.tokens.statements(), Send(SyncRequest(self.node_id, NOBODY))]
 
     def shift(self, by_us: int) -> None:
         """Bus time was set, or set anew: what is due stays as far away as it was."""
@@ -110,6 +116,11 @@ class Witness:
         self._ask_at_us = _later(self._ask_at_us, by_us)
         self._answer_at_us = _later(self._answer_at_us, by_us)
         self._quiet_until_us = _later(self._quiet_until_us, by_us)
+
+    def slept(self, now_us: int) -> None:
+        """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
+        if not self.is_over and self._since_us is not None:
+            self._since_us = self._ask_at_us = now_us
 
     def ask(self, node: int, boot_before: int = 0) -> list[Effect]:
         """Ask one machine for all that it vouches for; what it says that it holds is believed until it has done."""
@@ -167,7 +178,11 @@ class Witness:
     # --- answering ---------------------------------------------------------------------------------------------
 
     def _was_started(self, node: int) -> None:
-        """A machine was started again: what it held by its own word it has to say again."""
+        """A machine was started again: what it held by its own word it has to say again, and what it gave me too."""
+        self.tokens.drop_disputed(node)
+        if not self.starting:
+            self.tokens.gifts = set(self.tokens.leaving)
+        self.starting.add(node)
         beliefs = self.tokens.beliefs.verified
         self.doubted[node] = {
             TokenKey(*key): one.version for key, one in beliefs.items() if one.holder == node and one.confirmed
@@ -202,14 +217,32 @@ class Witness:
         self._answer_at_us, self._quiet_until_us = None, now_us + ANSWER_PERIOD_US
         effects = self.statements(now_us)
         for node in askers:
-            effects += self._tell_doubted(node)
-        effects += self._for_the_silent(now_us)
+            effects += self._tell_doubted(node) + self._tell_gifts(node)
+        effects += self._tell_own_gifts(set(askers)) + self._for_the_silent(now_us)
         whom = askers[0] if len(askers) == 1 else NOBODY
         return [*effects, Send(SyncDone(self.node_id, whom, self.boot))]
 
     def _tell_doubted(self, node: int) -> list[Effect]:
         lost = self.doubted.get(node, {})
         return [Send(TokenSeen(self.node_id, *key, version, node)) for key, version in lost.items()]
+
+    def _tell_gifts(self, node: int) -> list[Effect]:
+        """What a machine gave away by its own word and nobody has said that he has: only I can tell if it forgot it."""
+        effects: list[Effect] = []
+        for key, one in self.tokens.beliefs.verified.items():
+            if one.giver == node and not one.confirmed:
+                # It held the token under the version before; it may have forgotten either.
+                effects.append(Send(TokenSeen(self.node_id, *key, one.version - 1, node)))
+                effects.append(Send(TokenSeen(self.node_id, *key, one.version, one.holder)))
+        return effects
+
+    def _tell_own_gifts(self, askers: set[int]) -> list[Effect]:
+        """What I gave away since: who has it now may have answered before it had it."""
+        if not self.starting & askers:
+            return []
+        self.starting -= askers
+        given = [(key, self.tokens.given[key]) for key in sorted(self.tokens.gifts) if key in self.tokens.given]
+        return [Send(TokenGiven(self.node_id, *key, one.version, one.holder)) for key, one in given]
 
     def _for_the_silent(self, now_us: int) -> list[Effect]:
         """What machines hold that cannot say so themselves: whoever gave it to them may have forgotten that."""
@@ -238,12 +271,10 @@ class Witness:
                 mask = (1 << SEEN_VERSION_BITS) - 1
                 is_newer_seen = is_newer(word.version_seen, own & mask, SEEN_VERSION_BITS)
                 is_better = is_mine and word.version_seen != 0 and is_newer_seen
-            case TokenHeld():
-                is_better = is_mine and word.version > own
             case TokenSeen():
                 is_better = word.version > own and (is_mine or word.holder == self.node_id)
             case _:
-                is_better = False
+                is_better = is_mine and word.version > own
         if is_better:
             version = word.version_seen if isinstance(word, TokenRequest) else word.version
             reason = Reason.JOURNAL_SHORT if self.has_past else Reason.JOURNAL_LOST

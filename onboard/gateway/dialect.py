@@ -49,7 +49,7 @@ class Dialect:
         return {"powerSupply" if self.is_third else "batteryState": {charge: 100, "charging": False}}
 
     def safety(self, *, stopped: bool) -> Json:
-        """An emergency stop stays until a person has been at the machine: MANUAL."""
+        """An emergency stop, while it holds the machines: MANUAL, as a person said it and can lift it."""
         key = "activeEmergencyStop" if self.is_third else "eStop"
         return {"safetyState": {key: "MANUAL" if stopped else "NONE", "fieldViolation": False}}
 

@@ -58,7 +58,7 @@ class Gateway:
         self.publisher = Publisher(site, settings, self._now_us())
         self.reports = reports
         self._wall_us = wall_us
-        self._decoder = Decoder(codec)
+        self._decoder = Decoder(codec, site.machines)
         self._inbox: deque[tuple[Frame, int]] = deque()
         self._news = asyncio.Event()
         self._stopping = False

@@ -159,7 +159,7 @@ class Machines:
             # None that stands because it is held says so: its word that it was let go may have been lost.
             body.is_held = body.is_paused = False
         if message.state in (MachineState.IDLE, MachineState.WORKING) and self.emergency is not None:
-            # After an emergency stop only a machine that a person has started anew works again.
+            # Whoever is held by an emergency stop says OBSTACLE: one that works was let go, or the stop is old.
             self.emergency = None
             self.changed.update(self.bodies)
 

@@ -119,9 +119,9 @@ class Reading:
 
 def begin(owner: str, identity: str, entries: Iterable[Entry] = ()) -> tuple[bytes, Tail]:
     """A whole journal of ``entries`` and its tail. ``identity`` is another one each time: a word without spaces."""
-    link, lines = b"", []
-    head: Entry = {"record": "journal", "owner": owner, "identity": identity}
-    for number, entry in enumerate((head, *entries)):
+    head = _head(owner, identity)
+    link, lines = head.link, [head.text]
+    for number, entry in enumerate(entries, 1):
         lines.append(_line(link, number, _json(entry)))
         link = lines[-1][:_LINK_CHARS]
     records = len(lines) - 1
@@ -152,7 +152,6 @@ def _compare(content: bytes, seal: Seal, lines: list[Line], name: str) -> Readin
     """Hold the lines that are good against what the seal says."""
     good, state = len(lines) - 1, JournalState.INTACT
     end = SLOTS_BYTES + sum(len(line.text) for line in lines)
-    entries = [line.entry for line in lines[1:]]
     if good >= seal.records:
         if lines[seal.records].link.decode() != seal.link:
             return _refused([], JournalState.FOREIGN, 0, f"{name}: its records are not those that were sealed")
@@ -163,15 +162,16 @@ def _compare(content: bytes, seal: Seal, lines: list[Line], name: str) -> Readin
         if not restored:
             missing = seal.records - max(good, 0)
             why = f"{name}: {missing} of {seal.records} records are damaged or missing: the medium has failed"
-            return _refused(entries, JournalState.SHORT, missing, why)
+            return _refused([line.entry for line in lines[1:]], JournalState.SHORT, missing, why)
         state = JournalState.MENDED
     every = [*lines, *restored]
     mending = b"".join(line.text for line in restored)
     copies = _as_fit([line.text for line in every[1:]], _room(seal.owner))
     tail = Tail(seal.owner, seal.identity, len(every) - 1, every[-1].link, end + len(mending), deque(copies))
-    why = f"{name}: {len(restored)} records restored from their second copy" if restored else ""
-    condition = JournalCondition(state, 0, len(restored), why)
-    return Reading(entries + [line.entry for line in restored], condition, tail, end, mending)
+    mended = sum(line.number > 0 for line in restored)
+    why = f"{name}: {mended} records restored from their second copy" if restored else ""
+    condition = JournalCondition(state, 0, mended, why)
+    return Reading([line.entry for line in every[1:]], condition, tail, end, mending)
 
 
 def _refused(entries: list[Entry], state: JournalState, missing: int | None, why: str) -> Reading:
@@ -185,11 +185,12 @@ def _other_owner(seal: Seal | None, lines: list[Line], owner: str) -> str | None
 
 
 def _restored(seal: Seal, lines: list[Line]) -> list[Line]:
-    """The lines that are missing at the end, from the seal's copies; none where the copies do not reach back so far."""
-    if not lines:
-        return []
-    found: list[Line] = []
-    last = lines[-1]
+    """The lines that are missing at the end, from the seal's copies; none where the copies do not reach back so far.
+
+    The first line says nothing that the seal does not know.
+    """
+    found = [] if lines else [_head(seal.owner, seal.identity)]
+    last = (lines or found)[-1]
     for text in seal.copies:
         line = _checked(text, last.number + 1, last.link)
         if line is not None:
@@ -218,6 +219,12 @@ def _checked(text: bytes, number: int, before: bytes) -> Line | None:
         return None
     entry: Entry = json.loads(fields[2])
     return Line(number, entry, fields[0], text)
+
+
+def _head(owner: str, identity: str) -> Line:
+    entry: Entry = {"record": "journal", "owner": owner, "identity": identity}
+    text = _line(b"", 0, _json(entry))
+    return Line(0, entry, text[:_LINK_CHARS], text)
 
 
 def _line(before: bytes, number: int, entry: bytes) -> bytes:

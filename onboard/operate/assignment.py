@@ -9,12 +9,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.authority import TokenKey, genesis_holder, may_exist, segment_token, station_token
+from onboard.core.authority import TokenKey, genesis_holder, may_exist
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE, TokenKind
-from onboard.core.lifts import GATE_INDEX, PLATFORM_INDEX, gate, lift_at, platform
-from onboard.core.messages import CarAt, Progress
+from onboard.core.lifts import gate, lift_at, platform
+from onboard.core.messages import CarAt
 from onboard.core.recovery_messages import TokenAssigned
-from onboard.core.site import Machine, Segment, Site, Station, TrackKind
+from onboard.core.regeneration import tokens_of
+from onboard.core.site import Machine, Segment, Site, Station
 
 #: Highest version of a token (dbc/fleet.dbc): above it nothing can be made anew.
 LAST_VERSION = (1 << 28) - 1
@@ -83,14 +84,6 @@ class Body:
     bay: Station | None = None
 
     @classmethod
-    def of_progress(cls, site: Site, word: Progress) -> "Body":
-        """By a machine's own word; a body that is off its centre is in the next slot as well."""
-        found = [Segment(word.track, word.index)]
-        if word.offset_mm:
-            found.append(Segment(word.track, word.index + (1 if word.offset_mm > 0 else -1)))
-        return cls.of_segments(site, found)
-
-    @classmethod
     def of_fixed(cls, site: Site, machine: Machine) -> "Body":
         """A lift's platform and gate, a compartment's bay."""
         if machine.station is not None:
@@ -145,7 +138,7 @@ def assign(said: Statements, whose: Whose, operator: int) -> Assignment:
     """
     given: list[TokenAssigned] = []
     nobodys: list[TokenKey] = []
-    for key in sorted({*_of_site(said.site), *said.seen}):
+    for key in sorted({*tokens_of(said.site), *said.seen}):
         if key in said.held or not _is_orphan(said, key, whose):
             continue
         to = _heir(said, key, whose)
@@ -175,8 +168,10 @@ def _heir(said: Statements, key: TokenKey, whose: Whose) -> int:
     seen = said.seen.get(key)
     # A grant to a machine that lives is on its way: it is that machine's.
     wanted = NOBODY if seen is None or seen.node == whose.lost else seen.node
+    # A machine that moves learns from the slots that it gets where it is: it gets no others.
+    is_placed = whose.lost if site.machines[whose.lost].kind in MOBILE_KINDS else NOBODY
     for node in (wanted, genesis_holder(site, key), site.stewards.get(key.number >> 8, NOBODY)):
-        if node in site.machines and node != absent:
+        if node in site.machines and node not in (absent, is_placed):
             return node
     return _lowest_fixed(site, absent)
 
@@ -197,15 +192,3 @@ def _heir_of_car(said: Statements, key: TokenKey, whose: Whose) -> int:
 def _lowest_fixed(site: Site, absent: int) -> int:
     fixed = [node for node, one in site.machines.items() if one.kind not in MOBILE_KINDS and node != absent]
     return min(fixed, default=NOBODY)
-
-
-def _of_site(site: Site) -> Iterable[TokenKey]:
-    """All tokens of segments and stations that a site has."""
-    for number, track in site.tracks.items():
-        if track.kind is TrackKind.LIFT:
-            indices: Iterable[int] = (PLATFORM_INDEX, GATE_INDEX)
-        else:
-            indices = range(1, track.length + 1)
-        yield from (segment_token(Segment(number, index)) for index in indices)
-    yield from (station_token(place) for place in site.places)
-    yield from (station_token(bay) for bay in site.compartments.values())

@@ -30,7 +30,7 @@ examples:
   onboard operate stop -i socketcan -c can0 --site mysite.toml           all stand, until Ctrl-C and 30 s more
   onboard operate go -i socketcan -c can0 --site mysite.toml             who stands and why; asks; they go on
   onboard operate block "p(1,3)" -i socketcan -c can0 --site mysite.toml
-  onboard operate regenerate MR1 -i socketcan -c can0 --site mysite.toml
+  onboard operate regenerate MR1 --body 'p(1,3)' -i socketcan -c can0 --site mysite.toml
   onboard operate hold MR1 -i socketcand-asyncio -c fleet --bus-kwargs host=127.0.0.1 port=29536 --site small.toml
       the same on a site served by: bus-sim run small --serve
 This bus is no safety channel: machines that can hurt somebody have an emergency stop of their own.
@@ -80,12 +80,14 @@ def build_parser() -> argparse.ArgumentParser:
     regenerate = command("regenerate", "the rights of a machine whose journal is lost are made anew")
     regenerate.add_argument("machine", metavar="MACHINE", help="whose rights; it holds, or is --absent")
     regenerate.add_argument("--absent", default="", metavar="MACHINE", help="a machine that is off and locked off")
-    regenerate.add_argument(
-        "--body",
-        action="append",
-        metavar="SLOT",
-        help="where the body of the absent machine is: 'p(1,3)', or a lift's name for its platform; gone: nowhere",
-    )
+    for option, whose in (("--body", "the machine"), ("--absent-body", "another machine that is --absent")):
+        regenerate.add_argument(
+            option,
+            action="append",
+            default=[],
+            metavar="SLOT",
+            help=f"where the body of {whose} is: 'p(1,3)', or a lift's name for its platform; gone: nowhere",
+        )
     regenerate.add_argument(
         "--locked-off", default="", metavar="MACHINE", help="with --yes: the name that would have to be typed"
     )
@@ -122,7 +124,8 @@ def wish_of(args: argparse.Namespace) -> Wish:
         reason=getattr(args, "reason", "operator"),
         of=getattr(args, "of", None) or "",
         absent=getattr(args, "absent", ""),
-        body=tuple(args.body) if getattr(args, "body", None) else None,
+        body=tuple(getattr(args, "body", ())),
+        absent_body=tuple(getattr(args, "absent_body", ())),
         for_us=None if seconds is None else round(seconds * 1e6),
     )
 

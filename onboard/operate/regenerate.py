@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason, RegenerationPhase, TokenKind
-from onboard.core.messages import Blocked, CarAt, Heartbeat, Message, Progress, TokenGrant, TokenHeld
+from onboard.core.codes import NOBODY, Reason, RegenerationPhase, TokenKind
+from onboard.core.messages import Blocked, CarAt, Heartbeat, Message, TokenGrant, TokenHeld
 from onboard.core.recovery_messages import (
     Regeneration,
     RegenerationState,
@@ -59,10 +59,14 @@ PHASES = {
 
 @dataclass(frozen=True, slots=True)
 class Lost:
-    """Who lost its rights, who is locked off (0: nobody), and where the body of that one is."""
+    """Who lost its rights, who is locked off (0: nobody), and where their bodies are.
+
+    A machine that moves and lost its journal does not know where it is: it learns it from the rights that it gets.
+    """
 
     lost: int
     absent: int = NOBODY
+    body: Body = NO_BODY
     blocked: Body = NO_BODY
 
 
@@ -79,7 +83,6 @@ class Regenerate(Order):
         self._frozen: dict[int, int] = {}
         self._read: set[int] = set()
         self._boots: dict[int, int] = {}
-        self._place: Progress | None = None
         self._assignment = Assignment((), ())
         self._bursts: Iterator[list[Message]] = iter(())
         self._again_us = 0
@@ -92,6 +95,10 @@ class Regenerate(Order):
         park, who = self.park, self._who
         lines = [f"{known.machine.name} {state_words(park, node, now_us)}" for node, known in park.machines.items()]
         lines.append(f"the rights of {park.name(who.lost)} are made anew; all machines stand meanwhile")
+        if who.body.slots:
+            lines.append(
+                f"{park.name(who.lost)} is told that it stands at {', '.join(map(str, sorted(who.body.slots)))}"
+            )
         if who.absent:
             slots = ", ".join(str(one) for one in sorted(who.blocked.slots)) or "none"
             lines.append(f"{park.name(who.absent)} is absent; its rights go too; slots that stay blocked: {slots}")
@@ -170,8 +177,6 @@ class Regenerate(Order):
                 self._on_state(message, now_us)
             case Heartbeat() if message.sender in self._participants():
                 self._on_heartbeat(message, now_us)
-            case Progress() if message.sender == self._who.lost:
-                self._place = message
             case CarAt():
                 self._said.car_at(message)
             case TokenHeld() if self._step is Step.FREEZE:
@@ -211,12 +216,7 @@ class Regenerate(Order):
             what = f"{bad[0].kind.name.lower()} {bad[0].number:#06x}"
             self._abort(f"the journals of {self._names(bad[1])} do not agree about {what}: name one of them", now_us)
             return
-        is_placed = self._who.lost == self._who.absent or self._place is not None
-        if not is_placed and self.park.machines[self._who.lost].machine.kind in MOBILE_KINDS:
-            self._abort(f"{self.park.name(self._who.lost)} has not said where its body is", now_us)
-            return
-        body = NO_BODY if self._place is None else Body.of_progress(self.park.site, self._place)
-        whose = Whose(self._who.lost, self._who.absent, body, self._who.blocked)
+        whose = Whose(self._who.lost, self._who.absent, self._who.body, self._who.blocked)
         self._assignment = assign(self._said, whose, self.node)
         self._show()
         self._go_to(Step.ASK, now_us)

@@ -25,7 +25,7 @@ class Station:
         self.park = Park(site)
         self.node = 0
         self._codec, self._bus, self._tell = codec, bus, tell
-        self._decoder = Decoder(codec)
+        self._decoder = Decoder(codec, site.machines)
         self._loop = asyncio.get_running_loop()
         self._order: Order | None = None
         self._news = asyncio.Event()

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason
+from onboard.core.holding import RIGHTS_LOST
 from onboard.core.site import Machine, Site
 from onboard.kinds.car_park.site import CarPark
 from onboard.operate.assignment import Body
@@ -19,8 +20,6 @@ from onboard.operate.stops import GoAgain, LetGo, Stop
 
 #: Heartbeat periods for which the bus is listened to before anything is said: everybody is heard, and once lost.
 LISTEN_BEATS = 2
-#: A machine that holds for this has rights that nobody knows any more: letting it go is not enough.
-_RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
 
 #: A body that is in no slot of the site any more.
 GONE = "gone"
@@ -39,9 +38,10 @@ class Wish:
     reason: str = "operator"
     of: str = ""
     for_us: int | None = None
-    #: Of regenerate: who is locked off, and the slots of its body; empty where it has been taken out of the site.
+    #: Of regenerate: slots in which the machine's body is, who is locked off, and the slots of that one.
+    body: tuple[str, ...] = ()
     absent: str = ""
-    body: tuple[str, ...] | None = None
+    absent_body: tuple[str, ...] = ()
 
 
 def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
@@ -69,32 +69,39 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
 
 
 def _lost_of(site: Site, wish: Wish) -> Lost:
-    """Who lost its rights, who is locked off, and where the body of that one is. Raises ``OperateError``."""
+    """Who lost its rights, who is locked off, and where their bodies are. Raises ``OperateError``."""
     lost = machine_of(site, wish.machine)
     if not isinstance(site, CarPark):
-        raise OperateError(
-            f"{wish.machine}: only the rights of a car park are made anew; {site.name} is a {site.system}"
-        )
+        raise OperateError(f"{wish.machine}: {site.name} is a {site.system}; only a car park's rights can be made anew")
+    if wish.absent == wish.machine:
+        return Lost(lost.node_id, lost.node_id, blocked=_body_of(site, lost, wish.body, "--body"))
+    body = _body_of(site, lost, wish.body, "--body")
+    if lost.kind in MOBILE_KINDS and {slot.track for slot in body.slots} not in [
+        {one} for one in site.tracks if one not in site.lifts
+    ]:
+        raise OperateError(f"--body: {lost.name} must stand on one track, off the lifts; push it there first")
     if not wish.absent:
-        if wish.body is not None:
-            raise OperateError("--body: goes with --absent; a machine that lives says itself where it is")
-        return Lost(lost.node_id)
+        return Lost(lost.node_id, body=body)
     absent = machine_of(site, wish.absent)
-    if absent.kind not in MOBILE_KINDS:
-        return Lost(lost.node_id, absent.node_id, Body.of_fixed(site, absent))
-    if wish.body is None:
+    return Lost(lost.node_id, absent.node_id, body, _body_of(site, absent, wish.absent_body, "--absent-body"))
+
+
+def _body_of(site: Site, machine: Machine, told: tuple[str, ...], option: str) -> Body:
+    """Where a person sees a body: one that moves is told, one that does not is known."""
+    if machine.kind not in MOBILE_KINDS:
+        return Body.of_fixed(site, machine)
+    if not told:
         raise OperateError(
-            f"--absent {absent.name}: where is its body? give --body 'p(1,3)' for each slot of it, or --body gone"
+            f"{machine.name}: where does it stand? {option} 'p(1,3)' for each slot of it, or {option} gone"
         )
-    slots = [slot_of(site, text) for text in wish.body if text != GONE]
-    return Lost(lost.node_id, absent.node_id, Body.of_segments(site, slots))
+    return Body.of_segments(site, [slot_of(site, text) for text in told if text != GONE])
 
 
 def _release(park: Park, node: int, *, site: Site, machine: Machine, seed: int) -> Order:
     """A machine that says that it holds goes on by ``Go`` under its number; any other was held by a ``ManualOrder``."""
     # The latest word about it, however old: the time is not asked for here.
     word = park.machines[machine.node_id].halted
-    if word is not None and word.reason in _RIGHTS_LOST:
+    if word is not None and word.reason in RIGHTS_LOST:
         raise OperateError(f"{machine.name}: its journal does not know its rights; onboard operate regenerate")
     if word is not None and word.reason is Reason.EMERGENCY_STOP:
         raise OperateError(f"{machine.name}: holds by an emergency stop; onboard operate go")

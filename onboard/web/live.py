@@ -27,7 +27,7 @@ class LiveSource:
     def __init__(self, site: Site, codecs: Codecs) -> None:
         self.picture = LivePicture(site)
         self._codecs = codecs
-        self._fleet, self._device = Decoder(codecs.fleet), Decoder(codecs.device)
+        self._fleet, self._device = Decoder(codecs.fleet, site.machines), Decoder(codecs.device)
         self._loop = asyncio.get_running_loop()
         local = time.localtime()
         # The page tells the time of day: what the loop's clock lacks to it.

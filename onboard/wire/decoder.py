@@ -1,6 +1,7 @@
 """One listener's view of a bus: frames in, whole messages out, everything else counted under its reason."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -8,7 +9,9 @@ from onboard.core.codes import Grade, Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS
+from onboard.core.site import Machine
 from onboard.wire.codec import NO_WHEELBASE_MM, Codec, Part
+from onboard.wire.speakers import why_unheard
 
 #: A set whose frames do not all come within this is dropped, us. A set is sent in one go: milliseconds.
 SET_TIMEOUT_US = 1_000_000
@@ -31,15 +34,27 @@ class _Set:
 class Decoder:
     """Puts sets of frames together for one listener. ``drops`` counts what came to nothing, by reason."""
 
-    def __init__(self, codec: Codec) -> None:
+    def __init__(self, codec: Codec, machines: Mapping[int, Machine] | None = None) -> None:
+        """With ``machines``, those of a site by node-ID, what none of them listens to is dropped too."""
         self.drops: Counter[Reason] = Counter()
         self._codec = codec
+        self._machines = machines
         self._sets: dict[tuple[str, int, int], _Set] = {}
         #: Sets that were whole, from then on: what is said twice on a bus may come twice.
         self._whole: dict[tuple[str, int, int], _Set] = {}
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
+        message = self._put_together(frame, now_us)
+        if message is None or self._machines is None:
+            return message
+        why = why_unheard(message, self._machines, self._codec.speakers)
+        if why is Reason.NONE:
+            return message
+        self.drops[why] += 1
+        return None
+
+    def _put_together(self, frame: Frame, now_us: int) -> Message | None:
         part = self._codec.decode_part(frame)
         if isinstance(part, Message):
             return part
@@ -138,12 +153,18 @@ class Decoder:
         if collected is None:
             collected = _Set(now_us)
             if len(self._sets) >= MAX_SETS:
-                del self._sets[next(iter(self._sets))]
-                self.drops[Reason.INCOMPLETE_SET] += 1
+                self._drop_of_the_most()
         elif begins:
             collected.started_us = now_us
         self._sets[key] = collected
         return collected
+
+    def _drop_of_the_most(self) -> None:
+        """Make room: of the sender who has the most sets open, the oldest. Nobody drowns another's."""
+        senders = Counter(sender for _, sender, _ in self._sets)
+        most = max(senders.values())
+        del self._sets[next(key for key in self._sets if senders[key[1]] == most)]
+        self.drops[Reason.INCOMPLETE_SET] += 1
 
     def _complete(self, key: tuple[str, int, int], now_us: int) -> None:
         self._whole.pop(key, None)

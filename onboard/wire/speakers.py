@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable, Mapping
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import CallForProposals, Itinerary, Message, Speakers
+from onboard.core.codes import MAX_NODE_ID, KindCode, Reason
+from onboard.core.messages import CallForProposals, EmergencyStop, Itinerary, Message, Speakers
+from onboard.core.site import Machine
 from onboard.wire.dbc_file import MessageLayout
 
 #: The node of the fleet contract that stands for people's tools and bridges to other buses.
@@ -25,6 +26,21 @@ def is_in(kind: KindCode, nodes: Iterable[str]) -> bool:
     """Whether a kind of machine is among a contract's nodes."""
     roles = {_ROLES[kind]} if kind in _ROLES else {_MACHINE, kind.name.capitalize()}
     return not roles.isdisjoint(nodes)
+
+
+def why_unheard(message: Message, machines: Mapping[int, Machine], speakers: Speakers) -> Reason:
+    """Why no machine of a site listens to a message of its fleet bus: NOT_OF_SITE, NOT_OF_KIND; NONE where they do.
+
+    For who watches a site: its machines have their own rule (core/admission.py).
+    """
+    kinds = speakers.get(type(message))
+    if kinds is None or isinstance(message, EmergencyStop):
+        return Reason.NONE
+    machine = machines.get(message.sender)
+    if machine is None and message.sender <= MAX_NODE_ID:
+        return Reason.NOT_OF_SITE
+    kind = KindCode.OBSERVER if machine is None else machine.kind
+    return Reason.NONE if kind in kinds else Reason.NOT_OF_KIND
 
 
 def speakers_of(layouts: Iterable[MessageLayout], classes: Mapping[str, type[Message]]) -> Speakers:

@@ -22,6 +22,7 @@ from onboard.config.machine import load_machine
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import EmergencyStop, Heartbeat, Message
+from onboard.core.recovery_messages import Halted
 from onboard.io.endings import Ending
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
@@ -67,7 +68,7 @@ def test_the_single_file_walks_a_person_through_a_new_machine(archive: Path) -> 
 
 
 async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: Path, tmp_path: Path) -> None:
-    """Against a served bus, as a board would join it; its reason for stopping is an emergency stop."""
+    """Against a served bus, as a board would join it; an emergency stop holds it, and it says so."""
     machine = fleet(tmp_path, "--device", "can0") / "MR1" / "machine.toml"
     heard: asyncio.Queue[Message] = asyncio.Queue()
     decoder = Decoder(fleet_codec())
@@ -77,7 +78,7 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
         if message is not None:
             heard.put_nowait(message)
 
-    async def scenario() -> tuple[Message, int, str]:
+    async def scenario() -> tuple[Message, Halted]:
         medium = Medium(LoopClock(asyncio.get_running_loop()))
         server = SocketcandServer(lambda _, name: medium.attach(name), int, port=0)
         port = await server.start()
@@ -92,14 +93,18 @@ async def test_p58_the_single_file_runs_a_controller_to_its_heartbeat(archive: P
         message = await heard.get()
         for frame in fleet_codec().encode(EmergencyStop(251, Reason.OPERATOR)):
             ears.send(frame)
+        while not isinstance(held := await heard.get(), Halted):
+            pass
+        program.terminate()
         _, said = await program.communicate()
         await server.close()
-        return message, program.returncode or 0, said.decode()
+        assert program.returncode == Ending.STOPPED, said.decode()
+        return message, held
 
     async with asyncio.timeout(DEADLINE_S):
-        message, status, said = await scenario()
+        message, held = await scenario()
     assert isinstance(message, Heartbeat) and message.sender == 11
-    assert status == Ending.WAITS_FOR_PERSON and "emergency stop from node 251" in said
+    assert (held.sender, held.reason, held.cause) == (11, Reason.EMERGENCY_STOP, 251)
 
 
 def test_the_same_sources_give_the_same_bytes(archive: Path, tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """What each kind of fault does to the simulated world, seen on the buses and on the bodies."""
 
 from functools import partial
+from itertools import pairwise
 
 import pytest
 
@@ -221,6 +222,43 @@ def test_a_clock_jump_brings_what_was_due_later_at_once() -> None:
 
     jumped = watch("clock_jump:target=IOC1,at_s=20.2,by_ms=-3000", seconds=30, cars=0)
     assert beats(jumped)[0] - beats(watch(seconds=30, cars=0))[0] != 0
+
+
+def _beats_of(seen: Seen, node: int) -> list[int]:
+    return [t for t, m in seen.fleet if isinstance(m, Heartbeat) and m.sender == node]
+
+
+def test_a_frozen_clock_lets_nothing_fall_due_and_goes_on_by_itself() -> None:
+    beats = _beats_of(watch("clock_frozen:target=IOC1,at_s=5,for_s=20", seconds=40, cars=0), COMPARTMENT)
+    assert [t for t in beats if 5_000_000 < t < 25_000_000] == []
+    assert [t for t in beats if 25_000_000 <= t < 28_000_000]
+
+
+def test_a_clock_that_drifts_is_at_its_rate_again_when_that_is_over() -> None:
+    fast = _beats_of(watch("drift:target=IOC1,at_s=5,ppm=100000,for_s=30", seconds=80, cars=0), COMPARTMENT)
+
+    def gaps(from_us: int, to_us: int) -> set[int]:
+        inside = [t for t in fast if from_us <= t < to_us]
+        return {round((later - one) / 100_000) for one, later in pairwise(inside)}
+
+    assert gaps(8_000_000, 30_000_000) == {18}
+    assert gaps(60_000_000, 80_000_000) == {20}
+
+
+def test_clocks_of_several_machines_are_struck_at_once() -> None:
+    seen = watch("clock_frozen:target=IOC1|MR1,at_s=5,for_s=20", seconds=30, cars=0)
+    for node in (COMPARTMENT, ROBOT):
+        assert [t for t in _beats_of(seen, node) if 5_500_000 < t < 25_000_000] == []
+
+
+@pytest.mark.parametrize("by_ms", [-315_619_200_000, -60_000, 60_000, 2_160_000_000, 315_619_200_000])
+def test_after_a_jump_of_any_size_all_take_part_again_and_the_car_comes_in(by_ms: int) -> None:
+    """Whoever jumped: the time source, a follower, or both by the same."""
+    for target in ("IOC1", "MR1", "IOC1|MR1"):
+        seen = watch(f"clock_jump:target={target},at_s=8,by_ms={by_ms}", seconds=120)
+        assert [c.holon.halted for c in seen.simulation.controllers.values()] == [None, None]
+        assert seen.simulation.plant.oracle.finish() == []
+        assert seen.simulation.plant.street.summary().parked == 1, target
 
 
 # --- sensors and actuators -------------------------------------------------------------------------------------

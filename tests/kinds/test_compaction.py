@@ -22,6 +22,7 @@ from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.compaction import CORE_RULES, NUMBERS_KEPT, Entry, compact
 from onboard.core.holon import Holon
 from onboard.core.site import Site
+from onboard.io.sealed import SLOTS_BYTES, read
 from onboard.kinds.registry import compaction_for, factory_for, system_of
 from tests.mapd.sites import drawn, made
 
@@ -69,7 +70,7 @@ def state(site: Site, node: int, entries: list[Entry]) -> object:
 
 
 #: Tables that are looked up by key and never gone through: their order says when a key was first heard of.
-BY_KEY_ONLY = ("seen", "holder", "tasks")
+BY_KEY_ONLY = ("seen", "given", "verified", "tasks")
 
 
 def plain(value: object, inside: set[int], name: str = "") -> object:
@@ -180,3 +181,38 @@ def test_cars_whose_leaving_was_not_heard_are_forgotten_by_their_numbers() -> No
     assert len(kept(many, "small")) == NUMBERS_KEPT + 1
     held = car(1)[:1]
     assert kept([*held, *many[2:]], "small")[:1] == held, "a right that is held is never forgotten"
+
+
+@pytest.mark.parametrize("at_s", [30.0, 100.0, 160.0])
+def test_a_machine_at_rest_writes_its_journal_anew_and_goes_on(at_s: float) -> None:
+    """Each journal is made shorter again and again while cars come and go and machines lose power."""
+    site = find_site("small")
+    faults = tuple(
+        parse_injection(f"crash:target={one.name},at_s={at_s},restart_s=2") for one in site.machines.values()
+    )
+    scenario = Scenario("small", 3, 3_600, Arrivals(4, 60.0, 20.0, 90.0), faults=faults)
+    loop = VirtualTimeLoop()
+    identities: dict[int, set[str]] = {node: set() for node in site.machines}
+
+    async def play() -> list[str]:
+        stage = stage_maker(site)(site, scenario, RunOptions(seed=3), loop)
+        stage.arm(faults)
+        stage.run.start()
+        for journal in stage.run.journals.values():
+            journal.least_bytes = SLOTS_BYTES
+
+        def look() -> None:
+            for node, journal in stage.run.journals.items():
+                assert journal.medium is not None
+                found = read(bytes(journal.medium), journal.owner, "x")
+                assert found.tail is not None
+                identities[node].add(found.tail.identity)
+
+        await run_until(stage.run, lambda: stage.is_over, 3_600_000_000, STEP_US, look)
+        assert stage.is_over
+        return stage.violations()
+
+    assert run_on(loop, play()) == []
+    # The first is made at power-up.
+    assert all(max(found) > f"{1:016x}" for found in identities.values()), identities
+    assert sum(len(found) for found in identities.values()) > len(identities) + 2

@@ -3,7 +3,7 @@
 from bus_sim.sites import find_site
 from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, Reason, Side, TokenKind
+from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, Reason, ShuttleMode, Side, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.holon import Holon
 from onboard.core.lifts import gate, platform, says_standing, under_gate
@@ -16,6 +16,7 @@ from onboard.core.messages import (
     Message,
     PlatformState,
     Progress,
+    ShuttleState,
     Stamp,
     SyncRequest,
     TokenGrant,
@@ -48,6 +49,8 @@ class AtTheSill:
         self.holon = Holon(SITE, SITE.machines[ROBOT], factory_for(SITE, KindCode.ROBOT))
         self.holon.start(0)
         self.holon.receive(BusTime(BAY, 0), 0)
+        self.holon.tokens.trust()
+        self.holon.sense(ShuttleState(ROBOT, 0, ShuttleMode.HOME, 0, Side.NEAR, 0, 2_500), 5)
         self.holon.sense(DriveState(ROBOT, 0, 0, 0, DriveMode.STANDING, True), 10)
         assert isinstance(self.holon.behaviour, Robot)
         self.carriage = self.holon.behaviour.carriage
@@ -167,7 +170,7 @@ def lift_at(index: int) -> Holon:
     holon = Holon(SITE, SITE.machines[LIFT], factory_for(SITE, KindCode.LIFT))
     holon.start(0)
     holon.receive(BusTime(BAY, 0), 0)
-    holon.tokens.trust_genesis()
+    holon.tokens.trust()
     holon.sense(PlatformState(LIFT, False, False, 0), 5)
     pitch_mm = SITE.tracks[SHAFT].pitch_mm
     holon.sense(DriveState(LIFT, 4, (index - 1) * pitch_mm, 0, DriveMode.STANDING, True), 10)

@@ -121,7 +121,7 @@ LAYERS: dict[str, Layer] = {
             *CORE_TYPES,
             *SYSTEM_TYPES,
             "onboard.config.problems",
-            *("onboard.core.authority", "onboard.core.lifts"),
+            *(f"onboard.core.{name}" for name in ("authority", "holding", "lifts", "regeneration")),
             "onboard.gateway.pauses",
             "onboard.gateway.whereabouts",
             "onboard.ports",

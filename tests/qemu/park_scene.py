@@ -47,9 +47,12 @@ def scene(site: SiteRun) -> dict[str, object]:
 
     status = site.statuses(["plant"], 150)
     site.tell("the plant's run is over")
+    stopped_at = len(ears.read())
     site.tool("cansend", "can0", plan["stop"])
-    status |= site.statuses(site.order.machines, 20)
-    site.tell("all have stopped")
+    held: dict[str, str] = plan["held"]
+    everybody = "everybody holds, and says so"
+    site.wait(ears, everybody, lambda: set(held.values()) <= set(ears.frames[stopped_at:]), 20)
+    status |= site.end(site.order.machines)
     site.end(["candump", "candump-outside", "monitor"])
 
     part = site.share / "part.log"

@@ -45,7 +45,8 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site, Station
-from onboard.kinds.car_park.compartment import Compartment, CompartmentFactory
+from onboard.kinds.car_park.compartment import Compartment
+from onboard.kinds.car_park.compartment_factory import CompartmentFactory
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.program import Handling, Program, Step, Work
 from onboard.wire.codec import fleet_codec

@@ -2,6 +2,7 @@
 
 import os
 import re
+import select
 import signal
 import socket
 import subprocess
@@ -135,14 +136,17 @@ def test_a_run_of_any_system_leaves_a_whole_log(site: str, tmp_path: Path) -> No
 def test_a_campaign_leaves_no_worker(tmp_path: Path) -> None:
     with bus_sim("campaign", "small", "--seeds", "1-400", "--jobs", "2", folder=tmp_path) as running:
         children = set[int]()
-        # Two workers, and what counts their shared memory.
+        # Two workers, and what counts their shared memory, which ends once it hears that all others have.
         while len(children) < 3:
             assert running.poll() is None
             children = descendants(running.pid)
+        ends = [os.pidfd_open(child) for child in children]
         running.terminate()
         running.communicate()
     assert running.returncode == 130
-    assert [child for child in children if lives(child)] == []
+    for end in ends:
+        assert select.select([end], [], [], DEADLINE_S)[0], "a worker lives on"
+        os.close(end)
 
 
 def test_a_look_at_a_log_ends_by_its_own_way_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,12 +12,23 @@ from hypothesis import strategies as st
 
 from dbc import device_dbc_text, fleet_dbc_text
 from onboard.core import messages
-from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Reason, Side
+from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Reason, Side, TokenKind
 from onboard.core.frame import Frame
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Reference, Stamp
+from onboard.core.messages import (
+    CallForProposals,
+    EmergencyStop,
+    Itinerary,
+    Leg,
+    Message,
+    Reference,
+    Stamp,
+    TokenHeld,
+)
+from onboard.core.recovery_messages import Go
 from onboard.wire.codec import Codec, Part, device_codec, fleet_codec
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts
 from onboard.wire.decoder import MAX_SETS, SET_TIMEOUT_US, Decoder
+from tests.sites import one_floor
 from tests.wire.samples import judge_of, random_frames, signal_values
 
 FRAMES = 30_000
@@ -300,6 +311,31 @@ def test_memory_is_bounded_and_the_oldest_sets_are_counted_as_they_go() -> None:
     assert len(decoder._sets) < MAX_SETS == len(decoder._whole)
     memory = fleet_codec()._part.cache_info()
     assert memory.maxsize is not None and memory.currsize <= memory.maxsize
+
+
+def test_a_sender_who_opens_sets_without_end_drops_its_own() -> None:
+    decoder = Decoder(fleet_codec())
+    head, *legs = fleet_codec().encode(a_plan(11, 1, 2))
+    decoder.feed(head, 0)
+    for sender in (240, 241):
+        for version in range(1, 250):
+            decoder.feed(fleet_codec().encode(a_plan(sender, version, 2))[0], 0)
+    found = [decoder.feed(leg, 0) for leg in legs]
+    assert found[-1] == a_plan(11, 1, 2)
+
+
+def test_who_watches_a_site_takes_up_what_its_machines_listen_to() -> None:
+    site = one_floor()
+    decoder = Decoder(fleet_codec(), site.machines)
+    heard: list[Message] = [
+        TokenHeld(11, TokenKind.SEGMENT, 1, 2),
+        TokenHeld(240, TokenKind.SEGMENT, 1, 2),
+        Go(11, 0),
+        Go(251, 0),
+    ]
+    said = [decoder.feed(fleet_codec().encode(one)[0], 0) for one in (*heard, EmergencyStop(240, Reason.OPERATOR))]
+    assert [one.sender for one in said if one is not None] == [11, 251, 240]
+    assert decoder.drops == {Reason.NOT_OF_SITE: 1, Reason.NOT_OF_KIND: 1}
 
 
 # --- our own mistakes ------------------------------------------------------------------------------------------

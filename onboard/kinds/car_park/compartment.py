@@ -33,6 +33,7 @@ from onboard.core.codes import (
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import (
     BayState,
+    CarAt,
     DeskEvent,
     DoorState,
     Message,
@@ -41,10 +42,9 @@ from onboard.core.messages import (
     TaskReport,
     TokenRequest,
 )
-from onboard.core.mirror import Mirror
-from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, Estimator, NegotiationEvent
+from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.serial import successor
-from onboard.core.site import Machine, Site, Station
+from onboard.core.site import Station
 from onboard.kinds.car_park import bay_task, custody
 from onboard.kinds.car_park.bay_generation import BayGeneration
 from onboard.kinds.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
@@ -54,20 +54,6 @@ from onboard.kinds.car_park.outputs import BayOutputs
 from onboard.kinds.car_park.program import Program
 from onboard.kinds.car_park.site import car_park
 from onboard.kinds.car_park.stewardship import Stewardship
-
-
-class CompartmentFactory:
-    """Makes compartments."""
-
-    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
-        """The compartment's task-generation function."""
-        return BayGeneration(site, machine)
-
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Compartment":
-        """The compartment's steps; ``estimator`` is the one made above."""
-        if not isinstance(estimator, BayGeneration):
-            raise TypeError("a compartment needs its own task-generation function")
-        return Compartment(fleet, estimator)
 
 
 @dataclass
@@ -311,6 +297,12 @@ class Compartment:
             return effects
         return effects + self._to_free()
 
+    def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
+        """My journal is lost and my rights were made anew: whatever was meant with the car in my bay, it is parked."""
+        self.stewardship.left = None
+        self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        return [job_record(*self.memory.job), *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+
     def _take_up_job(self, now_us: int) -> list[Effect]:
         """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
         assert self.memory.job is not None
@@ -342,6 +334,8 @@ class Compartment:
         assert self.bay is not None and self.doors is not None
         if not self._is(DoorName.INPUT, DoorPosition.OPEN):
             return []
+        if self.stewardship.left is not None and self.bay.load_kg:
+            return self._park_again(self.stewardship.left, now_us)
         if self._key_pressed:
             self._key_pressed = False
             return self._admit(now_us)

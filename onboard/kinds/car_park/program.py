@@ -19,6 +19,9 @@ from onboard.core.site import Segment, Site, Station
 MAX_STEPS = 31
 #: Farthest end of a leg after the stamp: 24 bits of milliseconds (4.6 h).
 MAX_LEG_US = ((1 << 24) - 1) * 1000
+#: A stamp that lies farther ahead of its own machine's clock than this was made by a clock that was wrong, us. Ours:
+#: awards come at the end of a call, which is seconds away.
+STAMP_AHEAD_US = 60_000_000
 
 
 class Handling(Enum):
@@ -210,6 +213,9 @@ class Program:
         steps, stamp = self.remaining, self.stamp
         if not steps:
             return standing_itinerary(sender, self.version, stamp, self._place(), now_us)
+        if not _reaches(stamp, steps, now_us):
+            # Hours late, or awarded while a clock was wrong: its place among the plans is that of one made now.
+            stamp = stamp._replace(award_ms=to_bus_ms(now_us))
         return to_itinerary(sender, self.version, Grade.FIRM, stamp, steps)
 
 
@@ -263,6 +269,12 @@ def to_itinerary(sender: int, version: int, grade: Grade, stamp: Stamp, steps: l
         for step in steps
     )
     return Itinerary(sender, version, grade, stamp, legs)
+
+
+def _reaches(stamp: Stamp, steps: list[Step], now_us: int) -> bool:
+    """Whether a stamp is of before now, and all legs' ends can be told from it."""
+    award_us = from_bus_ms(stamp.award_ms, now_us)
+    return award_us <= now_us + STAMP_AHEAD_US and steps[-1].end_us - award_us <= MAX_LEG_US
 
 
 def _leg_end_ms(end_us: int, award_ms: int) -> int:

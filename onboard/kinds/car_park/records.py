@@ -10,12 +10,13 @@ _TASK = ("task_origin", "task")
 RECORDS: Rules = {
     # recovery.py: a task is in hand from its award until its car is left, or it is another's.
     "award": (Keep("award", _TASK),),
-    "forfeited": (End(("award", "handled"), _TASK),),
+    "sink": (Keep("sink", _TASK),),
+    "forfeited": (End(("award", "handled", "sink"), _TASK),),
     # The last handling also ends the shuttle's step; the last car that was left is told to whoever asks.
     "handled": (
         Keep("handled", _TASK),
         Keep("last_handled"),
-        End(("award", "handled"), _TASK, ("handling", (Handling.LEAVE.value,))),
+        End(("award", "handled", "sink"), _TASK, ("handling", (Handling.LEAVE.value,))),
         Keep("left", ("handling",)),
     ),
     "step": (Keep("step"),),

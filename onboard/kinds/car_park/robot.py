@@ -201,6 +201,7 @@ class Robot:
             self._begun = False
         if not rest and self.carriage.standing_at is not None:
             self.program.standing = self.carriage.standing_at
+            self.carriage.go(self.carriage.standing_at)
         planned = [step.work for step in rest]
         self.program.replace(rest, self.program.stamp, [work for work in works if work not in planned])
         effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
@@ -352,18 +353,18 @@ class Robot:
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
         return mine
 
-    def _started(self, planned: tuple[Step, ...], calls: list[CallForProposals], now_us: int) -> list[Effect]:
+    def _started(self, planned: tuple[Step, ...] | None, calls: list[CallForProposals], now_us: int) -> list[Effect]:
         """The start is over, and the program taken up: tell the plan, and call for rides in what was planned now."""
         # What a restart has left in hand is the first step, and was begun before.
-        self._begun = len(planned) < len(self.program.steps)
+        self._begun = len(planned or ()) < len(self.program.steps)
         effects: list[Effect] = []
         if self.recovery.is_restart:
             effects.append(Report("goes on after a restart: " + "; ".join(str(step) for step in self.program.steps)))
-        if self.program.unplanned:
-            # Somebody is in the way: it is tried again, and what was not touched is given back if that lasts.
+        if planned is None:
+            # Somebody is in the way, of work or to a refuge: it is tried again, and what was not touched is given back.
             self.going_around.turn_later(now_us)
         effects += self._publish(now_us)
-        return effects + (call_lifts(self.fleet, calls[0], planned, now_us) if calls else [])
+        return effects + (call_lifts(self.fleet, calls[0], planned or (), now_us) if calls else [])
 
     def _take_on(
         self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], version: int, now_us: int

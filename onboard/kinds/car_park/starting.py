@@ -21,7 +21,7 @@ from onboard.core.site import Segment
 from onboard.kinds.car_park.generation import CarParkGeneration
 from onboard.kinds.car_park.handling import ShuttleWork
 from onboard.kinds.car_park.program import Step, ends_at, standing_itinerary
-from onboard.kinds.car_park.recovery import Recovery
+from onboard.kinds.car_park.recovery import Recovery, floor_record
 from onboard.kinds.car_park.riding import Riding
 from onboard.kinds.car_park.travel import Carriage
 
@@ -74,7 +74,7 @@ class Body(NamedTuple):
 class Starting:
     """One robot's start. ``announce()`` is called once it stands, ``started(planned, calls, now)`` once it is over.
 
-    ``planned`` are the steps behind what was in hand, ``calls`` those of the tasks, both as the program has them then.
+    ``planned`` are the steps behind what was in hand, None where there was no way; ``calls`` are those of the tasks.
     """
 
     fleet: Fleet
@@ -82,7 +82,7 @@ class Starting:
     body: Body
     recovery: Recovery
     announce: Callable[[], list[Effect]]
-    started: Callable[[tuple[Step, ...], list[CallForProposals], int], list[Effect]]
+    started: Callable[[tuple[Step, ...] | None, list[CallForProposals], int], list[Effect]]
     stage: Stage = Stage.UNPLACED
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
@@ -116,20 +116,28 @@ class Starting:
 
         In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
         """
-        carriage = self.body.carriage
+        carriage, told = self.body.carriage, self.fleet.slots_told
+        effects: list[Effect] = []
+        if told:
+            # A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
+            self.fleet.slots_told, carriage.track, self.recovery.is_restart = (), told[0].track, True
+            effects.append(floor_record(told[0].track))
         here = carriage.standing_at
         assert carriage.sensed is not None
         if here is not None and here == carriage.nearest:
-            return self._is_placed(here, now_us)
+            return effects + self._is_placed(here, now_us)
+        out = carriage.way_out
+        if out is not None and carriage.goal is not None and carriage.goal != out:
+            carriage.go(out)
         shuttle = self.body.shuttle.sensed
         rests = carriage.sensed.mode in (DriveMode.STANDING, DriveMode.FAULT)
         if carriage.goal is None and rests and shuttle is not None and shuttle.mode in AT_REST:
             if shuttle.mode is not ShuttleMode.HOME:
-                return self._hold(self.recovery.contradiction(None, shuttle))
+                return effects + self._hold(self.recovery.contradiction(None, shuttle))
             if not self.generation.is_held:
                 # It asks first for what it is in: it may have been pushed there while it was off.
-                carriage.go(carriage.nearest)
-        return carriage.advance(now_us) if carriage.goal is not None else []
+                carriage.go(out or carriage.nearest)
+        return effects + (carriage.advance(now_us) if carriage.goal is not None else [])
 
     def _is_placed(self, here: Segment, now_us: int) -> list[Effect]:
         """Stand here and tell everybody; after a restart go on a little later."""
@@ -215,7 +223,7 @@ class Starting:
         if calls:
             stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF)
         self.generation.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
-        return self.started(more or (), calls, now_us)
+        return self.started(more, calls, now_us)
 
     def _resume(self, step: Step) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""

@@ -47,6 +47,8 @@ class Stewardship:
     #: The task that each car's winner has won and its version.
     tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
+    #: A car in my own bay, compartment, that I know nothing of but by others since my rights were made anew.
+    left: CarAt | None = None
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
     #: Since when the winner of each car has said nothing that shows that it knows of its award.
     _unheard_us: dict[Reference, int] = field(default_factory=dict)
@@ -114,7 +116,8 @@ class Stewardship:
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
         effects: list[Effect] = []
-        lost = {winner for winner in self.fleet.mirror.obstacles.machines if self._is_lost(winner, now_us)}
+        obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
+        lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
         deaf = {car for car, since_us in self._unheard_us.items() if now_us - since_us >= UNHEARD_AFTER_US}
         of_lost = [car for car, winner in self.winners.items() if winner in lost or car in deaf]
         for car in of_lost if lost or deaf else []:
@@ -122,6 +125,13 @@ class Stewardship:
                 task, version = self.tasks[car]
                 effects += self.won(car, NOBODY, task, version)
                 self._say_at_us[car] = now_us
+        forgetful &= set(obstacles)
+        for car, told in list(self.fleet.cars_told.items()):
+            if self.fleet.tokens.holds(car_token(*car)):
+                del self.fleet.cars_told[car]
+                effects += custody.state(self.fleet, car, told.station, told.wheelbase_mm)
+                own = self.fleet.site.compartments.get(self.fleet.node_id)
+                self.left = told if own is not None and told.station == own.number else self.left
         for car in [car for car, due_us in self._say_at_us.items() if due_us <= now_us]:
             record = self.fleet.mirror.cars.get(car)
             gone = record is None or record.station == OUTSIDE

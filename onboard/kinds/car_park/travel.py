@@ -16,9 +16,9 @@ from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.lifts import MARK_TOLERANCE_MM, gate, platform
+from onboard.core.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
-from onboard.core.motion_authority import MotionState, authorised
+from onboard.core.motion_authority import MotionState, authorised, needs_no_proof
 from onboard.core.refuges import refuges
 from onboard.core.serial import successor
 from onboard.core.site import Segment, TrackKind
@@ -110,6 +110,19 @@ class Carriage:
         return Segment(self.track, index) if index or self.axis.mouth is None else self.axis.mouth
 
     @property
+    def way_out(self) -> Segment | None:
+        """The alley's position beside the sill that the body is across, where its lift is an obstacle; else None.
+
+        The gate in hand keeps the lift where the body came from: that way it can always leave, and aboard it cannot.
+        """
+        obstacles, site = self.fleet.mirror.obstacles.machines, self.fleet.site
+        here = self.occupied()
+        lifts = {slot.track for slot in here if slot.index == GATE_INDEX and slot.track in site.lifts}
+        if not any(site.stewards[lift] in obstacles for lift in lifts):
+            return None
+        return next((slot for slot in here if slot.track == self.track), None)
+
+    @property
     def arrived(self) -> bool:
         """Whether the carrier stands at its goal."""
         return self.goal is not None and self.standing_at == self.goal
@@ -189,8 +202,11 @@ class Carriage:
         return abs(state.position_mm - axis.position_mm(axis.index_at(state.position_mm))) > OFF_LIMIT_MM
 
     def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
-        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known."""
-        if self.sensed is None:
+        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known.
+
+        A journal that is lost knew the track; the drive alone knows only where on it.
+        """
+        if self.sensed is None or self.fleet.has_no_rights:
             return []
         here, offset_mm = self._told_at(self.sensed)
         self._reported = here
@@ -272,7 +288,7 @@ class Carriage:
 
     def next_wake(self) -> int | None:
         """When the drive's order is to be repeated, or something is to be done about missing tokens."""
-        asks = self.goal is not None and self.sensed is not None and not self.arrived
+        asks = self.goal is not None and self.sensed is not None and not self.arrived and self.is_clear()
         asking = [self.whole.due_us, self._patience_over_us(), self.sill.next_wake()]
         times = [self.refresh_at_us, *(asking if asks else [])]
         due = [time for time in times if time is not None]
@@ -348,9 +364,10 @@ class Carriage:
 
     def _reach(self, ahead: list[int]) -> tuple[Segment | None, Reason]:
         """The last position of the unbroken authorised line, or None and why not even the first step is allowed."""
-        state = MotionState(
-            self.fleet.tokens, self.sensed is not None, self.stopped, lambda slot: self.sill.lacks(slot, self.track)
-        )
+        # Out of a sill, to the side from where the body came, nothing need be proved.
+        is_out = self.goal is not None and self.goal == self.way_out
+        proof = needs_no_proof if is_out else lambda slot: self.sill.lacks(slot, self.track)
+        state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped, proof)
         for slot in self.occupied():
             allowed, reason = authorised(state, slot)
             if not allowed:

@@ -149,6 +149,9 @@ class OneCustodian(Rule):
 
     def _on_car(self, event: Event[CarAt]) -> None:
         said = event.message
+        if self.picture.tokens.is_frozen(event.time_us):
+            # Whoever remembers where a lost machine's car stands says so in its place.
+            return
         self._stated[said.sender, said.station] = event.time_us
         self._named[said.sender] = said.station
         self._stated.move_to_end((said.sender, said.station))

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from onboard.core.codes import MAX_NODE_ID, KindCode, Reason
+from onboard.core.codes import Reason
 from onboard.core.frame import Frame
-from onboard.core.messages import BusTime, EmergencyStop, Message
+from onboard.core.messages import BusTime, Message
 from onboard.core.site import Site
 from onboard.trace.candump_reader import CandumpReader, Record
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
@@ -26,6 +26,7 @@ from onboard.trace.check.rule import Rule
 from onboard.trace.check.shuttles import TornCar
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.decoder import Decoder
+from onboard.wire.speakers import why_unheard
 
 #: Every rule, in the order in which the report names them.
 RULES: tuple[type[Rule], ...] = (
@@ -178,7 +179,10 @@ class Checks:
         self._excused_us = self._picture.excused_us = max(self._excused_us, until_us)
 
     def excuse_clocks(self, until_us: int) -> None:
-        """Until then, us of the log, clocks are wrong on purpose: a deadline is over when its machine thinks so."""
+        """Until then, us of the log, clocks are wrong on purpose.
+
+        A deadline is over when its machine thinks so, and bus time that goes back is no other run.
+        """
         self._clocks_until_us = self._picture.clock_settles_us = until_us + SETTLING_US
 
     def feed(self, time_us: int, channel: str, frame: Frame) -> None:
@@ -196,22 +200,13 @@ class Checks:
         elif decoder.drops.total() != before:
             self._count_drops(decoder)
 
-    def _why_unheard(self, message: Message) -> Reason:
-        """Why no machine listens to a message, so that it says nothing about the fleet: NONE where they do."""
-        kinds = self._codecs[0].speakers.get(type(message))
-        if self._site is None or kinds is None or isinstance(message, EmergencyStop):
-            return Reason.NONE
-        machine = self._site.machines.get(message.sender)
-        if machine is None and message.sender <= MAX_NODE_ID:
-            return Reason.NOT_OF_SITE
-        kind = KindCode.OBSERVER if machine is None else machine.kind
-        return Reason.NONE if kind in kinds else Reason.NOT_OF_KIND
-
     def feed_message(self, time_us: int, message: Message, channel: str = "", frame: Frame | None = None) -> None:
         """One whole message, with the frame that completed it where there is one."""
-        if (why := self._why_unheard(message)) is not Reason.NONE:
-            self.verdict.unknown[why.name] += 1
-            return
+        if self._site is not None:
+            why = why_unheard(message, self._site.machines, self._codecs[0].speakers)
+            if why is not Reason.NONE:
+                self.verdict.unknown[why.name] += 1
+                return
         time_us = self._orderly(time_us, message)
         self.verdict.messages += 1
         event = Event(time_us, message, channel, frame)
@@ -247,7 +242,7 @@ class Checks:
         """The time to go by: a little back is held, much back is another run, as is bus time that starts anew."""
         last_us, offset_us = self._last_us, self._picture.offset_us
         back_us = 0 if last_us is None else last_us - time_us
-        anew = isinstance(message, BusTime) and offset_us is not None
+        anew = isinstance(message, BusTime) and offset_us is not None and time_us >= self._clocks_until_us
         # A bus time that stands still while the log goes on is one that began anew as well.
         anew = anew and isinstance(message, BusTime) and time_us - message.bus_time_us - (offset_us or 0) > BACK_US
         if back_us > BACK_US or anew:

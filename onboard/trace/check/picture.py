@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from onboard.core.codes import KindCode, MachineState, ManualMode
 from onboard.core.messages import BusTime, Heartbeat, ManualState, Message, Progress, TokenGrant, TokenHeld
+from onboard.core.recovery_messages import Regeneration, TokenAssigned
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import Event
@@ -98,10 +99,8 @@ class Picture:
                 before_us, self.offset_us = self.offset_us, time_us - bus_us
                 if before_us is not None and abs(self.offset_us - before_us) > JUMP_US:
                     self.clock_settles_us = max(self.clock_settles_us, time_us + SETTLING_US)
-            case TokenGrant() as grant:
-                self.tokens.on_grant(grant, time_us)
-            case TokenHeld() as held:
-                self.tokens.on_held(held, time_us)
+            case TokenGrant() | TokenHeld() | TokenAssigned() | Regeneration() as word:
+                self.tokens.feed(word, time_us)
             case Progress() as progress if self._site is not None:
                 body = body_of(self._site, progress, time_us)
                 if body is not None:

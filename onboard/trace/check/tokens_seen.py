@@ -3,8 +3,9 @@
 from collections import OrderedDict, deque
 from typing import NamedTuple
 
-from onboard.core.codes import KindCode, TokenKind
+from onboard.core.codes import KindCode, RegenerationPhase, TokenKind
 from onboard.core.messages import TokenGrant, TokenHeld
+from onboard.core.recovery_messages import Regeneration, TokenAssigned
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, Station
 
@@ -14,6 +15,8 @@ VERSION_BITS = 16
 MEMORY = 8
 #: Most tokens remembered: all of the largest site, and the cars of many days. The one longest silent is forgotten.
 MOST_TOKENS = 20_000
+#: A freeze that is not said again for so long is over, us (onboard/core/regeneration.py).
+FORGOTTEN_US = 10_000_000
 #: A frame may overtake another of its own sender, whose identifier is larger, by some bursts on a busy bus, us.
 OVERTAKING_US = 100_000
 
@@ -48,6 +51,9 @@ class TokensSeen:
         self.from_start = False
         self._site = site
         self._past: OrderedDict[Token, deque[Handover]] = OrderedDict()
+        #: What an operator's tool has assigned, until it says that it counts.
+        self._assigned: dict[Token, TokenAssigned] = {}
+        self._step, self._step_us = RegenerationPhase.NONE, 0
 
     def last(self, token: Token) -> Handover | None:
         """The newest handover heard of."""
@@ -95,6 +101,34 @@ class TokensSeen:
     def on_held(self, held: TokenHeld, time_us: int) -> None:
         """Take up a statement; it tells something new only where the grant is not in the log."""
         self._learn(Token(held.token_kind, held.token), Handover(held.version, 0, held.sender, time_us))
+
+    def feed(self, word: TokenGrant | TokenHeld | TokenAssigned | Regeneration, time_us: int) -> None:
+        """Take up one word about tokens."""
+        match word:
+            case TokenGrant():
+                self.on_grant(word, time_us)
+            case TokenHeld():
+                self.on_held(word, time_us)
+            case _:
+                self.on_operator(word, time_us)
+
+    def is_frozen(self, now_us: int) -> bool:
+        """Whether all stand, so that rights can be made anew: not long after the last word of it."""
+        is_begun = self._step in (RegenerationPhase.FREEZE, RegenerationPhase.READ_BACK)
+        return is_begun and now_us - self._step_us < FORGOTTEN_US
+
+    def on_operator(self, word: TokenAssigned | Regeneration, time_us: int) -> None:
+        """A line of a list of rights that are made anew, or a step: the list counts from COMMIT on, else it is over."""
+        if isinstance(word, TokenAssigned):
+            if len(self._assigned) < MOST_TOKENS:
+                self._assigned[Token(word.token_kind, word.token)] = word
+            return
+        self._step, self._step_us = word.regeneration_phase, time_us
+        if word.regeneration_phase is RegenerationPhase.COMMIT:
+            for token, one in self._assigned.items():
+                self._learn(token, Handover(one.version, 0, one.holder, time_us))
+        if word.regeneration_phase is not RegenerationPhase.READ_BACK:
+            self._assigned.clear()
 
     def _learn(self, token: Token, handover: Handover) -> None:
         past = self._past.get(token)

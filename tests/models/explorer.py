@@ -1,0 +1,499 @@
+"""Every interleaving of the shipped token book and witness: a few nodes, one token, and the worst of buses.
+
+What was said once may be heard by any node at any later time, in any order, often or never. Nodes crash between any two
+effects and start again from their journal, or from an old copy of it; a node that the site does not have says whatever
+it likes. Looked for: two holders; and traps, states from which no node ever holds the token again although all live
+and nothing is lost any more. An answer to a question at a restart is heard whole or not at all, within that life; where
+a node starts from an old copy all others live, as who is away can be no witness, and what was said before is heard no
+more: to change a medium takes longer than any frame.
+
+``python -m tests.models.explorer --help`` explores more than the gate does.
+"""
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from bus_sim.sites import find_site
+from onboard.core.authority import Grant, TokenBook, TokenKey, genesis_holder
+from onboard.core.belief import Belief
+from onboard.core.codes import NOBODY, KindCode, MachineState, Reason, TokenKind
+from onboard.core.effects import Effect, Record, Send
+from onboard.core.messages import Message, SyncRequest, TokenGrant, TokenHeld, TokenRequest
+from onboard.core.mirror import Mirror, Peer
+from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
+from onboard.core.witness import Doubt, Witness
+from tests.core.token_words import hear
+
+SITE = find_site("small")
+KEY = TokenKey(TokenKind.STATION, next(iter(SITE.compartments.values())).number)
+#: No machine of the site.
+GHOST = 240
+Thing = TypeVar("Thing")
+#: Any moment: whatever is to be said again is due.
+_NOW_US = 1 << 40
+#: One line of a journal: record, version, holder.
+Line = tuple[str, int, int]
+Journal = tuple[Line, ...]
+
+
+class Memory(NamedTuple):
+    """What one node remembers of the token; hints, counts and times are left out, as nothing is decided by them."""
+
+    held: int | None = None
+    leaving: tuple[int, int] | None = None
+    seen: int | None = None
+    given: Belief | None = None
+    belief: Belief | None = None
+    disputed: TokenGrant | None = None
+    is_synced: bool = True
+    asked: frozenset[int] = frozenset()
+    answered: frozenset[int] = frozenset()
+    doubted: tuple[tuple[int, int], ...] = ()
+    doubt: bool = False
+    starting: frozenset[int] = frozenset()
+    is_gift: bool = False
+
+
+#: What a node has yet to do: lines for its journal and words for the bus.
+Deeds = tuple[Line | Message, ...]
+
+
+class State(NamedTuple):
+    """Of each node: its memory (None while it is down), what it has yet to do, its journal; and the bus.
+
+    All but the counts are numbers of things in the explorer's tables; ``bus`` has a bit for each word said.
+    """
+
+    memory: tuple[int | None, ...]
+    todo: tuple[int, ...]
+    journal: tuple[int, ...]
+    bus: int
+    crashes: int
+    old_copies: int
+
+
+@dataclass
+class Table(Generic[Thing]):
+    """Things by number, in the order in which they came."""
+
+    things: list[Thing] = field(default_factory=list)
+    _numbers: dict[Thing, int] = field(default_factory=dict)
+
+    def number(self, thing: Thing) -> int:
+        """The number of a thing, new or known."""
+        found = self._numbers.get(thing)
+        if found is None:
+            found = self._numbers[thing] = len(self.things)
+            self.things.append(thing)
+        return found
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much is explored: nodes, newest version, crashes, starts from an old copy of the journal; a ghost; CPU s."""
+
+    nodes: int = 3
+    versions: int = 2
+    crashes: int = 1
+    old_copies: int = 0
+    has_ghost: bool = False
+    most_s: float = 1e9
+
+
+@dataclass
+class Found:
+    """What an exploration found; ``two`` and ``trap`` are the first states of their kind."""
+
+    states: int = 0
+    transitions: int = 0
+    is_complete: bool = False
+    two: State | None = None
+    trap: State | None = None
+    spent_s: float = 0.0
+    held_for_a_person: int = 0
+
+
+@dataclass
+class Explorer:
+    """Depth first, every reachable state once; what a node does with a word is worked out once for each memory."""
+
+    limits: Limits
+    found: Found = field(default_factory=Found)
+    _memories: Table[Memory] = field(default_factory=Table)
+    _words: Table[Message] = field(default_factory=Table)
+    _deeds: Table[Deeds] = field(default_factory=Table)
+    _journals: Table[Journal] = field(default_factory=Table)
+    _done: dict[tuple[int, int, Message | None], tuple[int, int]] = field(default_factory=dict)
+    _seen_starting: dict[tuple[int, int, int], int] = field(default_factory=dict)
+    _started: dict[tuple[int, int], tuple[Memory, int]] = field(default_factory=dict)
+    _hold: dict[tuple[int, int], bool] = field(default_factory=dict)
+    _ends_well: dict[Any, bool] = field(default_factory=dict)
+    _ghosts: int = 0
+
+    def __post_init__(self) -> None:
+        first = genesis_holder(SITE, KEY)
+        others = [node for node in sorted(SITE.machines) if node != first]
+        self.nodes = [first, *others][: self.limits.nodes]
+        assert self._deeds.number(()) == 0, "nothing to do is number 0"
+        self._requests = [TokenRequest(node, *KEY, 0, 0, 0) for node in self.nodes]
+
+    # --- one node ----------------------------------------------------------------------------------------------
+
+    def _load(self, node: int, memory: Memory) -> tuple[TokenBook, Witness]:
+        book = TokenBook(SITE, node)
+        if memory.held is not None:
+            book.held[KEY] = memory.held
+        if memory.leaving is not None:
+            book.leaving[KEY] = Grant(*memory.leaving, 0)
+        if memory.seen is not None:
+            book.seen[KEY] = memory.seen
+        if memory.given is not None:
+            book.given[KEY] = memory.given
+        if memory.belief is not None:
+            book.beliefs.verified[KEY] = memory.belief
+        if memory.disputed is not None:
+            book._disputed[KEY] = memory.disputed
+        book.is_synced, book.asked = memory.is_synced, set(memory.asked)
+        return book, self._witness(book, memory)
+
+    def _witness(self, book: TokenBook, memory: Memory) -> Witness:
+        mirror = Mirror(SITE, book.node_id)
+        for node in self.nodes:
+            if node != book.node_id:
+                mirror.peers[node] = Peer(KindCode.ROBOT, MachineState.IDLE, 2, 0, _NOW_US, 0, 0)
+        witness = Witness(book, mirror, 2, True, lambda _: book.statements())
+        witness.answered = set(memory.answered)
+        witness.doubt = Doubt(Reason.JOURNAL_SHORT, NOBODY, "") if memory.doubt else None
+        witness.doubted = {node: {KEY: version} for node, version in memory.doubted}
+        witness.starting = set(memory.starting)
+        if memory.is_gift:
+            book.gifts.add(KEY)
+        # It has listened for long enough whenever all have answered.
+        witness._since_us = 0
+        return witness
+
+    def _save(self, book: TokenBook, witness: Witness) -> Memory:
+        leaving = book.leaving.get(KEY)
+        return Memory(
+            book.held.get(KEY),
+            leaving and (leaving.version, leaving.holder),
+            book.seen.get(KEY),
+            book.given.get(KEY),
+            book.beliefs.verified.get(KEY),
+            book._disputed.get(KEY),
+            book.is_synced,
+            frozenset(book.asked & set(self.nodes)),
+            frozenset(witness.answered),
+            tuple((node, lost[KEY]) for node, lost in sorted(witness.doubted.items()) if KEY in lost),
+            witness.doubt is not None,
+            frozenset(witness.starting & set(self.nodes)),
+            bool(witness.starting) and KEY in book.gifts,
+        )
+
+    def hears(self, i: int, memory: int, word: Message | None) -> tuple[int, int]:
+        """What node i makes of a word, None for the time that passes: its memory after it, and its deeds."""
+        case = i, memory, word
+        known = self._done.get(case)
+        if known is None:
+            book, witness = self._load(self.nodes[i], self._memories.things[memory])
+            deeds = _deeds(self._handle(book, witness, word))
+            known = self._memories.number(self._save(book, witness)), self._deeds.number(deeds)
+            self._done[case] = known
+        return known
+
+    def _handle(self, book: TokenBook, witness: Witness, word: Message | None) -> list[Effect]:
+        if word is None:
+            return book.wake(_NOW_US)
+        if isinstance(word, SyncRequest):
+            return witness.on_request(word, _NOW_US)
+        if isinstance(word, SyncDone):
+            return witness.on_done(word, _NOW_US)
+        if isinstance(word, TokenHeld | TokenGrant | TokenGiven | TokenSeen | TokenRequest):
+            witness.hear(word)
+        return hear(book, word, _NOW_US)
+
+    def starts(self, i: int, journal: int) -> tuple[Memory, int]:
+        """Node i begins again with what its journal says: its memory, and what it says, as bits of the bus."""
+        known = self._started.get((i, journal))
+        if known is None:
+            book = TokenBook(SITE, self.nodes[i])
+            book.replay(
+                {"record": record, "kind": int(KEY.kind), "number": KEY.number, "version": version, "holder": holder}
+                for record, version, holder in self._journals.things[journal]
+            )
+            witness = self._witness(book, Memory())
+            said = self._bits(_deeds(witness.begin(0)))
+            known = self._started[i, journal] = self._save(book, witness), said
+        return known
+
+    def _sees_start(self, j: int, memory: int, started: int) -> int:
+        """A live node hears the first heartbeat of one that was started, and asks it."""
+        known = self._seen_starting.get((j, memory, started))
+        if known is None:
+            book, witness = self._load(self.nodes[j], self._memories.things[memory])
+            witness._was_started(started)
+            book.asked.add(started)
+            known = self._seen_starting[j, memory, started] = self._memories.number(self._save(book, witness))
+        return known
+
+    def _bits(self, deeds: Deeds) -> int:
+        return sum(1 << self._words.number(word) for word in set(deeds) if isinstance(word, Message))
+
+    # --- all of them -------------------------------------------------------------------------------------------
+
+    def _holders(self, state: State) -> list[int]:
+        found = []
+        for i, memory in enumerate(state.memory):
+            if memory is None:
+                continue
+            holds = self._hold.get((i, memory))
+            if holds is None:
+                holds = self._hold[i, memory] = _holds(self.nodes[i], self._memories.things[memory])
+            if holds:
+                found.append(i)
+        return found
+
+    def _on_bus(self, state: State) -> Iterator[Message]:
+        bits, number = state.bus, 0
+        while bits:
+            if bits & 1:
+                yield self._words.things[number]
+            bits, number = bits >> 1, number + 1
+
+    def steps(self, state: State) -> Iterator[State]:
+        """All states that may come next."""
+        words: list[Message | None] = [None, *self._on_bus(state), *self._requests]
+        for i, memory in enumerate(state.memory):
+            if memory is None:
+                yield from self._restarts(state, i)
+                continue
+            if state.crashes < self.limits.crashes:
+                yield self._crash(state, i)
+            if state.todo[i]:
+                yield self._carry_out(state, i)
+                continue
+            yield from self._hearings(state, i, memory, words)
+            for j in range(len(self.nodes)):
+                if self._asks(state, j, i) and not state.todo[j]:
+                    yield self._answers(state, i, j)
+
+    def _hearings(self, state: State, i: int, memory: int, words: list[Message | None]) -> Iterator[State]:
+        node = self.nodes[i]
+        for word in words:
+            if word is not None and word.sender == node:
+                continue
+            after, deeds = self.hears(i, memory, word)
+            if (after != memory or deeds) and (self._memories.things[after].seen or 0) <= self.limits.versions:
+                yield state._replace(memory=_set(state.memory, i, after), todo=_set(state.todo, i, deeds))
+
+    def _asks(self, state: State, j: int, i: int) -> bool:
+        """Whether node j waits for an answer of node i."""
+        memory = state.memory[j]
+        return memory is not None and self.nodes[i] in self._memories.things[memory].asked
+
+    def _crash(self, state: State, i: int) -> State:
+        return state._replace(
+            memory=_set(state.memory, i, None), todo=_set(state.todo, i, 0), crashes=state.crashes + 1
+        )
+
+    def _restarts(self, state: State, i: int) -> Iterator[State]:
+        yield self._restarted(state, i, state.journal[i])
+        if state.old_copies < self.limits.old_copies and sum(one is None for one in state.memory) == 1:
+            journal = self._journals.things[state.journal[i]]
+            for length in range(len(journal)):
+                old = state._replace(old_copies=state.old_copies + 1, bus=self._ghosts)
+                yield self._restarted(old, i, self._journals.number(journal[:length]))
+
+    def _restarted(self, state: State, i: int, journal: int) -> State:
+        node = self.nodes[i]
+        memory, said = self.starts(i, journal)
+        others = [
+            one if one is None or j == i else self._sees_start(j, one, node) for j, one in enumerate(state.memory)
+        ]
+        live = frozenset(self.nodes[j] for j, one in enumerate(others) if one is not None and j != i)
+        others[i] = self._memories.number(memory._replace(asked=live, is_synced=not live))
+        return state._replace(memory=tuple(others), journal=_set(state.journal, i, journal), bus=state.bus | said)
+
+    def _carry_out(self, state: State, i: int) -> State:
+        deed, *rest = self._deeds.things[state.todo[i]]
+        after = state._replace(todo=_set(state.todo, i, self._deeds.number(tuple(rest))))
+        if isinstance(deed, Message):
+            return after._replace(bus=state.bus | 1 << self._words.number(deed))
+        journal = self._journals.number((*self._journals.things[state.journal[i]], deed))
+        return after._replace(journal=_set(state.journal, i, journal))
+
+    def _answers(self, state: State, i: int, j: int) -> State:
+        """Node i answers node j: all that it vouches for, heard in one go; the others may hear it or not."""
+        memory, asking = state.memory[i], state.memory[j]
+        assert memory is not None and asking is not None
+        memory, answer = self.hears(i, memory, SyncRequest(self.nodes[j], self.nodes[i]))
+        todo: Deeds = ()
+        words = [word for word in self._deeds.things[answer] if isinstance(word, Message)]
+        for word in words:
+            asking, more = self.hears(j, asking, word)
+            todo += self._deeds.things[more]
+        asking = self._trusts(state, asking, j)
+        memories = _set(_set(state.memory, i, memory), j, asking)
+        said = self._bits(tuple(word for word in words if not isinstance(word, SyncDone)))
+        return state._replace(memory=memories, todo=_set(state.todo, j, self._deeds.number(todo)), bus=state.bus | said)
+
+    def _trusts(self, state: State, asking: int, j: int) -> int:
+        """Once all that live have answered, and nobody knew better, a node's rights are its own."""
+        memory = self._memories.things[asking]
+        live = {node for node, one in zip(self.nodes, state.memory, strict=True) if one is not None}
+        if memory.is_synced or memory.doubt or live - memory.answered - {self.nodes[j]}:
+            return asking
+        return self._memories.number(memory._replace(is_synced=True))
+
+    # --- traps -------------------------------------------------------------------------------------------------
+
+    def ends_well(self, state: State) -> bool:
+        """Whether, all alive and nothing lost, somebody comes to hold the token, or a person is told."""
+        state = self._quiet(state)
+        start = state.memory, state.journal
+        known = self._ends_well.get(start)
+        if known is None:
+            known = self._ends_well[start] = self._play_on(state._replace(bus=0))
+        return known
+
+    def _play_on(self, state: State) -> bool:
+        for i, one in enumerate(state.memory):
+            if one is None:
+                state = self._restarted(state, i, state.journal[i])
+        for _ in range(4 * self.limits.nodes):
+            for i in range(len(self.nodes)):
+                for j in range(len(self.nodes)):
+                    if self._asks(state, j, i):
+                        state = self._quiet(self._answers(state, i, j))
+            if any(one is not None and self._memories.things[one].doubt for one in state.memory):
+                self.found.held_for_a_person += 1
+                return True
+            if self._holders(state):
+                return True
+            state = self._all_hear(state._replace(bus=0))
+        return False
+
+    def _quiet(self, state: State) -> State:
+        while any(state.todo):
+            state = self._carry_out(state, next(i for i, todo in enumerate(state.todo) if todo))
+        return state
+
+    def _all_hear(self, state: State) -> State:
+        """Time passes for all, and each hears all that is said, in turn, until nothing new is said."""
+        heard: set[tuple[int, Message]] = set()
+        for i in range(len(self.nodes)):
+            state = self._one_hears(state, i, None)
+        while True:
+            new = [(i, word) for word in self._on_bus(state) for i in range(len(self.nodes)) if (i, word) not in heard]
+            if not new:
+                return state
+            for i, word in new:
+                heard.add((i, word))
+                if word.sender != self.nodes[i]:
+                    state = self._one_hears(state, i, word)
+
+    def _one_hears(self, state: State, i: int, word: Message | None) -> State:
+        memory = state.memory[i]
+        assert memory is not None
+        after, deeds = self.hears(i, memory, word)
+        return self._quiet(state._replace(memory=_set(state.memory, i, after), todo=_set(state.todo, i, deeds)))
+
+    def told(self, state: State) -> str:
+        """A state in full, for a person."""
+        lines = []
+        for i, node in enumerate(self.nodes):
+            memory = state.memory[i]
+            lines.append(f"node {node}: {'down' if memory is None else self._memories.things[memory]}")
+            lines.append(f"    to do {self._deeds.things[state.todo[i]]}")
+            lines.append(f"    journal {self._journals.things[state.journal[i]]}")
+        return "\n".join([*lines, f"bus {list(self._on_bus(state))}"])
+
+    # --- the search ----------------------------------------------------------------------------------------------
+
+    def begin(self) -> State:
+        """The token is with its first holder; the ghost has said all that it can."""
+        nodes = len(self.nodes)
+        said: set[Message] = set()
+        if self.limits.has_ghost:
+            version = self.limits.versions
+            for node in self.nodes:
+                said.add(TokenGrant(GHOST, *KEY, version, node))
+                said.add(TokenGiven(GHOST, *KEY, version, node))
+                said.add(TokenDispute(GHOST, *KEY, version, node))
+                said.add(TokenSeen(GHOST, *KEY, version, node))
+            said.add(TokenHeld(GHOST, *KEY, version))
+        memories = [self._memories.number(Memory(answered=frozenset(self.nodes) - {node})) for node in self.nodes]
+        journal = self._journals.number(())
+        self._ghosts = self._bits(tuple(said))
+        return State(tuple(memories), (0,) * nodes, (journal,) * nodes, self._ghosts, 0, 0)
+
+    def run(self) -> Found:
+        """Explore until all is seen, two hold the token, or the time is over."""
+        found, begin = self.found, self.begin()
+        seen, stack = {begin}, [begin]
+        began_s = time.process_time()
+        while stack and found.two is None and time.process_time() - began_s < self.limits.most_s:
+            state = stack.pop()
+            if found.trap is None and not self.ends_well(state):
+                found.trap = state
+            for after in self.steps(state):
+                found.transitions += 1
+                if after in seen:
+                    continue
+                seen.add(after)
+                if len(self._holders(after)) > 1:
+                    found.two = after
+                    break
+                stack.append(after)
+        found.states, found.is_complete = len(seen), not stack and found.two is None
+        found.spent_s = time.process_time() - began_s
+        return found
+
+
+def _holds(node: int, memory: Memory) -> bool:
+    at_first = memory.seen is None and genesis_holder(SITE, KEY) == node
+    return memory.is_synced and (memory.held is not None or at_first)
+
+
+def _deeds(effects: list[Effect]) -> Deeds:
+    """What goes to the journal and to the bus; questions are noted by who asks."""
+    found: list[Line | Message] = []
+    for effect in effects:
+        if isinstance(effect, Record):
+            entry = effect.entry
+            found.append((str(entry["record"]), int(entry["version"]), int(entry["holder"])))
+        elif isinstance(effect, Send) and not isinstance(effect.message, SyncRequest):
+            found.append(effect.message)
+    return tuple(found)
+
+
+def _set(values: tuple[Any, ...], at: int, value: Any) -> tuple[Any, ...]:
+    return (*values[:at], value, *values[at + 1 :])
+
+
+def main() -> None:
+    """Explore as the command line says."""
+    parser = argparse.ArgumentParser(description="Every interleaving of the shipped token book and witness.")
+    parser.add_argument("--nodes", type=int, default=3)
+    parser.add_argument("--versions", type=int, default=2)
+    parser.add_argument("--crashes", type=int, default=1)
+    parser.add_argument("--old-copies", type=int, default=0, help="starts from an old copy of a journal")
+    parser.add_argument("--ghost", action="store_true", help="a node that the site does not have says what it likes")
+    parser.add_argument("--most-s", type=float, default=600.0, help="CPU seconds after which it ends")
+    options = parser.parse_args()
+    limits = Limits(options.nodes, options.versions, options.crashes, options.old_copies, options.ghost, options.most_s)
+    explorer = Explorer(limits)
+    found = explorer.run()
+    print(
+        f"{limits}: {found.states:,} states, {found.transitions:,} transitions, {found.spent_s:.1f} s, "
+        f"{'complete' if found.is_complete else 'not complete'}, for a person {found.held_for_a_person}"
+    )
+    for what, state in (("two holders", found.two), ("trap", found.trap)):
+        print(f"{what}:", "none" if state is None else f"\n{explorer.told(state)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""The bar of a lost journal: after the operator's command every site serves again within five minutes."""
+
+import pytest
+
+from bus_sim.faults.arm import arm
+from bus_sim.faults.injection import parse_injection
+from bus_sim.run import Simulation
+from bus_sim.sites import find_site
+from onboard.core.codes import Reason, RegenerationPhase, TaskPhase
+from onboard.core.messages import Heartbeat, TaskReport
+from onboard.core.recovery_messages import Halted, Regeneration
+from tests.system.scene import Scene, play, stays
+
+SITE = find_site("small")
+CARS = stays((0, 400), (60, 500), (120, 600), (300, None))
+#: A machine loses its journal, and when; its person comes 20 s later and sees where it stands.
+LOSSES = [("MR1", 50, "p(1;5)"), ("MR2", 20, "p(3;8)"), ("IOC1", 50, ""), ("IOC1", 190, ""), ("ER1", 50, "")]
+
+
+def played(*faults: str) -> Scene:
+    def plant(simulation: Simulation) -> None:
+        arm(simulation, [parse_injection(fault) for fault in faults])
+
+    return play(SITE, CARS, plant=plant, limit_s=1_500)
+
+
+@pytest.mark.parametrize(("name", "at_s", "body"), LOSSES)
+def test_a_lost_journal_is_a_matter_of_minutes(name: str, at_s: int, body: str) -> None:
+    came_s = at_s + 20
+    crash = f"crash:target={name},at_s={at_s},restart_s=5,journal=lost"
+    scene = played(crash, f"operate:do=regenerate,at_s={came_s},target={name}" + (f",body={body}" if body else ""))
+    scene.assert_sound()
+    node = SITE.machine(name).node_id
+    _, word = scene.first(Halted, lambda one: one.sender == node)
+    assert (word.reason, word.needs_person) == (Reason.JOURNAL_LOST, True)
+    street = scene.simulation.plant.street.summary()
+    assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
+    done = [t / 1e6 for t, one in scene.all(TaskReport) if one.phase is TaskPhase.DONE]
+    assert min(t for t in done if t > came_s) < came_s + 300
+    epochs = {beat.sender: beat.epoch for _, beat in scene.all(Heartbeat)}
+    assert set(epochs.values()) == {1}
+    log = [line for _, who, line in scene.simulation.log.lines if who == "operator"]
+    assert f"{name} is in epoch 1" in log
+
+
+def test_a_dead_robot_is_towed_regenerated_and_its_slot_is_nobodys() -> None:
+    """docs/operate.md, "A dead one"."""
+    scene = played(
+        "crash:target=MR1,at_s=97,restart=no",
+        "moved:target=MR1,at_s=110,by_mm=-9000",
+        "operate:do=regenerate,at_s=120,target=MR1,absent=yes,track=1,index=1",
+    )
+    scene.assert_sound()
+    street = scene.simulation.plant.street.summary()
+    assert (street.parked, street.served, street.queueing, street.asking) == (4, 3, 0, 0)
+
+
+def test_a_robot_that_is_declared_dead_and_comes_back_in_the_old_epoch_does_nothing() -> None:
+    scene = played(
+        "crash:target=MR1,at_s=97,restart_s=100",
+        "moved:target=MR1,at_s=110,by_mm=-9000",
+        "operate:do=regenerate,at_s=120,target=MR1,absent=yes,track=1,index=1",
+    )
+    assert scene.simulation.plant.oracle.finish() == []
+    node = SITE.machine("MR1").node_id
+    states = {one.state.name for t, one in scene.all(Heartbeat) if one.sender == node and t > 205e6}
+    assert states <= {"OBSTACLE", "STARTING"}
+    assert scene.simulation.plant.street.summary().served == 3
+
+
+def test_a_robot_that_lives_cannot_be_declared_dead() -> None:
+    scene = played("operate:do=regenerate,at_s=60,target=MR1,absent=yes,track=1,index=5")
+    scene.assert_sound()
+    log = [line for _, who, line in scene.simulation.log.lines if who == "operator"]
+    assert "MR1 lives: it is not absent" in log and not scene.all(Regeneration)
+
+
+def test_an_operator_that_is_gone_leaves_a_site_that_goes_on() -> None:
+    """FREEZE is not said any more: after ten seconds all go on with the rights that they had."""
+
+    def before(simulation: Simulation) -> None:
+        bus = simulation.fleet.attach("operator", 251)
+        word = Regeneration(251, RegenerationPhase.FREEZE, 1, SITE.machine("MR1").node_id, 0, 0, 0)
+        for frame in simulation.codecs.fleet.encode(word):
+            simulation.loop.call_at(45.0, bus.send, frame)
+
+    scene = play(SITE, CARS, before=before, limit_s=1_500)
+    scene.assert_sound()
+    assert scene.simulation.plant.street.summary().served == 3
+    assert {beat.epoch for _, beat in scene.all(Heartbeat)} == {0}
