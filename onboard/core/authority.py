@@ -233,7 +233,7 @@ class TokenBook:
         self.seen[key] = version
         self.given[key] = Belief(version, to)
         self.gifts.add(key)
-        self.beliefs.take_up(key, version, to)
+        self.beliefs.take_up(key, version, to, giver=self.node_id)
         self.backoff.forget(("leaving", key))
         self.leaving[key] = Grant(version, to, self.backoff.say(("leaving", key), now_us))
         return [self._record("token_given", key, version, to), Send(self._grant(key, version, to))]
@@ -320,6 +320,17 @@ class TokenBook:
             is_behind = refusal.reason is Reason.MIRROR_BEHIND
             self.wanted[key] = asked_us if is_behind else max(asked_us, self.wanted[key])
             self.changes += 1
+
+    def newest(self, key: TokenKey) -> TokenSeen:
+        """The newest that I know of a token: who is sure to have had it, as its holder or as who gave it away then.
+
+        A grant that its receiver has not confirmed proves that its giver had the token, and nothing about its receiver.
+        """
+        if self.is_mine_by_journal(key):
+            return TokenSeen(self.node_id, *key, self.own_version(key), self.node_id)
+        belief = self.beliefs.of(key)
+        sure = belief.holder if belief.confirmed else belief.giver or self.node_id
+        return TokenSeen(self.node_id, *key, belief.version, sure)
 
     # --- what is said without being asked --------------------------------------------------------------------------
 
@@ -457,11 +468,7 @@ class TokenBook:
 
     def _tell_seen(self, key: TokenKey, now_us: int) -> list[Effect]:
         """Somebody says that it holds a token under a version older than I know."""
-        version, holder, *_ = self.beliefs.of(key)
-        if self.is_mine_by_journal(key):
-            version, holder = self.own_version(key), self.node_id
-        word = TokenSeen(self.node_id, key.kind, key.number, version, holder)
-        return self._once(key, word, self.site.timing.token_repeat_us, now_us)
+        return self._once(key, self.newest(key), self.site.timing.token_repeat_us, now_us)
 
     def _dispute(self, key: TokenKey, version: int, now_us: int) -> list[Effect]:
         believed = self.beliefs.of(key).holder

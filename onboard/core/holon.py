@@ -249,20 +249,23 @@ class Holon:
 
     def next_wake(self) -> int | None:
         """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
+        if self.halted is not None:
+            return None
         times = [
             self._heartbeat_due_us,
             self.time.due_us,
             self.holding.next_wake(),
-            None if self.holding.is_apart else self.witness.next_wake(),
             self.regeneration.next_wake(),
-            self.tokens.next_wake() if self._deals else None,
-            self.rights.petition_due() if self._deals else None,
             self.presence.held_until_us,
-            self._negotiation_due() if self._begins else None,
-            self.behaviour.next_wake() if self._begins else None,
         ]
+        if not self.holding.is_apart:
+            times.append(self.witness.next_wake())
+        if self._deals:
+            times += (self.tokens.next_wake(), self.rights.petition_due())
+        if self._begins:
+            times += (self._negotiation_due(), self.behaviour.next_wake())
         due = [time for time in times if time is not None]
-        return self.time.loop_us(min(due)) if due and self.halted is None else None
+        return self.time.loop_us(min(due)) if due else None
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
@@ -363,6 +366,7 @@ class Holon:
             return news
         if fresh:
             self.tokens.begin_anew(now_us)
+            self.negotiation.begin_anew(now_us)
         return news + self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:

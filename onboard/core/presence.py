@@ -10,10 +10,10 @@ more machines speak another contract or know another site than speak its own, it
 from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenBook
-from onboard.core.codes import MOBILE_KINDS, NOBODY, MachineState, Reason
+from onboard.core.codes import MOBILE_KINDS, NOBODY, STILL, MachineState, Reason
 from onboard.core.messages import Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
-from onboard.core.obstacles import STILL, holder_in
+from onboard.core.obstacles import holder_in
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
 from onboard.core.standing import Standing

@@ -27,6 +27,8 @@ class _Seen:
     place: tuple[int, int, int]
     moved_us: int
     spoke_us: int
+    #: Since when its plan, whichever, has not left it where it is.
+    late_us: int | None = None
     stands: bool = False
 
 
@@ -67,9 +69,11 @@ class Standing:
         if not seen.stands:
             leaves_us = self._leaves_us(node, seen, now_us)
             if leaves_us is None:
+                seen.late_us = None
                 return False
+            seen.late_us = now_us if seen.late_us is None else seen.late_us
             quiet_us = now_us - max(seen.moved_us, seen.spoke_us, leaves_us)
-            seen.stands = quiet_us >= STANDS_AFTER_US or now_us - seen.moved_us >= WAITS_AFTER_US + STANDS_AFTER_US
+            seen.stands = quiet_us >= STANDS_AFTER_US or now_us - seen.late_us >= WAITS_AFTER_US + STANDS_AFTER_US
         return seen.stands
 
     def _leaves_us(self, node: int, seen: _Seen, now_us: int) -> int | None:

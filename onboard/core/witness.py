@@ -172,8 +172,10 @@ class Witness:
 
     def next_wake(self) -> int | None:
         """When there is something to ask or to answer, bus time in us."""
-        asking = None if self.is_over or self.doubt is not None else self._ask_at_us
-        return min((time for time in (asking, self._answer_at_us) if time is not None), default=None)
+        asking_us = None if self.is_over or self.doubt is not None else self._ask_at_us
+        if asking_us is None or self._answer_at_us is None:
+            return self._answer_at_us if asking_us is None else asking_us
+        return min(asking_us, self._answer_at_us)
 
     # --- answering ---------------------------------------------------------------------------------------------
 
@@ -228,13 +230,11 @@ class Witness:
 
     def _tell_gifts(self, node: int) -> list[Effect]:
         """What a machine gave away by its own word and nobody has said that he has: only I can tell if it forgot it."""
-        effects: list[Effect] = []
-        for key, one in self.tokens.beliefs.verified.items():
-            if one.giver == node and not one.confirmed:
-                # It held the token under the version before; it may have forgotten either.
-                effects.append(Send(TokenSeen(self.node_id, *key, one.version - 1, node)))
-                effects.append(Send(TokenSeen(self.node_id, *key, one.version, one.holder)))
-        return effects
+        return [
+            Send(self.tokens.newest(TokenKey(*key)))
+            for key, one in self.tokens.beliefs.verified.items()
+            if one.giver == node and not one.confirmed
+        ]
 
     def _tell_own_gifts(self, askers: set[int]) -> list[Effect]:
         """What I gave away since: who has it now may have answered before it had it."""
@@ -248,7 +248,7 @@ class Witness:
         """What machines hold that cannot say so themselves: whoever gave it to them may have forgotten that."""
         live = self.mirror.alive(now_us) | {self.node_id}
         return [
-            Send(TokenSeen(self.node_id, *key, one.version, one.holder))
+            Send(self.tokens.newest(TokenKey(*key)))
             for key, one in self.tokens.beliefs.verified.items()
             if one.holder not in live and one.version
         ]

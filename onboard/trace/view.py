@@ -12,6 +12,7 @@ from typing import TypeVar
 from onboard.core.codes import (
     ANY_STATION,
     OUTSIDE,
+    STILL,
     CallResult,
     Criterion,
     Grade,
@@ -37,7 +38,6 @@ from onboard.core.messages import (
     TaskReport,
     Waiting,
 )
-from onboard.core.obstacles import STILL
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment, Site, Station
 

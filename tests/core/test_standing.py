@@ -1,5 +1,7 @@
 """Who says that it goes and stands is an obstacle until it moves; who waits and says so is given longer."""
 
+from dataclasses import replace
+
 from onboard.core.codes import Grade, LegAction, Reason, Side
 from onboard.core.messages import Itinerary, Leg, Progress, Stamp, Waiting
 from onboard.core.mirror import Mirror
@@ -43,6 +45,22 @@ def test_a_machine_that_waits_and_says_so_is_given_longer() -> None:
         standing.hear(Waiting(ROBOT, 1, 4, 12, Reason.TOKEN_HELD_BY_OTHER), now_us)
         assert not standing.stands(ROBOT, now_us)
     assert standing.stands(ROBOT, WAITS_AFTER_US + STANDS_AFTER_US)
+
+
+def test_a_machine_that_has_stood_idle_for_long_has_all_the_time_for_a_new_plan() -> None:
+    site = one_floor()
+    mirror = Mirror(site, ME)
+    standing = Standing(site, mirror)
+    now_us = 2 * WAITS_AFTER_US
+    standing.hear(Progress(ROBOT, 0, 0, 1, 3, 0, 0), 0)
+    assert not standing.stands(ROBOT, now_us)
+    plan = goes()
+    begins = now_us // 1000
+    plan = replace(plan, stamp=Stamp(begins, ME, 1), legs=(plan.legs[0]._replace(end_ms=begins + RUN_MS),))
+    mirror.on_itinerary(plan, now_us)
+    standing.hear(plan, now_us)
+    assert not standing.stands(ROBOT, now_us + 1_000_000)
+    assert standing.stands(ROBOT, now_us + RUN_MS * 1000 + STANDS_AFTER_US)
 
 
 def test_a_machine_at_the_end_of_its_plan_may_stand_there_for_ever() -> None:

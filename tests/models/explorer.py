@@ -114,6 +114,8 @@ class Found:
     trap: State | None = None
     spent_s: float = 0.0
     held_for_a_person: int = 0
+    #: A node with a sound journal that holds for a person all the same.
+    alarm: State | None = None
 
 
 @dataclass
@@ -368,13 +370,16 @@ class Explorer:
                 for j in range(len(self.nodes)):
                     if self._asks(state, j, i):
                         state = self._quiet(self._answers(state, i, j))
-            if any(one is not None and self._memories.things[one].doubt for one in state.memory):
+            if self._is_doubtful(state):
                 self.found.held_for_a_person += 1
                 return True
             if self._holders(state):
                 return True
             state = self._all_hear(state._replace(bus=0))
         return False
+
+    def _is_doubtful(self, state: State) -> bool:
+        return any(one is not None and self._memories.things[one].doubt for one in state.memory)
 
     def _quiet(self, state: State) -> State:
         while any(state.todo):
@@ -439,6 +444,8 @@ class Explorer:
             state = stack.pop()
             if found.trap is None and not self.ends_well(state):
                 found.trap = state
+            if found.alarm is None and not state.old_copies and self._is_doubtful(state):
+                found.alarm = state
             for after in self.steps(state):
                 found.transitions += 1
                 if after in seen:
@@ -491,7 +498,7 @@ def main() -> None:
         f"{limits}: {found.states:,} states, {found.transitions:,} transitions, {found.spent_s:.1f} s, "
         f"{'complete' if found.is_complete else 'not complete'}, for a person {found.held_for_a_person}"
     )
-    for what, state in (("two holders", found.two), ("trap", found.trap)):
+    for what, state in (("two holders", found.two), ("trap", found.trap), ("false alarm", found.alarm)):
         print(f"{what}:", "none" if state is None else f"\n{explorer.told(state)}")
 
 

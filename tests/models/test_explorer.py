@@ -1,0 +1,102 @@
+"""Every interleaving of the shipped token book: one holder at most, no trap; and each rule is needed for it."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import pytest
+
+from onboard.core.authority import TokenBook
+from onboard.core.belief import Belief, Beliefs
+from onboard.core.effects import Effect
+from onboard.core.witness import Witness
+from tests.models.explorer import Explorer, Found, Limits
+
+#: Limits of CPU time are for runs in which a bug is looked for; a clean run has to be complete.
+_HUNT_S = 20.0
+
+
+def explore(nodes: int, versions: int, crashes: int = 0, **more: Any) -> Found:
+    return Explorer(Limits(nodes, versions, crashes, **more)).run()
+
+
+@pytest.mark.parametrize(
+    ("limits", "at_least"),
+    [
+        (Limits(nodes=3, versions=2, crashes=0), 50_000),
+        (Limits(nodes=2, versions=3, crashes=2), 100_000),
+        (Limits(nodes=2, versions=3, crashes=1, old_copies=1), 50_000),
+        (Limits(nodes=2, versions=3, crashes=1, has_ghost=True), 50_000),
+    ],
+    ids=["three-nodes", "crashes", "an-old-copy", "a-ghost"],
+)
+def test_never_two_holders_and_never_a_trap(limits: Limits, at_least: int) -> None:
+    found = Explorer(limits).run()
+    print(found)
+    assert (found.two, found.trap) == (None, None)
+    assert found.is_complete and found.states >= at_least
+
+
+def _reversed(method: Callable[..., list[Effect]]) -> Callable[..., list[Effect]]:
+    return lambda *args: method(*args)[::-1]
+
+
+def test_a_frame_before_its_journal_write_makes_two_holders(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(TokenBook, "give", _reversed(TokenBook.give))
+    assert explore(2, 2, 1, most_s=_HUNT_S).two is not None
+
+
+def test_a_right_that_is_used_before_all_have_answered_makes_two_holders(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An old copy of a journal: only the others know what was given away since."""
+    monkeypatch.setattr(Witness, "hear", lambda *_: None)
+    assert explore(2, 2, 1, old_copies=1, most_s=_HUNT_S).two is not None
+
+
+def test_a_grant_that_counts_from_anybody_makes_two_holders(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = Beliefs.of
+
+    def gullible(beliefs: Beliefs, key: Any) -> Belief:
+        return of(beliefs, key)._replace(holder=_Anybody())
+
+    monkeypatch.setattr(Beliefs, "of", gullible)
+    assert explore(2, 2, 0, has_ghost=True, most_s=_HUNT_S).two is not None
+
+
+class _Anybody(int):
+    """A node that is whoever it is compared with."""
+
+    def __eq__(self, other: object) -> bool:
+        return True
+
+    def __ne__(self, other: object) -> bool:
+        return False
+
+    __hash__ = int.__hash__
+
+
+def test_a_right_that_leaves_by_a_strangers_claim_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    def meek(book: TokenBook, key: Any, by: int, now_us: int) -> list[Effect]:
+        book.held.pop(key, None)
+        book.seen[key] = book.seen.get(key, 0)
+        return []
+
+    monkeypatch.setattr(TokenBook, "_claimed", meek)
+    assert explore(2, 2, 0, has_ghost=True, most_s=_HUNT_S).trap is not None
+
+
+def test_a_dispute_without_an_answer_is_a_trap(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One lost frame: a bystander that missed a grant refuses the next one for ever."""
+    monkeypatch.setattr(TokenBook, "on_dispute", lambda *_: [])
+    assert explore(3, 2, 0, most_s=_HUNT_S).trap is not None
+
+
+def test_a_grant_that_is_said_once_is_a_trap(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(TokenBook, "wake", lambda *_: [])
+    assert explore(2, 2, 0, most_s=_HUNT_S).trap is not None
+
+
+def test_a_forgotten_take_that_nobody_misses_is_a_trap(monkeypatch: pytest.MonkeyPatch) -> None:
+    def silent(*_: object) -> Iterable[Effect]:
+        return []
+
+    monkeypatch.setattr(Witness, "_tell_doubted", silent)
+    assert explore(2, 2, 1, old_copies=1, most_s=_HUNT_S).trap is not None
