@@ -4,6 +4,7 @@ import pytest
 
 from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.messages import BusTime, Heartbeat, Message, Reference
+from onboard.core.recovery_messages import Halted
 from tests.trace.checking import (
     MR1,
     MR2,
@@ -87,6 +88,15 @@ def test_a_bid_after_the_deadline_does_not_win() -> None:
 def test_a_call_that_is_never_closed_is_found() -> None:
     assert tell(STORY[:3]).broken(13) == {}
     assert tell(STORY[:3]).broken(15) == {"calls-closed": 1}
+
+
+def test_a_call_whose_initiator_is_held_is_closed_when_it_goes_on() -> None:
+    held = Halted(1, 1, Reason.EMERGENCY_STOP, 240, needs_person=False, boot=1)
+    tape = tell(STORY[:3])
+    for second in range(2, 33, 2):
+        tape.say(second, held)
+    assert tape.broken(36) == {}
+    assert tape.broken(60) == {"calls-closed": 1}
 
 
 def test_a_call_whose_initiator_started_anew_is_over() -> None:
