@@ -185,7 +185,8 @@ class Holon:
             return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
         if why is not Reason.NONE:
-            return self._pass_over(message, why)
+            self.drops[why] += 1
+            return self.admission.passed_over(message, why) if self.halted is None else []
         self.holding.heard(now_us)
         if isinstance(message, BusTime):
             return self._on_bus_time(message, local_us)
@@ -206,13 +207,6 @@ class Holon:
             proven = self.car_words.settle(message.token_kind, message.token)
             effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
-
-    def _pass_over(self, message: Message, why: Reason) -> list[Effect]:
-        """What its sender may not say is as if it had not been heard; who it is, people are told once."""
-        self.drops[why] += 1
-        if self.halted is not None or not self.admission.is_first(message.sender, why):
-            return []
-        return [Report(f"{type(message).__name__} of node {message.sender} passed over: {why.name}")]
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
