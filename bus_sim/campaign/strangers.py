@@ -39,7 +39,8 @@ class Outcome:
     served: int
     told: int
     waiting: int
-    mean_wait_s: float
+    #: What each customer who was served waited in all, s; None for the others.
+    waits_s: tuple[float | None, ...]
     broken: tuple[str, ...]
 
 
@@ -53,8 +54,10 @@ class Pair:
 
     @property
     def longer_s(self) -> float:
-        """By how much the mean wait is longer."""
-        return self.strange.mean_wait_s - self.without.mean_wait_s
+        """By how much a wait is longer, in the mean of coming in and going out of those served in both runs."""
+        pairs = zip(self.strange.waits_s, self.without.waits_s, strict=True)
+        longer = [(one - other) / 2 for one, other in pairs if one is not None and other is not None]
+        return fmean(longer) if longer else 0.0
 
     @property
     def is_good(self) -> bool:
@@ -66,8 +69,8 @@ class Pair:
         """One line for people."""
         one, other = self.strange, self.without
         told = f"served {one.served} of {other.served}, told {one.told}, waiting {one.waiting}"
-        head = f"{'' if self.is_good else 'FAILED '}seed {self.seed}: {told}, mean wait {one.mean_wait_s:.1f} s"
-        return f"{head}, {self.longer_s:+.1f} s; {'; '.join(one.broken)}".rstrip("; ")
+        head = f"{'' if self.is_good else 'FAILED '}seed {self.seed}: {told}, mean wait"
+        return f"{head} {self.longer_s:+.1f} s; {'; '.join(one.broken)}".rstrip("; ")
 
 
 def play_pairs(plan: StrangerPlan, seeds: range, jobs: int) -> Iterator[Pair]:
@@ -105,7 +108,12 @@ async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop,
         )
     finally:
         stage.run.close()
-    tally, summary = stage.tally(), stage.run.plant.street.summary()
-    waits = [us / 1e6 for us in (*summary.in_wait_us, *summary.out_wait_us)]
+    tally, visits = stage.tally(), [customer.visit for customer in stage.run.plant.street.customers]
+    waits = tuple(
+        (visit.in_wait_us + visit.out_wait_us) / 1e6
+        if visit.in_wait_us is not None and visit.out_wait_us is not None
+        else None
+        for visit in visits
+    )
     broken = (*stage.violations(), *(judges.finish()[0]))
-    return Outcome(tally.served, tally.told, tally.waiting, fmean(waits) if waits else 0.0, broken)
+    return Outcome(tally.served, tally.told, tally.waiting, waits, broken)

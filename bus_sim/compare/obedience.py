@@ -29,8 +29,8 @@ from onboard.kinds.car_park.generation import AWARD_LATENCY_US, CarParkGeneratio
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.registry import factory_for
 
-#: Node-ID under which the dispatcher speaks. Machines of the shipped sites have lower ones.
-DISPATCHER = 250
+#: Node-ID under which the dispatcher speaks: one of those that no machine of a site has, and that may award.
+DISPATCHER = 251
 #: What a dispatcher decides about. Rides are between a robot and the lifts.
 TASKS = (Operation.PARK, Operation.RETRIEVE)
 

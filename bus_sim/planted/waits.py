@@ -8,9 +8,10 @@ from typing import Any
 from bus_sim.planted.bug import PlantedBug
 from bus_sim.planted.tools import in_behaviour, replace
 from bus_sim.run import Simulation
-from onboard.core.codes import KindCode, ManualMode, Reason, TokenKind
-from onboard.core.effects import Effect
-from onboard.core.messages import ManualOrder
+from onboard.core.codes import CallResult, KindCode, ManualMode, Reason, TaskPhase, TokenKind
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import ManualOrder, TaskReport
+from onboard.core.negotiation import Awarded, Closed
 from onboard.wire.codec import fleet_codec
 
 #: The node-ID of a person's tool (251 to 255).
@@ -72,6 +73,52 @@ def _deaf_to_the_end_of_a_hold(simulation: Simulation) -> None:
     simulation.loop.call_at(30.0, say, 2, ManualMode.AUTOMATIC)
 
 
+def _nobody_is_left_out(simulation: Simulation) -> None:
+    def plant(desk: Any) -> None:
+        replace(desk.fleet.negotiation.trust, "left_out", lambda _: lambda *_a, **_k: frozenset())
+
+    in_behaviour(simulation, KindCode.COMPARTMENT, plant)
+
+
+def _gives_all_back(simulation: Simulation) -> None:
+    """Robots give back whatever they win, and nobody remembers who did."""
+
+    def plant(robot: Any) -> None:
+        def make(old: Callable[..., list[Effect]]) -> Callable[..., list[Effect]]:
+            def negotiated(event: Any, now_us: int) -> list[Effect]:
+                if not isinstance(event, Awarded):
+                    return old(event, now_us)
+                robot.generation.tentative.clear()
+                task = event.call.task
+                return [Send(TaskReport(robot.fleet.node_id, task, TaskPhase.FORFEITED, 0, Reason.CANCELLED))]
+
+            return negotiated
+
+        replace(robot, "negotiated", make)
+
+    in_behaviour(simulation, KindCode.ROBOT, plant)
+    _nobody_is_left_out(simulation)
+
+
+def _never_content(simulation: Simulation) -> None:
+    """A compartment calls anew for what has just found its machine, and leaves nobody out."""
+    _nobody_is_left_out(simulation)
+
+    def plant(desk: Any) -> None:
+        def make(old: Callable[..., list[Effect]]) -> Callable[..., list[Effect]]:
+            def negotiated(event: Any, now_us: int) -> list[Effect]:
+                effects = old(event, now_us)
+                if isinstance(event, Closed) and event.result is CallResult.AWARDED and desk.job is not None:
+                    effects += desk._call_again(desk.job, now_us)
+                return effects
+
+            return negotiated
+
+        replace(desk, "negotiated", make)
+
+    in_behaviour(simulation, KindCode.COMPARTMENT, plant)
+
+
 BUGS = (
     PlantedBug("segments-kept", "nobody-starves", "a steward never grants", _never_to_robots),
     PlantedBug("lift-never-comes", "nobody-starves", "lifts promise rides and stay where they are", _lift_never_comes),
@@ -79,4 +126,8 @@ BUGS = (
     PlantedBug(
         "deaf-to-going-on", "let-go-again", "a held robot does not hear that it may go on", _deaf_to_the_end_of_a_hold
     ),
+    PlantedBug(
+        "gives-all-back", "no-rounds", "robots give back what they win, and nobody remembers it", _gives_all_back
+    ),
+    PlantedBug("never-content", "no-rounds", "a compartment calls anew for what has found its machine", _never_content),
 )

@@ -8,6 +8,7 @@ anybody.
 from dataclasses import dataclass, field
 
 from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, KindCode, Reason
+from onboard.core.effects import Effect, Report
 from onboard.core.messages import Blocked, BusTime, Clear, EmergencyStop, ManualOrder, Message, Speakers
 from onboard.core.site import Machine, Site
 
@@ -47,9 +48,9 @@ class Admission:
             return Reason.NOT_AUTHORISED
         return Reason.NONE
 
-    def is_first(self, node: int, reason: Reason) -> bool:
-        """Whether a node's words come to nothing for this reason for the first time: people are told once."""
-        if (node, reason) in self._named:
-            return False
-        self._named.add((node, reason))
-        return True
+    def passed_over(self, message: Message, why: Reason) -> list[Effect]:
+        """Tell people once of each sender and reason: what it may not say is as if it had not been heard."""
+        if (message.sender, why) in self._named:
+            return []
+        self._named.add((message.sender, why))
+        return [Report(f"{type(message).__name__} of node {message.sender} passed over: {why.name}")]

@@ -122,6 +122,10 @@ class MachineState(IntEnum):
     STOPPED = 5
 
 
+#: States in which a machine that lives is an obstacle all the same.
+STILL = (MachineState.OBSTACLE, MachineState.STOPPED)
+
+
 class Reason(IntEnum):
     """Why something was held, refused or dropped; the one table for all messages."""
 

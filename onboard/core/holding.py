@@ -101,6 +101,8 @@ class Holding:
     @property
     def is_apart(self) -> bool:
         """Whether it also takes in nothing of rights and plans, as if it were off: it compares all when it is back."""
+        if self.hold is Hold.ACTING:
+            return False
         own = self.hold is Hold.PERSON and self._decision.reason is Reason.DUPLICATE_NODE_ID
         return own or self.hold in (Hold.OWN_NUMBER, Hold.HALTED)
 
@@ -176,6 +178,8 @@ class Holding:
 
     def next_wake(self) -> int | None:
         """When ``wake`` has something to do, bus time in us."""
+        if self.hold is Hold.ACTING and not self.stops:
+            return None
         times = [heard_us + STOP_LASTS_US for heard_us in self.stops.values()]
         if self.hold is Hold.OWN_NUMBER:
             times.append(self._quiet_since_us + QUIET_BEATS * self.beat_us)

@@ -185,7 +185,8 @@ class Holon:
             return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
         if why is not Reason.NONE:
-            return self._pass_over(message, why)
+            self.drops[why] += 1
+            return self.admission.passed_over(message, why) if self.halted is None else []
         self.holding.heard(now_us)
         if isinstance(message, BusTime):
             return self._on_bus_time(message, local_us)
@@ -206,13 +207,6 @@ class Holon:
             proven = self.car_words.settle(message.token_kind, message.token)
             effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
-
-    def _pass_over(self, message: Message, why: Reason) -> list[Effect]:
-        """What its sender may not say is as if it had not been heard; who it is, people are told once."""
-        self.drops[why] += 1
-        if self.halted is not None or not self.admission.is_first(message.sender, why):
-            return []
-        return [Report(f"{type(message).__name__} of node {message.sender} passed over: {why.name}")]
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
@@ -249,20 +243,23 @@ class Holon:
 
     def next_wake(self) -> int | None:
         """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
+        if self.halted is not None:
+            return None
         times = [
             self._heartbeat_due_us,
             self.time.due_us,
             self.holding.next_wake(),
-            None if self.holding.is_apart else self.witness.next_wake(),
             self.regeneration.next_wake(),
-            self.tokens.next_wake() if self._deals else None,
-            self.rights.petition_due() if self._deals else None,
             self.presence.held_until_us,
-            self._negotiation_due() if self._begins else None,
-            self.behaviour.next_wake() if self._begins else None,
         ]
+        if not self.holding.is_apart:
+            times.append(self.witness.next_wake())
+        if self._deals:
+            times += (self.tokens.next_wake(), self.rights.petition_due())
+        if self._begins:
+            times += (self._negotiation_due(), self.behaviour.next_wake())
         due = [time for time in times if time is not None]
-        return self.time.loop_us(min(due)) if due and self.halted is None else None
+        return self.time.loop_us(min(due)) if due else None
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
@@ -363,6 +360,7 @@ class Holon:
             return news
         if fresh:
             self.tokens.begin_anew(now_us)
+            self.negotiation.begin_anew(now_us)
         return news + self.witness.on_heartbeat(beat, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:

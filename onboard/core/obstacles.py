@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.core.authority import segment_token
-from onboard.core.codes import MOBILE_KINDS, MachineState, Reason
+from onboard.core.codes import MOBILE_KINDS, Reason
 from onboard.core.lifts import GATE_INDEX, PLATFORM_INDEX, lift_at, platform
 from onboard.core.messages import Blocked, Clear, Progress
 from onboard.core.occupancy import standing_segments
@@ -19,8 +19,6 @@ from onboard.core.site import Machine, Segment, Site, TrackKind
 
 #: Owner of the windows of segments that are blocked by a word on the bus: no node carries it.
 BLOCKED = 256
-#: States in which a machine that lives is an obstacle all the same.
-STILL = (MachineState.OBSTACLE, MachineState.STOPPED)
 
 
 class Obstacle(NamedTuple):

@@ -10,10 +10,10 @@ more machines speak another contract or know another site than speak its own, it
 from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenBook
-from onboard.core.codes import MOBILE_KINDS, NOBODY, MachineState, Reason
+from onboard.core.codes import MOBILE_KINDS, NOBODY, STILL, MachineState, Reason
 from onboard.core.messages import Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
-from onboard.core.obstacles import STILL, holder_in
+from onboard.core.obstacles import holder_in
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
 from onboard.core.standing import Standing
@@ -179,5 +179,6 @@ class Presence:
             return Reason.ACTUATOR_FAULT if peer.state is MachineState.STOPPED else Reason.POSITION_UNKNOWN
         if self.standing.stands(node, now_us):
             return Reason.FALSE_STATEMENT
-        planless = machine.kind in MOBILE_KINDS and node not in self.mirror.itineraries
+        # Where machines do not move along tracks nobody plans around them, and they may have no plan to tell.
+        planless = bool(self.site.tracks) and machine.kind in MOBILE_KINDS and node not in self.mirror.itineraries
         return Reason.NONE if known is None or not planless else known.reason

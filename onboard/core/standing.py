@@ -6,8 +6,8 @@ the end only its place counts.
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import MOBILE_KINDS, Grade, LegAction
-from onboard.core.messages import Itinerary, Leg, Message, Progress, TaskReport, TokenRequest, Waiting
+from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, ManualMode
+from onboard.core.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
 from onboard.core.mirror import Mirror
 from onboard.core.occupancy import final_position, turned_in
 from onboard.core.serial import from_bus_ms
@@ -27,6 +27,8 @@ class _Seen:
     place: tuple[int, int, int]
     moved_us: int
     spoke_us: int
+    #: Since when its plan, whichever, has not left it where it is.
+    late_us: int | None = None
     stands: bool = False
 
 
@@ -46,6 +48,12 @@ class Standing:
             if known is None or known.place != place:
                 self._seen[message.sender] = _Seen(place, now_us, now_us)
             return
+        if isinstance(message, ManualOrder) and message.manual_mode is ManualMode.AUTOMATIC:
+            # A person lets it go: whoever did has seen why it stood, and it has to ask for its way first.
+            known = self._seen.get(message.machine)
+            if known is not None:
+                self._seen[message.machine] = _Seen(known.place, now_us, now_us)
+            return
         # Who asks for a right waits for it.
         speaks = isinstance(message, Waiting | TaskReport | TokenRequest)
         speaks = speaks or (isinstance(message, Itinerary) and message.grade is Grade.FIRM)
@@ -53,7 +61,7 @@ class Standing:
             self._seen[message.sender].spoke_us = now_us
 
     def stands(self, node: int, now_us: int) -> bool:
-        """Whether a machine has stood for too long where its plan does not leave it; only motion ends that."""
+        """Whether a machine has stood for too long where its plan does not leave it; motion or a person ends that."""
         seen = self._seen.get(node)
         machine = self.site.machines.get(node)
         if seen is None or machine is None or machine.kind not in MOBILE_KINDS:
@@ -61,9 +69,11 @@ class Standing:
         if not seen.stands:
             leaves_us = self._leaves_us(node, seen, now_us)
             if leaves_us is None:
+                seen.late_us = None
                 return False
+            seen.late_us = now_us if seen.late_us is None else seen.late_us
             quiet_us = now_us - max(seen.moved_us, seen.spoke_us, leaves_us)
-            seen.stands = quiet_us >= STANDS_AFTER_US or now_us - seen.moved_us >= WAITS_AFTER_US + STANDS_AFTER_US
+            seen.stands = quiet_us >= STANDS_AFTER_US or now_us - seen.late_us >= WAITS_AFTER_US + STANDS_AFTER_US
         return seen.stands
 
     def _leaves_us(self, node: int, seen: _Seen, now_us: int) -> int | None:

@@ -172,8 +172,10 @@ class Witness:
 
     def next_wake(self) -> int | None:
         """When there is something to ask or to answer, bus time in us."""
-        asking = None if self.is_over or self.doubt is not None else self._ask_at_us
-        return min((time for time in (asking, self._answer_at_us) if time is not None), default=None)
+        asking_us = None if self.is_over or self.doubt is not None else self._ask_at_us
+        if asking_us is None or self._answer_at_us is None:
+            return self._answer_at_us if asking_us is None else asking_us
+        return min(asking_us, self._answer_at_us)
 
     # --- answering ---------------------------------------------------------------------------------------------
 

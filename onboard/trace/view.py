@@ -12,6 +12,7 @@ from typing import TypeVar
 from onboard.core.codes import (
     ANY_STATION,
     OUTSIDE,
+    STILL,
     CallResult,
     Criterion,
     Grade,
@@ -37,6 +38,7 @@ from onboard.core.messages import (
     TaskReport,
     Waiting,
 )
+from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment, Site, Station
 
 _Key = TypeVar("_Key")
@@ -120,6 +122,8 @@ class SiteView:
         #: From the first call for each to its end, all tasks that are done together.
         self.done_us = 0
         self.blocked: set[Segment] = set()
+        #: Why each machine that does not act does not, by its own last word, or by a neighbour's.
+        self.halts: dict[int, Halted] = {}
         #: How people name what is carried or ordered, and what became of a task; systems other than the car park have
         #: their own words.
         self.thing: Callable[[Reference], str] = lambda reference: f"car {reference.number}"
@@ -133,13 +137,23 @@ class SiteView:
         machine = self.site.machines.get(node)
         return machine.name if machine is not None else f"node {node}"
 
+    def _on_halted(self, halted: Halted, time_us: int) -> None:
+        before = self.halts.get(halted.machine)
+        self.halts[halted.machine] = halted
+        what = halted.reason, halted.cause, halted.needs_person
+        if before is not None and what == (before.reason, before.cause, before.needs_person):
+            return
+        why = halted.reason.name.lower().replace("_", " ") + (f", by {self.name(halted.cause)}" if halted.cause else "")
+        person = "; a person must decide" if halted.needs_person else ""
+        self.say(time_us, f"{self.name(halted.machine)} does not act: {why}{person}")
+
     def feed(self, message: Message, time_us: int) -> None:
         """Take up one message of the fleet bus."""
         self.now_us = time_us
         self.messages[type(message).__name__] += 1
         match message:
             case Heartbeat():
-                self.states[message.sender] = message.state
+                self._on_heartbeat(message)
             case Progress():
                 self.positions[message.sender] = (Segment(message.track, message.index), message.offset_mm)
             case CarAt():
@@ -154,10 +168,18 @@ class SiteView:
                 self.itineraries[message.sender] = message
             case TaskReport():
                 self._on_report(message, time_us)
-            case Waiting() | Blocked() | Clear() | ManualState():
+            case Waiting() | Blocked() | Clear() | ManualState() | Halted():
                 self._on_word(message, time_us)
 
-    def _on_word(self, message: Waiting | Blocked | Clear | ManualState, time_us: int) -> None:
+    def _on_heartbeat(self, beat: Heartbeat) -> None:
+        self.states[beat.sender] = beat.state
+        if beat.state not in STILL:
+            self.halts.pop(beat.sender, None)
+
+    def _on_word(self, message: Waiting | Blocked | Clear | ManualState | Halted, time_us: int) -> None:
+        if isinstance(message, Halted):
+            self._on_halted(message, time_us)
+            return
         if isinstance(message, Blocked):
             self.blocked.add(Segment(message.track, message.index))
         elif isinstance(message, Clear):

@@ -12,7 +12,12 @@ from onboard.core.codes import ANY_STATION, NOBODY, OUTSIDE, Criterion, TokenKin
 from onboard.core.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
 from onboard.core.site import Segment, Site, Station
 
-_NODES = frozenset({"initiator", "winner", "holder", "predecessor", "requester", "blocker", "whom", "compartment"})
+_NODES = frozenset({"initiator", "winner", "holder", "predecessor", "requester", "blocker", "whom", "compartment"}) | {
+    "machine",
+    "cause",
+    "stopper",
+    "believed",
+}
 _STATIONS = frozenset({"station", "from_station", "to_station"})
 #: Bus times, to be told apart from lengths of time.
 _MOMENTS = frozenset({"deadline_ms", "end_ms", "award_ms"})

@@ -19,9 +19,9 @@ PARK = Plan("small", arrivals=Arrivals(3, 60.0, 30.0))
 PLANS = {name: Plan(name, orders=Orders(4, 10.0)) for name in ("cell", "graph", "terminal", "turning")}
 
 
-def play(attack: str, plan: Plan) -> list[str]:
+def play(attack: str, plan: Plan, seed: int = 1) -> list[str]:
     """What was not harmless, in words; nothing where all was."""
-    result = run_attack(plan, (attack, 1))
+    result = run_attack(plan, (attack, seed))
     return [] if result.is_harmless else [f"{result.report.verdict.value}: {result.why()}"]
 
 
@@ -36,6 +36,11 @@ def test_a_car_park_gets_over_it(attack: str) -> None:
 )
 def test_other_systems_get_over_it(attack: str, site: str) -> None:
     assert play(attack, PLANS[site]) == []
+
+
+def test_bids_of_machines_that_have_no_plans_to_tell_count_again_after_a_stop() -> None:
+    """Who says OBSTACLE is one; robots of a graph were for ever, as they tell no itinerary, and no call had a bid."""
+    assert play("stop", replace(PLANS["graph"], orders=Orders(12, 17.0), limit_s=900.0), seed=11) == []
 
 
 def test_a_floor_of_robots_in_step_gets_over_it(tmp_path: Path) -> None:

@@ -29,8 +29,10 @@ def carriage() -> Carriage:
     return Carriage(fleet, 1)
 
 
-def state(position_mm: int, mode: DriveMode = DriveMode.STANDING, *, across: bool = False) -> DriveState:
-    return DriveState(ROBOT, 1, position_mm, 0, mode, True, across)
+def state(
+    position_mm: int, mode: DriveMode = DriveMode.STANDING, *, across: bool = False, sequence: int = 1
+) -> DriveState:
+    return DriveState(ROBOT, sequence, position_mm, 0, mode, True, across)
 
 
 def get(one: Carriage, slot: Segment) -> None:
@@ -82,6 +84,8 @@ def test_with_both_it_is_sent_in_and_tells_of_the_turn() -> None:
     assert set(one.occupied()) == {MOUTH, INSIDE}
     one.sense(state(-PITCH_MM, DriveMode.MOVING, across=True), 2, 1, 1)
     one.sense(state(0, across=True), 3, 1, 1)
+    assert not one.arrived, "it has not heard the last order yet"
+    one.sense(state(0, across=True, sequence=one.sequence), 3, 1, 1)
     assert one.arrived and one.occupied() == [INSIDE]
     given = [e.message for e in one.advance(3) if isinstance(e, Send) and isinstance(e.message, TokenGrant)]
     assert [(m.token, m.holder) for m in given] == [(MOUTH.number, STEWARD)]
@@ -99,7 +103,7 @@ def test_out_it_drives_into_the_mouth_first_and_then_turns() -> None:
     assert orders(one.advance(2)) == [(MOUTH_MM, False)]
     one.sense(state(-PITCH_MM, DriveMode.TURNING, across=True), 3, 1, 2)
     assert orders(one.advance(3)) == [], "the same order stands"
-    assert places(one.sense(state(MOUTH_MM), 4, 1, 2)) == [(1, 7, 0)]
+    assert places(one.sense(state(MOUTH_MM, sequence=one.sequence), 4, 1, 2)) == [(1, 7, 0)]
     assert one.arrived and one.track == 1
 
 

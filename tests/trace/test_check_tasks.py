@@ -4,6 +4,7 @@ import pytest
 
 from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.messages import BusTime, Heartbeat, Message, Reference
+from onboard.core.recovery_messages import Halted
 from tests.trace.checking import (
     MR1,
     MR2,
@@ -89,6 +90,15 @@ def test_a_call_that_is_never_closed_is_found() -> None:
     assert tell(STORY[:3]).broken(15) == {"calls-closed": 1}
 
 
+def test_a_call_whose_initiator_is_held_is_closed_when_it_goes_on() -> None:
+    held = Halted(1, 1, Reason.EMERGENCY_STOP, 240, needs_person=False, boot=1)
+    tape = tell(STORY[:3])
+    for second in range(2, 33, 2):
+        tape.say(second, held)
+    assert tape.broken(36) == {}
+    assert tape.broken(60) == {"calls-closed": 1}
+
+
 def test_a_call_whose_initiator_started_anew_is_over() -> None:
     assert tell(STORY[:3]).say(3, power_up(2)).say(5, power_up(2)).broken() == {}
 
@@ -160,3 +170,17 @@ def test_the_finding_names_time_machines_and_frame() -> None:
     (finding,) = verdict.findings
     assert (finding.time_us, finding.rule, finding.machines) == (20_000_000, "one-owner", (MR2, MR1))
     assert "task 1.1" in finding.what and "TaskReport" in finding.evidence
+
+
+@pytest.mark.parametrize(("rounds", "broken"), [(3, {}), (4, {"no-rounds": 1}), (8, {"no-rounds": 1})])
+def test_a_task_that_one_machine_wins_and_gives_back_again_and_again_is_found(
+    rounds: int, broken: dict[str, int]
+) -> None:
+    """As a machine did that only bids: 188 awards for one car, and every rule said held."""
+    tape = tell(STORY[:1])
+    at_s = 3.0
+    for number in range(2, 2 + rounds):
+        tape.say(at_s, call(number, at_s + 1)).say(at_s + 0.5, bid(MR1, 50_000, number))
+        tape.say(at_s + 1, award(MR1, number=number), report(MR1, TaskPhase.FORFEITED))
+        at_s += 2
+    assert {rule: count for rule, count in tape.broken().items() if rule == "no-rounds"} == broken

@@ -26,8 +26,8 @@ Outcome = list[Effect | NegotiationEvent]
 #: is enough. Ours.
 QUICK_AWARDS = 10
 SLOW_DOWN = 10
-#: The longest pace, in award repeats: 16 s at the default of 100 ms. Ours.
-SLOWEST = 160
+#: The longest pace, in award repeats: 4 s at the default of 100 ms. Ours.
+SLOWEST = 40
 
 #: Steps and largest values of a sub-call's two durations on the wire (dbc/fleet.dbc, CallParent), in ms.
 READY_STEP_MS, MAX_READY_MS = 100, 1_638_300
@@ -233,6 +233,12 @@ class Initiator:
         self._lost_reason = reason
         return self._fire(Event.ABANDON, now_us)
 
+    def begin_anew(self, now_us: int) -> None:
+        """A machine has come back: it may be the winner, and hears the award soon."""
+        if self.state is State.AWARDING and self.awards_sent > QUICK_AWARDS:
+            self.awards_sent = QUICK_AWARDS + 1
+            self.due_us = min(self.due_us or now_us, now_us + self.timing.award_repeat_us)
+
     def unheard(self, now_us: int) -> int:
         """The winner that was awarded the task long ago and has said nothing of it since; 0 for nobody."""
         is_late = self.state is State.AWARDING and now_us - self.awarded_us >= ACCEPT_WITHIN_US
@@ -281,7 +287,7 @@ class Initiator:
         self.awards_sent += 1
         slow = self.awards_sent - QUICK_AWARDS
         # Ever more slowly: what a winner that is down needs to hear it hears when it is back and asks.
-        factor = min(SLOWEST, SLOW_DOWN << min(slow, 10)) if slow > 0 else 1
+        factor = min(SLOWEST, SLOW_DOWN << min(slow - 1, 10)) if slow > 0 else 1
         self.due_us = now_us + self.timing.award_repeat_us * factor
         outcome: Outcome = [Send(self._closing(winner, CallResult.AWARDED, Reason.NONE))]
         if self.awards_sent == QUICK_AWARDS + 1:

@@ -93,6 +93,11 @@ class Negotiation:
         self._forget(now_us)
         return outcome
 
+    def begin_anew(self, now_us: int) -> None:
+        """A machine has come back: what is said again slowly is said soon."""
+        for initiator in self.initiators:
+            initiator.begin_anew(now_us)
+
     def unheard(self, task: Reference, now_us: int) -> int:
         """Who was awarded a whole ``task`` of mine long ago and is not heard acting on it; 0 for nobody."""
         found = [one.unheard(now_us) for one in self.initiators if one.terms.task == task and not one.terms.depth]

@@ -298,9 +298,8 @@ class Compartment:
         return effects + self._to_free()
 
     def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
-        """My journal is lost and my rights were made anew: whatever was meant with the car in my bay, it is parked."""
-        self.stewardship.left = None
-        self.memory.job = (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        """My journal is lost and my rights are new: whatever was meant with the car in my bay, it is parked."""
+        self.stewardship.left, self.memory.job = None, (left.car, Operation.PARK, left.car, left.wheelbase_mm)
         return [job_record(*self.memory.job), *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
 
     def _take_up_job(self, now_us: int) -> list[Effect]:
@@ -324,9 +323,7 @@ class Compartment:
 
     def _to_free(self) -> list[Effect]:
         over: list[Effect] = [job_over_record()] if self.job is not None else []
-        self.job = None
-        self._robot_waits = False
-        self._key_pressed = False
+        self.job, self._robot_waits, self._key_pressed = None, False, False
         self._go(BayPhase.FREE)
         return over + self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
 

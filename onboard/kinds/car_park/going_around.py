@@ -10,10 +10,11 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import car_token, segment_token, station_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import Grade, LegAction, Reason, TaskPhase
+from onboard.core.codes import NOBODY, Grade, LegAction, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.lifts import gate, lift_at
 from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
+from onboard.core.obstacles import holder_in
 from onboard.core.occupancy import itinerary_windows
 from onboard.core.reservations import FOREVER, Window
 from onboard.core.site import Segment
@@ -23,6 +24,7 @@ from onboard.kinds.car_park.handling import Phase, ShuttleWork
 from onboard.kinds.car_park.places import Places
 from onboard.kinds.car_park.program import Handling, Program, Step, Work, to_itinerary
 from onboard.kinds.car_park.recovery import forfeited_record, sink_record
+from onboard.kinds.car_park.standoff import Standoff
 from onboard.kinds.car_park.travel import Carriage
 
 #: A plan that finds no way is tried again after this, us. Ours.
@@ -64,6 +66,7 @@ class GoingAround:
 
     def __post_init__(self) -> None:
         self.places = Places(self.fleet, self.generation, self.shuttle)
+        self.standoff = Standoff(self.fleet, self.carriage)
 
     @property
     def program(self) -> Program:
@@ -73,7 +76,7 @@ class GoingAround:
     def next_wake(self) -> int | None:
         """When to try again, or to say again what was given back."""
         stands_us = None if self._stands_since_us is None else self._stands_since_us + KEEP_US
-        times = [self.next_word(), self._retry_at_us, self._place_at_us, stands_us]
+        times = [self.next_word(), self._retry_at_us, self._place_at_us, stands_us, self.standoff.due_us]
         return min((time for time in times if time is not None), default=None)
 
     def next_word(self) -> int | None:
@@ -96,6 +99,9 @@ class GoingAround:
             return effects + self._make_room(now_us)
         if self._retry_at_us is not None and self._retry_at_us <= now_us:
             effects += self._try(now_us)
+        other = self.standoff.look(now_us)
+        if other != NOBODY:
+            effects += self._turn_away(other, now_us)
         return effects + self._leave_elsewhere(now_us)
 
     def _stood_for_us(self, now_us: int) -> int:
@@ -266,6 +272,20 @@ class GoingAround:
         task = lost[-1]
         effects: list[Effect] = [Report(f"gives task {task.origin}.{task.number} back: no way")]
         return effects + self.drop([task], now_us) + self.forfeit(task, Reason.IMPOSSIBLE, now_us)
+
+    def _turn_away(self, other: int, now_us: int) -> list[Effect]:
+        """Plan anew as if who stands face to face with me stood there for ever; without a way all stays as it is."""
+        mirror, machine = self.fleet.mirror, self.fleet.site.machines[other]
+        kept, origin, start_us = self._turning((), now_us)
+        if kept or other in mirror.obstacles.machines:
+            return []
+        slots = mirror.obstacles.slots_of(machine, mirror.progress.get(other), holder_in(self.fleet.tokens.holder_of))
+        works = self.program.works()
+        mirror.set_aside(other, slots, Reason.NOT_AUTHORISED, now_us)
+        steps = self.generation.reroute(origin, start_us, works, now_us)
+        mirror.admit(other, now_us)
+        self._seen = mirror.obstacles.changes
+        return [] if steps is None else self.take_up(0, steps, works, now_us)
 
     def _is_trapped(self, now_us: int) -> bool:
         """Whether the ride in hand is with a lift that is an obstacle."""

@@ -117,6 +117,8 @@ class Stewardship:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
         effects: list[Effect] = []
         obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
+        if not (obstacles or forgetful or self._unheard_us or self.fleet.cars_told or self._say_at_us):
+            return effects
         lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
         deaf = {car for car, since_us in self._unheard_us.items() if now_us - since_us >= UNHEARD_AFTER_US}
         of_lost = [car for car, winner in self.winners.items() if winner in lost or car in deaf]

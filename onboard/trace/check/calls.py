@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from onboard.core.codes import NOBODY, CallResult, Criterion
 from onboard.core.messages import Award, Bid, CallForProposals, LeftOut, Progress
+from onboard.core.recovery_messages import Halted
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
@@ -91,12 +92,26 @@ class CallsClosed(_CallRule):
     """Each call gets exactly one final outcome, at its deadline; an award is idempotent.
 
     A winner may give the task back before it was heard (REJECTED after AWARDED). An option that nobody
-    decides on lapses without a frame. A call whose initiator fell silent or started anew is over.
+    decides on lapses without a frame. A call whose initiator fell silent or started anew is over; one that is held
+    closes it when it goes on.
     """
 
     name = "calls-closed"
     title = "calls closed, once and in time"
     source = "rows P11, P12, P14; dbc/fleet.dbc, Award"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        #: When a machine last said that it is held: it closes its calls once it goes on.
+        self._held_us: dict[int, int] = {}
+
+    def handlers(self) -> Handlers:
+        """Beside calls, machines that do nothing any more for a while."""
+        return {**super().handlers(), Halted: self._on_halted}
+
+    def _on_halted(self, event: Event[Halted]) -> None:
+        if event.message.sender == event.message.machine:
+            self._held_us[event.message.sender] = event.time_us
 
     def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
         """Another outcome than the first."""
@@ -121,7 +136,8 @@ class CallsClosed(_CallRule):
             # A sign of the same life after the time is over: before it, the initiator may have died without a word.
             lived_us = self.picture.heard_us.get(seen.call.sender, 0)
             # A caller whose clock is behind may name a deadline that is over when the call is heard.
-            due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us)
+            held_us = self._held_us.get(seen.call.sender, 0)
+            due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us)
             late = lived_us - due_us > CLOSED_WITHIN_US
             if late and self.picture.is_alive(seen.call.sender, seen.boot):
                 seen.told = True

@@ -17,7 +17,7 @@ from onboard.trace.check.doors import Doors
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.holds import LetGoAgain
 from onboard.trace.check.lifts import LiftByGate, LiftCrush, PlatformThere
-from onboard.trace.check.liveness import NobodyStarves, SomethingHappens
+from onboard.trace.check.liveness import NobodyStarves, NoRounds, SomethingHappens
 from onboard.trace.check.motion import InsideAuthority, OneBody
 from onboard.trace.check.owners import OneOwner
 from onboard.trace.check.picture import SETTLING_US, Picture
@@ -49,6 +49,7 @@ RULES: tuple[type[Rule], ...] = (
     FullMeansFull,
     SomethingHappens,
     NobodyStarves,
+    NoRounds,
     LetGoAgain,
 )
 

@@ -14,6 +14,9 @@ from onboard.trace.check.rule import Handlers, Rule
 
 #: Something happens within this, beyond the longest single motion, while there is an open task, us (issue 4, point 1).
 IDLE_WITHIN_US = 60_000_000
+#: A task is awarded at most so often to one machine, and to all, before its car is taken. Restarts, traffic and a
+#: machine that fails make some; who is left out comes back after minutes. Ours.
+MOST_SAME, MOST_ROUNDS = 3, 8
 
 
 def run_us(length_mm: float, axis: Axis) -> int:
@@ -140,6 +143,45 @@ class SomethingHappens(_OpenTasks):
         since_s = (now_us - self._last.time_us) // 1_000_000
         what = f"nothing happened for {since_s} s; {len(self.open)} open tasks, oldest {task.origin}.{task.number}"
         self.find(self._last, (task.origin,), what)
+
+
+class NoRounds(_OpenTasks):
+    """No task goes round: awarded, given back and awarded again, without a car that moves for it.
+
+    What is awarded while faults last is not counted: a machine that was killed gives nothing back.
+    """
+
+    name = "no-rounds"
+    liveness = True
+    title = "no task awarded again and again"
+    source = "issue 13, point 5"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._calls: dict[Reference, dict[int, set[int]]] = {}
+
+    def on_award(self, event: Event[Award]) -> None:
+        """One more round, unless it is only said again."""
+        super().on_award(event)
+        award = event.message
+        is_whole = award.task in self.open and award.sender == award.task.origin
+        if award.result is not CallResult.AWARDED or not is_whole or event.time_us < self.picture.excused_us:
+            return
+        calls = self._calls.setdefault(award.task, {})
+        if award.call in calls.setdefault(award.winner, set()):
+            return
+        calls[award.winner].add(award.call)
+        total = sum(len(one) for one in calls.values())
+        if len(calls[award.winner]) == MOST_SAME + 1 or total == MOST_ROUNDS + 1:
+            what = f"task {award.task.origin}.{award.task.number} is awarded for the {total}th time"
+            what += f", to {award.winner} for the {len(calls[award.winner])}th"
+            self.find(event, (award.sender, award.winner), what)
+
+    def on_report(self, event: Event[TaskReport]) -> None:
+        """A car that is loaded, or a task that is over, ends the rounds."""
+        super().on_report(event)
+        if event.message.phase is TaskPhase.LOADED or event.message.task not in self.open:
+            self._calls.pop(event.message.task, None)
 
 
 class NobodyStarves(Rule):

@@ -219,13 +219,14 @@ def awarding() -> tuple[Bus, Machine]:
     return bus, compartment
 
 
-def test_an_award_that_is_not_heard_is_said_ten_times_quickly_then_at_a_tenth_of_the_pace() -> None:
+def test_an_award_that_is_not_heard_is_said_ten_times_quickly_then_ever_more_slowly() -> None:
     bus, _ = awarding()
     bus.run(20)
     sent_us = [time_us for time_us, message in bus.wire if isinstance(message, Award)]
     gaps = [later - earlier for earlier, later in pairwise(sent_us)]
     assert gaps[:10] == [TIMING.award_repeat_us] * 10
-    assert set(gaps[10:]) == {10 * TIMING.award_repeat_us}
+    assert gaps[10:] == [10 * TIMING.award_repeat_us, *[20 * TIMING.award_repeat_us], *gaps[12:]]
+    assert set(gaps[12:]) == {40 * TIMING.award_repeat_us}
 
 
 def test_only_the_winners_firm_plan_for_this_call_ends_the_award() -> None:
