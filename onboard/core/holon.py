@@ -361,7 +361,7 @@ class Holon:
         if fresh:
             self.tokens.begin_anew(now_us)
             self.negotiation.begin_anew(now_us)
-        return news + self.witness.on_heartbeat(beat, is_fresh=fresh)
+        return news + self.witness.on_heartbeat(beat, now_us, is_fresh=fresh)
 
     def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         if request.whom not in (NOBODY, self.node_id):

@@ -20,8 +20,10 @@ from onboard.core.serial import is_newer
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
 DIGEST_PATIENCE = 2
-#: Who asks within this time of an answer shares the next one, us: at power-up all ask all. Ours.
+#: While machines start, who asks within this time of an answer shares the next one, us: at power-up all ask all. Ours.
 ANSWER_PERIOD_US = 250_000
+#: So many heartbeat periods after the last start seen all have asked; then everybody is answered at once. Ours.
+STARTING_BEATS = 2
 
 
 class Doubt(NamedTuple):
@@ -65,6 +67,7 @@ class Witness:
     _askers: set[int] = field(default_factory=set)
     _answer_at_us: int | None = None
     _quiet_until_us: int | None = None
+    _crowd_until_us: int | None = None
 
     def __post_init__(self) -> None:
         self.site, self.node_id = self.tokens.site, self.tokens.node_id
@@ -82,10 +85,10 @@ class Witness:
         """Whether a machine that was started again has to wait still; in a first life only rights wait."""
         return self.has_past and not self.is_over
 
-    def on_heartbeat(self, beat: Heartbeat, *, is_fresh: bool) -> list[Effect]:
+    def on_heartbeat(self, beat: Heartbeat, now_us: int, *, is_fresh: bool) -> list[Effect]:
         """Ask who is new or was started again, and whose mirror has differed from mine for a while."""
         if is_fresh:
-            self._was_started(beat.sender)
+            self._was_started(beat.sender, now_us)
             return self.ask(beat.sender, self.mirror.boots_before[beat.sender])
         if beat.mirror_digest == self.mirror.digest():
             del self.mismatches[beat.sender]
@@ -107,7 +110,7 @@ class Witness:
         # All answer me now and ask me: what they say in it need not be told to them.
         self._quiet_until_us = now_us + ANSWER_PERIOD_US
         for node in self._others:
-            self._was_started(node)
+            self._was_started(node, now_us)
         return [*self.tokens.statements(), Send(SyncRequest(self.node_id, NOBODY))]
 
     def shift(self, by_us: int) -> None:
@@ -116,6 +119,7 @@ class Witness:
         self._ask_at_us = _later(self._ask_at_us, by_us)
         self._answer_at_us = _later(self._answer_at_us, by_us)
         self._quiet_until_us = _later(self._quiet_until_us, by_us)
+        self._crowd_until_us = _later(self._crowd_until_us, by_us)
 
     def slept(self, now_us: int) -> None:
         """I heard nothing for a while, or my clock has jumped: who has not answered has had no time to."""
@@ -179,8 +183,9 @@ class Witness:
 
     # --- answering ---------------------------------------------------------------------------------------------
 
-    def _was_started(self, node: int) -> None:
+    def _was_started(self, node: int, now_us: int) -> None:
         """A machine was started again: what it held by its own word it has to say again, and what it gave me too."""
+        self._crowd_until_us = now_us + STARTING_BEATS * self.site.timing.heartbeat_us
         self.tokens.drop_disputed(node)
         if not self.starting:
             self.tokens.gifts = set(self.tokens.leaving)
@@ -202,7 +207,8 @@ class Witness:
             # All are asked at power-up only: I knew it before, even where its counter is the same again.
             effects = self.ask(request.sender, known.boot)
         self._askers.add(request.sender)
-        if self._quiet_until_us is not None and now_us < self._quiet_until_us:
+        is_crowded = self._crowd_until_us is not None and now_us < self._crowd_until_us
+        if is_crowded and self._quiet_until_us is not None and now_us < self._quiet_until_us:
             self._answer_at_us = self._quiet_until_us
             return effects
         return self._answer(now_us) + effects

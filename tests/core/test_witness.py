@@ -219,6 +219,7 @@ def test_many_who_ask_at_once_are_answered_once() -> None:
     """At power-up all ask all: one answer at once, one more for all others."""
     steward = Machine(STEWARD, line("token_held", 3, STEWARD))
     steward.knows(ALICE, BOB)
+    steward.witness._was_started(ALICE, START_US)
     first = said(steward.hear(SyncRequest(ALICE, STEWARD)))
     assert first == [TokenHeld(STEWARD, KEY.kind, KEY.number, 3), SyncDone(STEWARD, ALICE, 2)]
     for node in (ALICE, BOB, ALICE, BOB):
@@ -227,6 +228,10 @@ def test_many_who_ask_at_once_are_answered_once() -> None:
     assert due_us == START_US + ANSWER_PERIOD_US
     assert steward.wake(due_us) == [TokenHeld(STEWARD, KEY.kind, KEY.number, 3), SyncDone(STEWARD, 0, 2)]
     assert steward.witness.next_wake() is None
+    later_us = due_us + 10 * BEAT_US
+    for at_us in (later_us, later_us + 5):
+        answered = said(steward.hear(SyncRequest(BOB, STEWARD), at_us))
+        assert answered[-1] == SyncDone(STEWARD, BOB, 2), "one who has missed something is answered at once"
 
 
 def test_what_a_silent_machine_holds_is_told_by_who_knows() -> None:
@@ -260,7 +265,7 @@ def test_a_disputed_grant_ends_with_its_givers_life() -> None:
     alice = Machine(ALICE)
     given = TokenGrant(BOB, KEY.kind, KEY.number, 2, ALICE)
     assert said(alice.tokens.on_grant(given, START_US)) == [TokenDispute(ALICE, KEY.kind, KEY.number, 2, STEWARD)]
-    alice.witness._was_started(BOB)
+    alice.witness._was_started(BOB, START_US)
     alice.tokens.on_given(TokenGiven(STEWARD, KEY.kind, KEY.number, 1, BOB), START_US)
     assert not alice.tokens.holds(KEY)
     alice.tokens.on_grant(given, START_US)
