@@ -14,7 +14,7 @@ import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from bus_sim.sites import find_site
 from onboard.core.authority import Grant, TokenBook, TokenKey, genesis_holder
@@ -26,12 +26,12 @@ from onboard.core.mirror import Mirror, Peer
 from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
 from onboard.core.witness import Doubt, Witness
 from tests.core.token_words import hear
+from tests.models.table import Table
 
 SITE = find_site("small")
 KEY = TokenKey(TokenKind.STATION, next(iter(SITE.compartments.values())).number)
 #: No machine of the site.
 GHOST = 240
-Thing = TypeVar("Thing")
 #: Any moment: whatever is to be said again is due.
 _NOW_US = 1 << 40
 #: One line of a journal: record, version, holder.
@@ -73,22 +73,6 @@ class State(NamedTuple):
     bus: int
     crashes: int
     old_copies: int
-
-
-@dataclass
-class Table(Generic[Thing]):
-    """Things by number, in the order in which they came."""
-
-    things: list[Thing] = field(default_factory=list)
-    _numbers: dict[Thing, int] = field(default_factory=dict)
-
-    def number(self, thing: Thing) -> int:
-        """The number of a thing, new or known."""
-        found = self._numbers.get(thing)
-        if found is None:
-            found = self._numbers[thing] = len(self.things)
-            self.things.append(thing)
-        return found
 
 
 @dataclass(frozen=True)
