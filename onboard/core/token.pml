@@ -5,9 +5,19 @@
  * Machines crash between any two effects and start again from their journal, CRASHES times in all.
  *
  * Variants: SEND_FIRST plants a bug, the frame before the journal write. LIVE takes frames off the bus, LOSSES times,
- * and asks whether a requested token moves once that is over; ONE_GRANT plants a bug there, a grant never repeated.
+ * and asks whether a requested token moves once that is over; ONE_GRANT plants a bug there, a grant never repeated; with
+ * MISSED machine 1 has missed how the token came to where it is, and NO_ANSWER plants a bug: disputes are not answered.
  * TRACE leaves out the processes: what a run of the controllers did is then a sequence of these same steps, and a step that the model does not have blocks.
- * Not modelled: versions that wrap, and a journal that is lost or torn.
+ *
+ * Rules that can be left out, each a macro that makes two holders or loses the token:
+ * GHOST: a foreign node says that it gives any version to anybody, and that it holds the token. A machine takes a grant
+ *   from whom it believes to hold (left out: GULLIBLE), and what it holds leaves by its own hand (left out: MEEK).
+ * OLD_COPY: once a machine starts from an old copy of its journal, while all others live. It asks them what they know
+ *   (left out: NO_WITNESS), and where they know newer it stands for a person.
+ * REGENERATE: a person has the rights of a machine that is down made anew. All are frozen meanwhile (left out: NO_FREEZE),
+ *   the version is above every one known, leaving grants too (left out: NOT_ABOVE), and the machine that was declared
+ *   lost stays out under its old epoch if it comes back (left out: NO_EPOCH).
+ * SERIAL: versions of 3 bits that wrap, as they did once: a rule left out for good.
  */
 #ifndef NODES
 #define NODES 3
@@ -30,9 +40,36 @@
 #define TAKE_SEND 4
 #define GONE_RECORD 5
 #define DOWN 6
+#define STANDS 7
 
 #define AT(version, node) ((version) * NODES + (node))
+#ifdef SERIAL
+#define NEXT(version) (((version) + 1) & 7)
+#define NEWS(n, version) ((((version) - seen[n]) & 7) > 0 && (((version) - seen[n]) & 7) < 4)
+#define MORE(n) true
+#else
+#define NEXT(version) ((version) + 1)
 #define NEWS(n, version) ((version) > seen[n])
+#define MORE(n) (seen[n] < VERSIONS)
+#endif
+#define NOBODY NODES
+/* A grant of this version comes from whom n believes to hold; a trace knows nothing of beliefs. */
+#if defined(GULLIBLE) || defined(TRACE) || !defined(BELIEFS)
+#define FROM_HOLDER(n, version) true
+#else
+#define FROM_HOLDER(n, version) (giver[version] == believed[n])
+#endif
+#ifdef REGENERATE
+#define FREE (!frozen)
+#else
+#define FREE true
+#endif
+/* A machine of an older epoch is an obstacle. */
+#if defined(REGENERATE) && !defined(NO_EPOCH)
+#define OF_THIS_EPOCH(n) (lost_one != n)
+#else
+#define OF_THIS_EPOCH(n) true
+#endif
 
 byte todo[NODES];
 /* Memory: whether it holds the token, the newest version seen, and the grant that its receiver has not confirmed. */
@@ -50,6 +87,27 @@ bool granted[AT(VERSIONS + 1, 0)];
 bool stated[AT(VERSIONS + 1, 0)];
 /* The newest version that anybody gave, by its journal: whoever asks can hear of it. */
 byte newest;
+#if defined(BELIEFS) && !defined(TRACE)
+/* Who gave each version, whom each machine believes to hold, and to whom it gave last, from its journal. */
+byte giver[VERSIONS + 1];
+byte believed[NODES];
+byte given_to[NODES];
+#endif
+#ifdef OLD_COPY
+bool has_copy;
+byte copied;
+bool copy_holds;
+byte copy_seen;
+byte copy_leaving;
+byte copy_receiver;
+bool restored;
+#endif
+#ifdef REGENERATE
+bool frozen;
+bool regenerated;
+byte lost_one;
+byte maximum;
+#endif
 byte crashes;
 byte losses;
 
@@ -64,10 +122,24 @@ inline alone(n) {
     other_ = 0
 }
 
+/* The token is with somebody, or on its way. */
+inline somewhere() {
+    other_ = 0;
+    do
+    :: other_ < NODES && (holds[other_] || leaving[other_] != 0) -> break
+    :: other_ < NODES && !(holds[other_] || leaving[other_] != 0) -> other_++
+    :: other_ >= NODES -> assert(false)
+    od;
+    other_ = 0
+}
+
 inline give(n, to) {
     atomic {
-        todo[n] == IDLE && holds[n] && seen[n] < VERSIONS && n != to;
-        holds[n] = false; seen[n] = seen[n] + 1; leaving[n] = seen[n]; receiver[n] = to;
+        todo[n] == IDLE && holds[n] && MORE(n) && n != to && FREE;
+        holds[n] = false; seen[n] = NEXT(seen[n]); leaving[n] = seen[n]; receiver[n] = to;
+#if defined(BELIEFS) && !defined(TRACE)
+        giver[seen[n]] = n; believed[n] = to; given_to[n] = to;
+#endif
 #ifdef SEND_FIRST
         todo[n] = GIVE_SEND
 #else
@@ -107,7 +179,10 @@ inline grant_again(n) {
 
 inline accept(n, version) {
     atomic {
-        todo[n] == IDLE && granted[AT(version, n)] && NEWS(n, version);
+        todo[n] == IDLE && granted[AT(version, n)] && NEWS(n, version) && FROM_HOLDER(n, version) && FREE;
+#if defined(BELIEFS) && !defined(TRACE)
+        believed[n] = n;
+#endif
         holds[n] = true; seen[n] = version; leaving[n] = 0; receiver[n] = 0; todo[n] = TAKE_RECORD;
         alone(n)
     }
@@ -145,14 +220,14 @@ inline record_gone(n) {
 
 inline crash(n) {
     atomic {
-        todo[n] != DOWN && crashes < CRASHES;
+        todo[n] != DOWN && todo[n] != STANDS && crashes < CRASHES;
         crashes++; holds[n] = false; seen[n] = 0; leaving[n] = 0; receiver[n] = 0; todo[n] = DOWN
     }
 }
 
 inline restart(n) {
     atomic {
-        todo[n] == DOWN;
+        todo[n] == DOWN && OF_THIS_EPOCH(n);
         holds[n] = kept_holds[n]; seen[n] = kept_seen[n]; leaving[n] = kept_leaving[n]; receiver[n] = kept_receiver[n];
         todo[n] = IDLE;
         if
@@ -161,6 +236,135 @@ inline restart(n) {
         fi
     }
 }
+
+#ifdef BELIEFS
+#ifndef TRACE
+/* A grant of whom it believes, to another, is overheard. */
+inline overhear(n, version, whom) {
+    atomic {
+        todo[n] == IDLE && !holds[n] && n != whom && granted[AT(version, whom)] && version > 0 && giver[version] == believed[n];
+        believed[n] = whom
+    }
+}
+
+/* It doubts a grant and asks whom it believes, who answers from its journal to whom it gave. */
+inline ask(n) {
+    atomic {
+        todo[n] == IDLE && !holds[n] && believed[n] != n && todo[believed[n]] == IDLE && !holds[believed[n]] &&
+            given_to[believed[n]] != NOBODY && given_to[believed[n]] != n;
+        believed[n] = given_to[believed[n]]
+    }
+}
+#endif
+#endif
+
+#ifdef OLD_COPY
+/* Somebody keeps a copy of a machine's journal. */
+inline copy_journal(n) {
+    atomic {
+        !has_copy;
+        has_copy = true; copied = n; copy_holds = kept_holds[n]; copy_seen = kept_seen[n];
+        copy_leaving = kept_leaving[n]; copy_receiver = kept_receiver[n]
+    }
+}
+
+/* The machine starts from it while all others live; what was said before is heard no more. */
+inline restore(n) {
+    atomic {
+        has_copy && !restored && copied == n && todo[n] == DOWN;
+        other_ = 0;
+        do
+        :: other_ < NODES && (other_ == n || todo[other_] != DOWN) -> other_++
+        :: else -> break
+        od;
+        if
+        :: other_ < NODES -> other_ = 0
+        :: else ->
+            restored = true; other_ = 0;
+            do
+            :: other_ < AT(VERSIONS + 1, 0) -> granted[other_] = false; stated[other_] = false; other_++
+            :: else -> break
+            od;
+            kept_holds[n] = copy_holds; kept_seen[n] = copy_seen; kept_leaving[n] = copy_leaving;
+            kept_receiver[n] = copy_receiver;
+            holds[n] = copy_holds; seen[n] = copy_seen; leaving[n] = copy_leaving; receiver[n] = copy_receiver;
+            todo[n] = IDLE; other_ = 0;
+#ifndef NO_WITNESS
+            do
+            :: other_ < NODES && seen[other_] > copy_seen && other_ != n -> holds[n] = false; todo[n] = STANDS; break
+            :: other_ < NODES && !(seen[other_] > copy_seen && other_ != n) -> other_++
+            :: other_ >= NODES -> break
+            od;
+#endif
+            other_ = 0;
+            if
+            :: holds[n] -> alone(n)
+            :: else
+            fi
+        fi
+    }
+}
+#endif
+
+#ifdef REGENERATE
+/* A machine is down and a person says that it is lost. */
+inline freeze(n) {
+    atomic {
+        todo[n] == DOWN && !frozen && !regenerated && lost_one == NOBODY;
+        lost_one = n;
+#ifndef NO_FREEZE
+        frozen = true
+#endif
+    }
+}
+
+/* What all others hold, gave away or have under way is known: the maximum, and whether one of them has the token. */
+inline collect(n) {
+    atomic {
+        n == 0 && lost_one != NOBODY && maximum == 0 && !regenerated;
+        other_ = 0;
+        do
+        :: other_ < NODES && other_ != lost_one && (todo[other_] != IDLE || holds[other_]) -> break
+#ifdef NOT_ABOVE
+        :: other_ < NODES && (other_ == lost_one || (todo[other_] == IDLE && !holds[other_])) -> other_++
+#else
+        :: other_ < NODES && (other_ == lost_one || (todo[other_] == IDLE && !holds[other_])) ->
+            if
+            :: other_ != lost_one && seen[other_] > maximum -> maximum = seen[other_]
+            :: else
+            fi;
+            other_++
+#endif
+        :: other_ >= NODES -> break
+        od;
+        if
+        :: other_ < NODES -> maximum = 0
+        :: else -> maximum = maximum + 1
+        fi;
+        other_ = 0
+    }
+}
+
+/* The token is assigned to n under the new epoch; everybody forgets what is older. */
+inline commit(n) {
+    atomic {
+        maximum > 0 && !regenerated && n != lost_one && todo[n] == IDLE && maximum <= VERSIONS;
+        regenerated = true; other_ = 0;
+        do
+        :: other_ < NODES && other_ != lost_one ->
+            if
+            :: seen[other_] < maximum -> seen[other_] = maximum; kept_seen[other_] = maximum
+            :: else
+            fi;
+            leaving[other_] = 0; receiver[other_] = 0; kept_leaving[other_] = 0; kept_receiver[other_] = 0; other_++
+        :: other_ == lost_one -> other_++
+        :: other_ >= NODES -> break
+        od;
+        other_ = 0; holds[n] = true; kept_holds[n] = true; frozen = false; maximum = 0;
+        alone(n)
+    }
+}
+#endif
 
 /* What a run's controller remembers after a step is what the model remembers. */
 inline expect(n, is_holder, version, outgoing) {
@@ -205,7 +409,7 @@ end:
 proctype giving(byte n, to) {
 end:
     do
-    :: atomic { GIVES(to) && todo[n] == IDLE && holds[n] && seen[n] < VERSIONS -> give(n, to) }
+    :: atomic { GIVES(to) && todo[n] == IDLE && holds[n] && MORE(n) -> give(n, to) }
     od
 }
 
@@ -215,6 +419,68 @@ end:
     :: accept(n, version)
     od
 }
+
+#ifdef GHOST
+/* A node that the site does not have says all that it can: its grants are believed by the gullible, its claims by the meek. */
+proctype ghost(byte n, version) {
+end:
+    do
+#ifdef GULLIBLE
+    :: atomic {
+        todo[n] == IDLE && NEWS(n, version) ->
+        holds[n] = true; seen[n] = version; leaving[n] = 0; receiver[n] = 0; todo[n] = TAKE_RECORD;
+        alone(n)
+    }
+#endif
+#ifdef MEEK
+    :: atomic {
+        todo[n] == IDLE && holds[n] && NEWS(n, version) -> holds[n] = false; seen[n] = version; somewhere()
+    }
+#endif
+    :: atomic { granted[AT(version, n)] && todo[n] == IDLE && holds[n] && NEWS(n, version) -> skip }
+    od
+}
+#endif
+
+#ifdef BELIEFS
+proctype believing(byte n, version, whom) {
+end:
+    do
+    :: overhear(n, version, whom)
+    od
+}
+
+proctype asking(byte n) {
+end:
+    do
+#ifndef NO_ANSWER
+    :: ask(n)
+#endif
+    :: false
+    od
+}
+#endif
+
+#ifdef OLD_COPY
+proctype medium(byte n) {
+end:
+    do
+    :: copy_journal(n)
+    :: restore(n)
+    od
+}
+#endif
+
+#ifdef REGENERATE
+proctype operator(byte n) {
+end:
+    do
+    :: freeze(n)
+    :: collect(n)
+    :: commit(n)
+    od
+}
+#endif
 
 #ifdef LIVE
 proctype noise() {
@@ -232,14 +498,38 @@ init {
     byte i, j, v;
     atomic {
         holds[0] = true; kept_holds[0] = true;
+#ifdef BELIEFS
+        for (i : 0 .. NODES - 1) { given_to[i] = NOBODY }
+#endif
+#ifdef MISSED
+        believed[1] = 2; given_to[2] = 0; seen[0] = 1; kept_seen[0] = 1;
+#endif
+#ifdef REGENERATE
+        lost_one = NOBODY;
+        for (i : 0 .. NODES - 1) { run operator(i) }
+#endif
         for (i : 0 .. NODES - 1) {
             run machine(i);
+#ifdef BELIEFS
+            run asking(i);
+#endif
+#ifdef OLD_COPY
+            run medium(i);
+#endif
             for (j : 0 .. NODES - 1) {
                 if
                 :: i != j ->
-                    run giving(i, j)
+                    run giving(i, j);
+#ifdef BELIEFS
+                    for (v : 1 .. VERSIONS) { run believing(i, v, j) }
+#endif
                 :: else ->
-                    for (v : 1 .. VERSIONS) { run accepting(i, v) }
+                    for (v : 1 .. VERSIONS) {
+                        run accepting(i, v);
+#ifdef GHOST
+                        run ghost(i, v)
+#endif
+                    }
                 fi
             }
         }

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import pytest
+
 from tests.models.spin import NEGOTIATION, TOKEN, verify
 
 
@@ -35,3 +37,31 @@ def test_the_silent_award_makes_two_owners_with_one_single_omission(tmp_path: Pa
     assert found.errors == 1
     assert "assertion violated" in found.report
     assert found.trail.count("= 3") >= 1, "the trail shows the bid that was missed"
+
+
+@pytest.mark.parametrize(
+    ("rules", "left_out"),
+    [
+        (("GHOST", "BELIEFS", "VERSIONS=4"), ("GULLIBLE",)),
+        (("GHOST", "BELIEFS", "VERSIONS=4"), ("MEEK",)),
+        (("OLD_COPY", "VERSIONS=4"), ("NO_WITNESS",)),
+        (("REGENERATE", "VERSIONS=4"), ("NO_FREEZE",)),
+        (("REGENERATE", "VERSIONS=4"), ("NOT_ABOVE",)),
+        (("REGENERATE", "VERSIONS=4"), ("NO_EPOCH",)),
+        (("NODES=2", "VERSIONS=7", "CRASHES=0"), ("SERIAL",)),
+    ],
+    ids="-".join,
+)
+def test_each_rule_keeps_the_token_with_one_holder(
+    rules: tuple[str, ...], left_out: tuple[str, ...], tmp_path: Path
+) -> None:
+    kept = verify(tmp_path, TOKEN, *rules)
+    assert kept.errors == 0, kept.trail
+    found = verify(tmp_path, TOKEN, *rules, *left_out)
+    assert found.errors == 1 and "assertion violated" in found.report
+
+
+def test_who_missed_how_a_token_moved_gets_it_by_asking(tmp_path: Path) -> None:
+    macros = ("LIVE", "BELIEFS", "MISSED", "VERSIONS=2", "LOSSES=1")
+    assert verify(tmp_path, TOKEN, *macros, is_liveness=True).errors == 0
+    assert verify(tmp_path, TOKEN, *macros, "NO_ANSWER", is_liveness=True).errors == 1
