@@ -230,11 +230,30 @@ def test_many_who_ask_at_once_are_answered_once() -> None:
 
 
 def test_what_a_silent_machine_holds_is_told_by_who_knows() -> None:
-    """Bob is away: his journal tells nobody that Alice gave it to him."""
-    steward = Machine(STEWARD)
-    steward.knows(ALICE)
-    steward.tokens.beliefs.take_up(KEY, 4, BOB, confirmed=True)
-    assert TokenSeen(STEWARD, KEY.kind, KEY.number, 4, BOB) in said(steward.hear(SyncRequest(ALICE, STEWARD)))
+    """Bob is away: his journal cannot tell that the steward gave it to him."""
+    alice = Machine(ALICE)
+    alice.knows(STEWARD)
+    alice.tokens.beliefs.take_up(KEY, 4, BOB, confirmed=True)
+    assert TokenSeen(ALICE, KEY.kind, KEY.number, 4, BOB) in said(alice.hear(SyncRequest(STEWARD, ALICE)))
+
+
+def test_a_grant_that_nobody_confirmed_proves_nothing_about_its_receiver() -> None:
+    """Bob was given it and may never have heard of it; that the steward had it and gave it away is sure."""
+    alice = Machine(ALICE)
+    alice.knows(STEWARD)
+    alice.tokens.on_grant(TokenGrant(STEWARD, KEY.kind, KEY.number, 1, BOB), START_US)
+    told = said(alice.hear(SyncRequest(STEWARD, ALICE)))
+    assert TokenSeen(ALICE, KEY.kind, KEY.number, 1, STEWARD) in told
+    bob = Machine(BOB)
+    bob.start()
+    for word in told:
+        bob.hear(word)
+    assert bob.witness.doubt is None
+    forgetful = Machine(STEWARD)
+    forgetful.start()
+    for word in told:
+        forgetful.hear(word)
+    assert forgetful.witness.doubt is not None
 
 
 def test_a_disputed_grant_ends_with_its_givers_life() -> None:
