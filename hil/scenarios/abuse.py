@@ -36,10 +36,10 @@ async def refuses_duplicate_node_id(stage: Stage) -> None:
     """Another node speaks under its node-ID: it holds, and says so in each beat and on its console; it does no more."""
     await stage.power_on()
     own = await stage.takes_part(JOIN_S)
-    since = stage.mark()
     # Not the very same frame, which would be acknowledged as one where both are sent at once.
     stage.say(replace(own, boot=own.boot % 255 + 1))
     await stage.first_own(Halted, "word that it holds", JOIN_S, lambda one: one.reason is Reason.DUPLICATE_NODE_ID)
+    since = stage.mark()
     await stage.beats(min(stage.simulation.controllers), 1, BEATS_S)
     acts = [one for one in stage.own(Message, since) if not isinstance(one.message, _OF_WHO_HOLDS)]
     assert not acts, f"it still acts: {acts[0].message}"
