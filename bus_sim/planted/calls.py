@@ -39,7 +39,7 @@ def _takes_others_tasks(simulation: Simulation) -> None:
 
 
 def _no_award(simulation: Simulation) -> None:
-    saying(simulation, KindCode.COMPARTMENT, lambda message: [] if _is_award(message) else [message])
+    saying(simulation, KindCode.COMPARTMENT, lambda message: [] if isinstance(message, Award) else [message])
 
 
 def _awards_twice(simulation: Simulation) -> None:
@@ -135,7 +135,7 @@ _BID_ID = 2302214144 & 0x1FFFFFFF
 BUGS = (
     PlantedBug("silent-form", "one-owner", "the award is believed and not said", _silent_form),
     PlantedBug("takes-others-tasks", "one-owner", "every robot takes an award for its own", _takes_others_tasks),
-    PlantedBug("no-award", "calls-closed", "an initiator never says who has won", _no_award),
+    PlantedBug("no-award", "calls-closed", "an initiator never says how its calls end", _no_award),
     PlantedBug("awards-twice", "calls-closed", "an initiator awards a task to two", _awards_twice),
     PlantedBug("awards-whom-it-likes", "bids-in-time", "an initiator awards one that never bid", _awards_whom_it_likes),
     PlantedBug("late-bids-count", "bids-in-time", "an initiator counts bids after its deadline", _late_bids_count),

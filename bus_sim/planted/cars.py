@@ -7,25 +7,25 @@ from dataclasses import replace as changed
 from typing import Any
 
 from bus_sim.planted.bug import PlantedBug
-from bus_sim.planted.tools import at_start, in_behaviour, replace, saying
+from bus_sim.planted.tools import in_behaviour, replace, saying
 from bus_sim.run import Simulation
-from onboard.controller.shell import Controller
 from onboard.core.authority import car_token
-from onboard.core.codes import ANY_STATION, KindCode, ShuttleAction, TokenKind
+from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, ShuttleAction, TokenKind
 from onboard.core.effects import Send
 from onboard.core.messages import CarAt, Message, ShuttleOrder, TokenGrant
 from onboard.kinds.car_park.handling import Phase
 from onboard.kinds.car_park.site import car_park
 
 
-def _all_places_free(simulation: Simulation) -> None:
-    """Every machine takes every place for free, and no sensor in a place contradicts."""
+def _all_in_one_place(simulation: Simulation) -> None:
+    """Robots say of every car that they leave that it stands in the first place."""
+    first = car_park(simulation.site).places[0].number
 
-    def plant(controller: Controller) -> None:
-        places = list(controller.holon.site.places)
-        replace(controller.holon.mirror, "free_places", lambda _: lambda *_arguments, **_named: list(places))
+    def say(message: Message) -> list[Message]:
+        is_left = isinstance(message, CarAt) and message.station not in (ANY_STATION, OUTSIDE)
+        return [changed(message, station=first)] if isinstance(message, CarAt) and is_left else [message]
 
-    at_start(simulation, None, plant)
+    saying(simulation, KindCode.ROBOT, say)
 
 
 def _not_said_aboard(simulation: Simulation) -> None:
@@ -66,6 +66,7 @@ def _everybodys_car(simulation: Simulation) -> None:
 
         replace(compartment, "hear", make)
 
+    in_behaviour(simulation, KindCode.ROBOT, lambda robot: replace(robot.going_around.places, "lost", lambda _: list))
     for kind in (KindCode.COMPARTMENT, KindCode.LIFT):
         in_behaviour(simulation, kind, plant)
 
@@ -113,7 +114,7 @@ def _and_no_home_switch(simulation: Simulation) -> None:
 
 
 BUGS = (
-    PlantedBug("all-places-free", "cars-conserved", "every place is taken for free", _all_places_free),
+    PlantedBug("all-in-one-place", "cars-conserved", "all cars are said to stand in one place", _all_in_one_place),
     PlantedBug("not-said-aboard", "cars-conserved", "robots do not say that they took a car", _not_said_aboard),
     PlantedBug("custody-first", "one-custodian", "a car is stated under a version passed on", _custody_first),
     PlantedBug("everybodys-car", "one-custodian", "fixed machines state cars that are not theirs", _everybodys_car),

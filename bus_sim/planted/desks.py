@@ -10,7 +10,7 @@ from bus_sim.planted.bug import PlantedBug
 from bus_sim.planted.tools import at_start, hearing, in_behaviour, replace, saying
 from bus_sim.run import Simulation
 from onboard.controller.shell import Controller
-from onboard.core.codes import CallResult, DeskInput, DeskText, DoorPosition, KindCode, Reason, TaskPhase
+from onboard.core.codes import CallResult, DeskInput, DeskText, DoorPosition, KindCode, Reason, TaskPhase, TokenKind
 from onboard.core.messages import (
     Award,
     BayState,
@@ -103,19 +103,14 @@ def _always_full(simulation: Simulation) -> None:
     saying(simulation, KindCode.COMPARTMENT, say)
 
 
-def _takes_and_sleeps(simulation: Simulation) -> None:
-    """A robot takes a task on, says so, and does nothing."""
+def _places_kept(simulation: Simulation) -> None:
+    """Stewards give nobody the right to a place."""
 
-    def plant(robot: Any) -> None:
-        def make(old: Callable[..., Any]) -> Callable[..., Any]:
-            def advance(now_us: int) -> Any:
-                return [] if robot.program.step is not None else old(now_us)
+    def keep(old: Callable[..., Reason]) -> Callable[..., Reason]:
+        return lambda key, *rest: Reason.TOKEN_HELD_BY_OTHER if key.kind is TokenKind.STATION else old(key, *rest)
 
-            return advance
-
-        replace(robot, "advance", make)
-
-    in_behaviour(simulation, KindCode.ROBOT, plant)
+    for kind in (KindCode.COMPARTMENT, KindCode.LIFT):
+        in_behaviour(simulation, kind, lambda steward: replace(steward.stewardship, "may_grant", keep))
 
 
 def _drives_dead(simulation: Simulation) -> None:
@@ -149,7 +144,7 @@ def _refused_without_why(simulation: Simulation) -> None:
 
 
 def _forgets_its_award(simulation: Simulation) -> None:
-    """A robot hears that it won, says so, and forgets it."""
+    """A robot forgets what it won, and no desk tells that its task came to nothing."""
 
     def ears(_: object) -> Callable[[Message], Message | None]:
         def hear(message: Message) -> Message | None:
@@ -158,6 +153,13 @@ def _forgets_its_award(simulation: Simulation) -> None:
         return hear
 
     hearing(simulation, KindCode.ROBOT, ears)
+    saying(simulation, KindCode.COMPARTMENT, lambda message: [] if _is_an_end(message) else [message])
+
+
+def _is_an_end(message: Message) -> bool:
+    if isinstance(message, TaskReport):
+        return message.phase is TaskPhase.REFUSED
+    return isinstance(message, Award) and message.result is not CallResult.AWARDED
 
 
 def _blind_to_persons(simulation: Simulation) -> None:
@@ -184,7 +186,7 @@ BUGS = (
     PlantedBug("tickets-lost", "customers-served", "a desk loses tickets", _tickets_lost),
     PlantedBug("full-too-soon", "full-means-full", "a park with one car is called full", _full_too_soon),
     PlantedBug("always-full", "full-means-full", "a desk says FULL to everybody", _always_full),
-    PlantedBug("takes-and-sleeps", "something-happens", "robots win tasks and do nothing", _takes_and_sleeps),
+    PlantedBug("places-kept", "something-happens", "stewards give nobody the right to a place", _places_kept),
     PlantedBug("drives-dead", "something-happens", "no drive gets its orders", _drives_dead),
     PlantedBug("refused-without-why", "tasks-served", "a task is refused without a reason", _refused_without_why),
     PlantedBug("forgets-its-award", "tasks-served", "awards are never acted upon", _forgets_its_award),

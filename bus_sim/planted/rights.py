@@ -1,14 +1,15 @@
 """Bugs in authority: tokens doubled, motion without them or beyond them."""
 
 from collections.abc import Callable
+from dataclasses import replace as changed
 from typing import Any
 
 from bus_sim.planted.bug import PlantedBug
-from bus_sim.planted.tools import at_start, hearing, in_behaviour, reaches_goal, replace
+from bus_sim.planted.tools import at_start, hearing, in_behaviour, reaches_goal, replace, saying
 from bus_sim.run import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, Reason, TokenKind
-from onboard.core.messages import CallForProposals, Itinerary, Message, Progress
+from onboard.core.messages import CallForProposals, Itinerary, Message, Progress, TokenHeld
 
 
 def _without_erasing(simulation: Simulation) -> None:
@@ -66,12 +67,13 @@ def _sees_nobody(simulation: Simulation) -> None:
     _alone(simulation)
 
 
-def _version_not_raised(simulation: Simulation) -> None:
-    def plant(controller: Controller) -> None:
-        tokens = controller.holon.tokens
-        replace(tokens, "_grant", lambda old: lambda key, version, to: old(key, version - 1, to))
+def _never_given(simulation: Simulation) -> None:
+    """A robot states every right that it gets under the next version as well."""
 
-    at_start(simulation, None, plant)
+    def say(message: Message) -> list[Message]:
+        return [message, changed(message, version=message.version + 1)] if isinstance(message, TokenHeld) else [message]
+
+    saying(simulation, KindCode.ROBOT, say)
 
 
 def _steward_for_ever(simulation: Simulation) -> None:
@@ -132,7 +134,7 @@ def _all_is_mine(simulation: Simulation) -> None:
 
 
 BUGS = (
-    PlantedBug("version-not-raised", "one-holder", "a token is given under the version it had", _version_not_raised),
+    PlantedBug("never-given", "one-holder", "a right is stated under a version that nobody gave", _never_given),
     PlantedBug("steward-for-ever", "one-holder", "a steward takes others' slots for its own", _others_are_mine),
     PlantedBug("keeps-what-it-gives", "doors", "a compartment gives its bay and does not erase it", _without_erasing),
     PlantedBug("drives-unasked", "inside-authority", "a robot drives to its goal, whatever it holds", _unasked),

@@ -20,7 +20,7 @@ MEMORY_MB = 1536
 #: The guest's clock counts its instructions, two nanoseconds each, and jumps to the next timer when nothing is to be
 #: done (QEMU, "TCG Instruction Counting"). So it sees a processor of 500 million instructions a second, about that of
 #: a small board, however busy the host is; on the host's clock a busy host would make every controller late.
-ICOUNT = "shift=1,sleep=off"
+ICOUNT = "shift=1,sleep=on"
 #: The most processor time of the host for a second of the guest's: one of nothing but work takes one to two.
 WORK_PER_SECOND = 4.0
 #: What is left after the guest's own limit has ended the script: the end of the guest, s of its time.

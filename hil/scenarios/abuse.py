@@ -11,12 +11,14 @@ from onboard.core.frame import Frame
 from onboard.core.messages import (
     Award,
     Bid,
+    BusTime,
     CallForProposals,
     Diagnostic,
     DriveState,
     Heartbeat,
     Message,
 )
+from onboard.core.recovery_messages import Halted
 
 #: Frames of a flood: three quarters of a second of a full bus at 500 kbit/s, of eight bytes each.
 FLOOD_FRAMES = 2_400
@@ -26,20 +28,23 @@ _FLOOD_WINDOW = 16
 FLOOD_ID = 0x00FF_00FD
 
 
+#: What a machine says that holds: who it is, why, what it dropped; and the time, if all others go by it.
+_OF_WHO_HOLDS = Heartbeat | Halted | Diagnostic | BusTime
+
+
 async def refuses_duplicate_node_id(stage: Stage) -> None:
-    """Another node speaks under its node-ID: it stops where it is, falls silent, and says why on its console."""
+    """Another node speaks under its node-ID: it holds, and says so in each beat and on its console; it does no more."""
     await stage.power_on()
     own = await stage.takes_part(JOIN_S)
     # Not the very same frame, which would be acknowledged as one where both are sent at once.
     stage.say(replace(own, boot=own.boot % 255 + 1))
-    # Frames that were under way when the twin spoke.
-    await stage.beats(min(stage.simulation.controllers), 1, BEATS_S)
+    await stage.first_own(Halted, "word that it holds", JOIN_S, lambda one: one.reason is Reason.DUPLICATE_NODE_ID)
     since = stage.mark()
-    await stage.beats(min(stage.simulation.controllers), 3, BEATS_S)
-    heard = stage.own(Message, since)
-    assert not heard, f"it still speaks: {heard[0].message}"
+    await stage.beats(min(stage.simulation.controllers), 1, BEATS_S)
+    acts = [one for one in stage.own(Message, since) if not isinstance(one.message, _OF_WHO_HOLDS)]
+    assert not acts, f"it still acts: {acts[0].message}"
     said = await stage.device.console()
-    assert "another node sends under this node-ID" in said, f"its console does not tell why: {said[-300:]!r}"
+    assert "held: DUPLICATE_NODE_ID" in said, f"its console does not tell why: {said[-300:]!r}"
 
 
 async def refuses_wrong_site(stage: Stage) -> None:

@@ -36,9 +36,9 @@ SCENARIOS: tuple[Scenario, ...] = (
         "refuses a duplicate node-ID",
         refuses_duplicate_node_id,
         _BUS | {Capability.CONSOLE},
+        drops=frozenset({Reason.DUPLICATE_NODE_ID}),
         wire_errors=True,
         late=True,
-        ends=True,
     ),
     Scenario(
         "refuses another site's file",

@@ -175,7 +175,7 @@ class Holon:
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
-        self.admission.speakers = speakers
+        self.admission.speakers = dict(speakers)
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""

@@ -99,9 +99,19 @@ class Rights:
         effects: list[Effect] = []
         for key in list(self.petitions.open):
             for requester in self.petitions.due(key, now_us) if self.tokens.holds(key) else ():
-                if self.tokens.holds(key) and self.may_grant(key, requester, now_us) is Reason.NONE:
+                if not self.tokens.holds(key) or not self._was_heard_of_late(requester, now_us):
+                    continue
+                if self.may_grant(key, requester, now_us) is Reason.NONE:
                     effects += self.tokens.give(key, requester, now_us)
         return effects
+
+    def _was_heard_of_late(self, requester: int, now_us: int) -> bool:
+        """Whether an old request is still somebody's: a right that is given to a dead machine is gone with it.
+
+        A machine that lives is heard in each heartbeat period; it gets the right with its next word.
+        """
+        peer = self.mirror.peers.get(requester)
+        return peer is None or now_us - peer.heard_at_us <= self.site.timing.heartbeat_us * 5 // 4
 
     def petition_due(self) -> int | None:
         """When the first request for a token held here is to be looked at again, bus time in us; None for never."""

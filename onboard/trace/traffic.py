@@ -32,6 +32,7 @@ _ALL = (KindCode.ROBOT, KindCode.LIFT, KindCode.COMPARTMENT)
 _ROBOT = (KindCode.ROBOT,)
 _LIFT = (KindCode.LIFT,)
 _COMPARTMENT = (KindCode.COMPARTMENT,)
+_STEWARDS = (KindCode.COMPARTMENT, KindCode.LIFT)
 
 
 class Numbers(NamedTuple):
@@ -132,8 +133,8 @@ _OPERATION = (
         lambda _: _SECOND_US // 2,
         "segments at top speed; it stops, is at its place, and the next leg begins",
     ),
-    Row("Blocked", _ALL, _one, _second, "a person or a sensor says so, once"),
-    Row("Clear", _ALL, _one, _second, "the same"),
+    Row("Blocked", _STEWARDS, _one, _second, "a person says so, and the track's steward says it again, once"),
+    Row("Clear", _STEWARDS, _one, _second, "the same"),
     Row("Waiting", _ROBOT, _two, _second, "once for each thing waited for"),
     Row("TaskReport", _ROBOT, _two, _second, "one phase ends and the next begins"),
     Row("TaskReport", (), _rides, _window, "one for each ride won"),
@@ -145,6 +146,7 @@ _OPERATION = (
 #: first. Nobody holds cars or has plans yet.
 _POWER_UP = (
     Row("SyncRequest", _ALL, lambda n: n.nodes, lambda n: 5 * n.heartbeat_us, "to all, and to each new peer"),
+    Row("SyncDone", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "after all that is said to who asks"),
     Row("TokenHeld", _ALL, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
     Row("ItineraryHead", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "to each that asks"),
     Row("ItineraryLeg", _ROBOT, lambda n: 2 * n.nodes, lambda n: 5 * n.heartbeat_us, "an idle robot's one leg"),

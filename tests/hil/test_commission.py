@@ -15,6 +15,7 @@ from hil.commission.setting import Setting
 from hil.commission.walk import walk
 from hil.play import stop_fleet
 from onboard.config.site import parse_site
+from onboard.core.codes import CONTRACT_VERSION
 from onboard.core.messages import DriveOrder, Message
 from onboard.core.site import Site
 from tests.hil.bench_files import BENCHES
@@ -188,8 +189,8 @@ def test_another_site_file_ends_the_walk_and_names_the_machines() -> None:
     slow = parse_site((BENCHES / "bench.toml").read_text().replace("door_ms = 500", "door_ms = 600"), "bench.toml")
     protocol, _ = commission(site=slow)
     assert verdicts(protocol)["digests"] is Verdict.FAILED
-    assert f"IOC1 contract 1, site {SITE.digest:04X}" in detail(protocol, "digests")
-    assert f"here contract 1, site {slow.digest:04X}" in detail(protocol, "digests")
+    assert f"IOC1 contract {CONTRACT_VERSION}, site {SITE.digest:04X}" in detail(protocol, "digests")
+    assert f"here contract {CONTRACT_VERSION}, site {slow.digest:04X}" in detail(protocol, "digests")
 
 
 def test_an_emergency_stop_that_does_not_stop_the_drive_is_found() -> None:

@@ -119,7 +119,8 @@ def test_a_machine_with_another_site_or_contract_is_an_obstacle_and_never_bids(
 
     def other_site(controller: Controller) -> None:
         if controller.holon.node_id == stranger and reason is Reason.OTHER_SITE:
-            controller.holon.site = replace(controller.holon.site, digest=controller.holon.site.digest ^ 1)
+            other = replace(controller.holon.site, digest=controller.holon.site.digest ^ 1)
+            controller.holon.site = controller.holon.regeneration.site = other
         if controller.holon.node_id == stranger and reason is Reason.OTHER_CONTRACT:
             on_heartbeat = controller.holon._on_heartbeat
             controller.holon._handlers[Heartbeat] = lambda beat, now: on_heartbeat(replace(beat, contract=3), now)

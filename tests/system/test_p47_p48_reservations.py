@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 import pytest
 
 from bus_sim.can.node import SimulatedBus
+from bus_sim.planted.tools import replace
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
-from onboard.core.codes import CallResult, Grade, KindCode, Operation, TaskPhase
+from onboard.core.codes import CallResult, Grade, KindCode, Operation, Reason, TaskPhase
 from onboard.core.frame import Frame
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.serial import from_bus_ms
@@ -106,7 +107,7 @@ class Rival:
 
     def _outbid(self, bid: Bid) -> None:
         self.kept.append(dict(self._tentative))
-        self._say(Bid(200, bid.initiator, bid.call, bid.cost - 5_000, 0))
+        self._say(Bid(200, bid.initiator, bid.call, bid.cost - 100, 0))
         self.simulation.loop.call_later(0.01, lambda: self.kept.append(dict(self._tentative)))
 
     @property
@@ -120,6 +121,13 @@ class Rival:
             self.bus.send(frame)
 
 
+def admitted(simulation: Simulation) -> Simulation:
+    """Machines that hear a node that their site does not have as if it were one of theirs."""
+    for controller in simulation.controllers.values():
+        replace(controller.holon.admission, "why_not", lambda _: lambda message: Reason.NONE)
+    return simulation
+
+
 @pytest.fixture(scope="module")
 def outbid() -> tuple[Scene, Rival]:
     """Two customers come to two bays; robot 11 is outbid for the first car."""
@@ -128,7 +136,7 @@ def outbid() -> tuple[Scene, Rival]:
     scene = play(
         one_floor(extra=bay),
         stays((0, None), (1, None)),
-        before=lambda simulation: rivals.append(Rival(simulation)),
+        before=lambda simulation: rivals.append(Rival(admitted(simulation))),
         extra_s=60,
     )
     return scene, rivals[0]

@@ -5,6 +5,7 @@ import pytest
 from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.messages import BusTime, Heartbeat, Message, Reference
 from onboard.core.recovery_messages import Halted
+from tests.sites import one_floor
 from tests.trace.checking import (
     MR1,
     MR2,
@@ -33,7 +34,7 @@ STORY: list[tuple[float, list[Message]]] = [
 
 
 def tell(story: list[tuple[float, list[Message]]], *, disturbed: bool = False) -> Tape:
-    tape = Tape(one_alley(), disturbed=disturbed)
+    tape = Tape(one_floor(3), disturbed=disturbed)
     for at_s, messages in story:
         tape.say(at_s, *messages)
     return tape

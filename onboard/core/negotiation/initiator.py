@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Reason, TaskPhase
+from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Operation, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, TaskReport
 from onboard.core.negotiation.bidding import beats, cut_off_us, is_below
@@ -218,6 +218,9 @@ class Initiator:
         if report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
             self._lost_reason = report.reason
             return self._fire(Event.FORFEIT, now_us)
+        if self.terms.operation is Operation.RIDE and report.station != self.terms.from_station:
+            # Of another ride of the same task: the word for this one is lost, or has not been heard yet.
+            return []
         return self._fire(Event.HEARD, now_us)
 
     def confirm(self, now_us: int) -> Outcome:

@@ -103,7 +103,8 @@ class OrderDesk(Plain):
         missing = self.knowledge.behind(self.step)
         if missing:
             self._due_us = now_us + ASK_US
-            return [Send(SyncRequest(self.fleet.node_id, node)) for node in missing[:ASK_AT_ONCE]]
+            asked = dict.fromkeys([*self.knowledge.pathless(), *missing])
+            return [Send(SyncRequest(self.fleet.node_id, node)) for node in list(asked)[:ASK_AT_ONCE]]
         return self._open(now_us)
 
     def next_wake(self) -> int | None:

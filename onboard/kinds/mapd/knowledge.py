@@ -139,8 +139,16 @@ class Knowledge:
             del self.unfit[robot]
 
     def pathless(self) -> list[int]:
-        """Robots whose path is not known, or does not fit to the others'."""
-        return [robot for robot in self.robots if robot not in self.paths.by_robot]
+        """Robots to ask for their path: first those that leave no room for one that was told, whose own may be old.
+
+        Then those whose path is not known, or does not fit to the others'.
+        """
+        in_the_way: set[int | None] = set()
+        for _, path in self.unfit.values():
+            in_the_way |= {self.paths.holder(cell, step) for step, cell in path.steps()}
+            in_the_way |= {self.paths.holder(path.rest, step) for step in range(path.end, self.paths.horizon + 1)}
+        others = [robot for robot in self.robots if robot in in_the_way and robot != self.me]
+        return [*others, *(robot for robot in self.robots if robot not in self.paths.by_robot)]
 
     def next_user(self, resource: int, leaving: int = 0) -> int | None:
         """Who is to be in a cell or zone first, from each robot's own step on; None for nobody.
