@@ -19,7 +19,7 @@ from bus_sim.campaign.ledger import Ledger
 from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
-from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
+from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.systems import SYSTEMS, usual_orders, with_orders
 from bus_sim.campaign.trial import play
@@ -247,7 +247,9 @@ def _trials(
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
     console.print(f"{args.exhaustive}s on {site.name}: {len(chosen)} of {len(every)} points", highlight=False)
     chosen = chosen if ledger is None else [one for one in chosen if one.number not in ledger.done]
-    return play_all(partial(run_point, plan), chosen), len(chosen)
+    if args.dask:
+        return play_all(partial(run_point, plan), chosen), len(chosen)
+    return run_points(plan, chosen, jobs), len(chosen)
 
 
 def brought(site: Site, arrivals: Arrivals, orders: Orders | None) -> str:
