@@ -102,7 +102,7 @@ def _play_scene(
             copies.collect(most=0)
         else:
             copies.answer(_of(report, scenario, copies.mine))
-    except BaseException:
+    except BaseException:  # below a copy is the stack of what it was copied from: nothing may pass
         if copies.mine is not None:
             sys.excepthook(*sys.exc_info())
             os._exit(1)

@@ -7,8 +7,8 @@ from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
-from bus_sim.campaign.recovery import Recovery, clocks_right_us
-from bus_sim.campaign.report import CONVERGED_US, Report, Verdict
+from bus_sim.campaign.recovery import Measure, Recovery, clocks_right_us, is_of_clock
+from bus_sim.campaign.report import CLOCKS_SERVED_US, CONVERGED_US, Report, Verdict
 from bus_sim.campaign.stage import Stage, StageMaker
 from bus_sim.campaign.systems import SYSTEMS, SystemStage
 from bus_sim.faults.arm import frame_faults
@@ -131,6 +131,7 @@ def _judge(
         (bool(tally.waiting), Verdict.NOT_SERVED),
         (bool(stalls), Verdict.NOT_LIVE),
         (is_apart, Verdict.APART),
+        (_heals_late(scenario, recovery), Verdict.LATE),
         (is_late, Verdict.DELAYED),
         (bool(tally.told), Verdict.TOLD),
         (True, Verdict.SERVED),
@@ -153,6 +154,12 @@ def _judge(
         error or hang,
         stage.who,
     )
+
+
+def _heals_late(scenario: Scenario, recovery: Recovery) -> bool:
+    """Whether clocks were all that was wrong, and who waited when they were right again was served too late."""
+    took_us = recovery.longest_us.get(Measure.HEAL_SERVED, 0)
+    return took_us > CLOCKS_SERVED_US and all(is_of_clock(fault) for fault in scenario.faults)
 
 
 def _struck(run: BusRun) -> tuple[tuple[str, int], ...]:
