@@ -107,6 +107,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         # asyncio's own queue of ready handles: there is no public way to ask whether something is ready.
         self._ready_handles: deque[asyncio.Handle] = vars(self)["_ready"]
         selector.loop = self
+        self._waits = selector
         if pace is not None and not pace > 0:
             # Only now: asyncio insists on closing a loop, and can close only what it has set up.
             self.close()
@@ -171,6 +172,14 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         """As asyncio's; pending timers are dropped."""
         self._timers.clear()
         super().close()
+
+    def go_on_in_copy(self) -> None:
+        """To be called in a copy of the process (``os.fork``) that was made in a call of this loop.
+
+        asyncio takes a loop for running only in the process that ran it, and a selector would be shared with that one.
+        """
+        asyncio._set_running_loop(self)  # noqa: SLF001  # as asyncio's own loops do; there is no other name for it
+        self._waits.renew()
 
     # --- the world outside -------------------------------------------------------------------------------------
 
@@ -328,6 +337,12 @@ class _Selector(selectors.BaseSelector):
 
     def close(self) -> None:
         self._inner.close()
+
+    def renew(self) -> None:
+        """Watch the same with a selector of the system's own."""
+        watched, self._inner = list(self._inner.get_map().values()), selectors.DefaultSelector()
+        for key in watched:
+            self._inner.register(key.fileobj, key.events, key.data)
 
     def has_guests(self) -> bool:
         """Whether any file descriptor but the loop's own self-pipe is watched."""

@@ -52,11 +52,15 @@ class Start:
         return told + late + "".join(f"; {one}" for one in self.wrong)
 
 
-def cold_starts(site: Site, name: str, moments_s: Sequence[float] = MOMENTS_S) -> Iterator[Start]:
-    """Each moment, with nobody missing and with each machine missing in turn."""
-    for at_s in moments_s:
-        for missing in (None, *(machine.name for machine in site.machines.values())):
-            yield cold_start(site, name, at_s, missing)
+def cold_starts(
+    site: Site, name: str, moments_s: Sequence[float] = MOMENTS_S, sample: int | None = None
+) -> Iterator[Start]:
+    """Each moment, with nobody missing and with each machine missing in turn; of these ``sample``, evenly spread."""
+    missing = (None, *(machine.name for machine in site.machines.values()))
+    every = [(at_s, who) for at_s in moments_s for who in missing]
+    number = len(every) if sample is None else min(sample, len(every))
+    for index in range(number):
+        yield cold_start(site, name, *every[index * len(every) // number])
 
 
 def cold_start(site: Site, name: str, at_s: float, missing: str | None) -> Start:

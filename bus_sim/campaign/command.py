@@ -19,7 +19,7 @@ from bus_sim.campaign.ledger import Ledger
 from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
-from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_seed
+from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
 from bus_sim.campaign.systems import SYSTEMS, usual_orders, with_orders
 from bus_sim.campaign.trial import play
@@ -66,6 +66,7 @@ examples:
   bus-sim campaign small --exhaustive crash --scene overlap --add-to crashes.jsonl
   bus-sim campaign small --seeds 1-2000 --faults two-crashes --apart 30 --no-baseline --add-to crashes.jsonl
   bus-sim campaign standard --cold-start
+  bus-sim campaign large --cold-start --sample 12
   bus-sim campaign standard --seeds 1-2000 --dask tcp://10.0.0.5:8786
 """
 
@@ -96,7 +97,9 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         help="instead of seeds: cut the power of all machines at work, and see who takes part again within 30 s, with "
         "nobody missing and with each machine missing in turn",
     )
-    parser.add_argument("--sample", type=int, metavar="N", help="with --exhaustive: only so many, spread over all")
+    parser.add_argument(
+        "--sample", type=int, metavar="N", help="with --exhaustive or --cold-start: only so many, spread over all"
+    )
     parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
     parser.add_argument("--cars", type=int, metavar="N", help=f"cars in each run of a car park (default: {CARS})")
@@ -154,7 +157,7 @@ def run_campaign_command(args: argparse.Namespace) -> int:
         return _strangers(args, plan, site)
     console = Console()
     if args.cold_start:
-        return _start_cold(args.site, site, console)
+        return _start_cold(args, site, console)
     ledger = _ledger(args, plan)
     trials, total = _trials(args, plan, site, console, ledger)
     results: list[Result] = []
@@ -194,13 +197,16 @@ def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
     return 1 if bad else 0
 
 
-def _start_cold(name: str, site: Site, console: Console) -> int:
+def _start_cold(args: argparse.Namespace, site: Site, console: Console) -> int:
     """0 where every machine with power took part in time, each time."""
-    is_good = True
-    for start in cold_starts(site, name):
+    starts = []
+    for start in cold_starts(site, args.site, sample=args.sample):
         console.print(str(start), highlight=False, markup=False, soft_wrap=True)
-        is_good &= start.is_good
-    return 0 if is_good else 1
+        starts.append(start)
+    longest_s = max(start.longest_s for start in starts)
+    bad = sum(not start.is_good for start in starts)
+    console.print(f"{len(starts)} starts, {bad} failed; at most {longest_s:.1f} s", highlight=False)
+    return 1 if bad else 0
 
 
 def _why(result: Result) -> str:
@@ -247,7 +253,9 @@ def _trials(
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
     console.print(f"{args.exhaustive}s on {site.name}: {len(chosen)} of {len(every)} points", highlight=False)
     chosen = chosen if ledger is None else [one for one in chosen if one.number not in ledger.done]
-    return play_all(partial(run_point, plan), chosen), len(chosen)
+    if args.dask:
+        return play_all(partial(run_point, plan), chosen), len(chosen)
+    return run_points(plan, chosen, jobs), len(chosen)
 
 
 def brought(site: Site, arrivals: Arrivals, orders: Orders | None) -> str:
@@ -313,8 +321,8 @@ def _check(args: argparse.Namespace) -> None:
     _check_seconds("limit", args.limit)
     if args.faults_an_hour is not None and not 0 < args.faults_an_hour <= MOST_AN_HOUR:
         raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
-    if args.sample is not None and (args.sample < 1 or args.exhaustive is None):
-        raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive")
+    if args.sample is not None and (args.sample < 1 or (args.exhaustive is None and not args.cold_start)):
+        raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive or --cold-start")
 
 
 def _check_seconds(option: str, value: float | None) -> None:

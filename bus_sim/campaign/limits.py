@@ -38,18 +38,27 @@ def wall_limit(seconds: float) -> Iterator[None]:
 
     That is in a thread other than the main one, and on systems without ``setitimer``.
     """
-
-    def over(_number: int, _frame: object) -> None:
-        raise WallLimitError(f"{seconds:.0f} s of the wall are over")
-
     try:
-        before = signal.signal(signal.SIGALRM, over)
+        before = signal.getsignal(signal.SIGALRM)
+        end_after(seconds)
     except (AttributeError, ValueError):
         yield
         return
-    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN_S)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
+
+
+def end_after(seconds: float) -> None:
+    """Raise ``WallLimitError`` after so long, for good: of a process that does nothing else.
+
+    Raises ``AttributeError`` where there is no such timer, ``ValueError`` in a thread other than the main one.
+    """
+
+    def over(_number: int, _frame: object) -> None:
+        raise WallLimitError(f"{seconds:.0f} s of the wall are over")
+
+    signal.signal(signal.SIGALRM, over)
+    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN_S)

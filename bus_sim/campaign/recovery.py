@@ -58,8 +58,12 @@ def healed_us(faults: Iterable[AnyFault]) -> int:
 
 def clocks_right_us(faults: Iterable[AnyFault]) -> int | None:
     """When the last fault of a clock is over, us of loop time; None where there is none."""
-    ends = [healed_us([one]) for one in faults if isinstance(one, Injection) and KINDS[one.kind].group is Group.CLOCK]
-    return max(ends, default=None)
+    return max((healed_us([one]) for one in faults if is_of_clock(one)), default=None)
+
+
+def is_of_clock(fault: AnyFault) -> bool:
+    """Whether it makes clocks wrong, and nothing else."""
+    return isinstance(fault, Injection) and KINDS[fault.kind].group is Group.CLOCK
 
 
 class Recovery:

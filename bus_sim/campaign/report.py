@@ -4,11 +4,14 @@ from collections import Counter
 from dataclasses import dataclass
 from enum import StrEnum
 
+from bus_sim.campaign.recovery import Measure
 from bus_sim.can.faults import Fault
 from bus_sim.faults.scenario import Scenario
 
 #: With all faults over and everybody served, all machines run and all mirrors are equal within this, us (ours).
 CONVERGED_US = 120_000_000
+#: With all clocks right and nothing else disturbed, whoever waits then is served within this, us (issue 13, point 3).
+CLOCKS_SERVED_US = 300_000_000
 
 
 class Verdict(StrEnum):
@@ -22,6 +25,7 @@ class Verdict(StrEnum):
     NOT_SERVED = "not served"
     NOT_LIVE = "stood still"
     APART = "not converged"
+    LATE = "healed late"
     DELAYED = "delayed"
     TOLD = "told why"
     SERVED = "served"
@@ -36,6 +40,7 @@ FAILURES = (
     Verdict.NOT_SERVED,
     Verdict.NOT_LIVE,
     Verdict.APART,
+    Verdict.LATE,
 )
 
 
@@ -69,6 +74,9 @@ class Report:
         """One line for a person."""
         if self.error:
             return self.error
+        if self.verdict is Verdict.LATE:
+            took_s, most_s = dict(self.recovery)[Measure.HEAL_SERVED] / 1e6, CLOCKS_SERVED_US / 1e6
+            return f"all are served {took_s:.0f} s after the clocks were right, not within {most_s:g} s"
         said = self.violations or self.halted or (() if self.waiting else self.stalls)
         if not said and self.is_apart and not self.waiting:
             return f"mirrors differ {CONVERGED_US // 1_000_000} s after all faults and all work"

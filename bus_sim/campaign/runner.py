@@ -12,6 +12,7 @@ from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.points import SCENE_LIMIT_S, Scene, reference
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults
 from bus_sim.campaign.report import FAILURES, Report, Verdict
+from bus_sim.campaign.shared import Crash, can_share, is_shared, play_shared
 from bus_sim.campaign.shrink import shrink
 from bus_sim.campaign.systems import SYSTEMS, patience_s, span_s, with_orders
 from bus_sim.campaign.trial import play
@@ -119,13 +120,30 @@ def _faults(plan: Plan, bare: Scenario, site: Site) -> tuple[AnyFault, ...]:
 
 
 def run_point(plan: Plan, point: Point) -> Result:
-    """Play the reference scene with one single fault; there is nothing to shrink."""
-    site = find_site(plan.site)
-    scenario = reference(plan.site, plan.limit_s or SCENE_LIMIT_S, plan.scene).with_faults([point.fault])
-    report = play(site, scenario, usual_wait_s=plan.usual_wait_s)
+    """Play the reference scene with one single fault, from its start."""
+    scenario = _scene(plan).with_faults([point.fault])
+    return _point_result(plan, point.number, play(find_site(plan.site), scenario, usual_wait_s=plan.usual_wait_s))
+
+
+def run_points(plan: Plan, points: Sequence[Point], jobs: int) -> Iterator[Result]:
+    """The results of all points, as they come in; crashes share the beginning of their scene where this can be."""
+    crashes = [Crash(number, one) for number, one in points if isinstance(one, Injection) and is_shared(one)]
+    if not can_share() or len(crashes) < len(points) or len(points) < 2:
+        yield from on_cores(jobs, partial(run_point, plan), points)
+        return
+    for number, report in play_shared(_scene(plan), crashes, plan.usual_wait_s, jobs):
+        yield _point_result(plan, number, report)
+
+
+def _scene(plan: Plan) -> Scenario:
+    return reference(plan.site, plan.limit_s or SCENE_LIMIT_S, plan.scene)
+
+
+def _point_result(plan: Plan, number: int, report: Report) -> Result:
+    """Of a failure its trace; there is nothing to shrink."""
     if report.verdict not in FAILURES:
-        return Result(point.number, report)
-    return Result(point.number, report, scenario, _keep(plan, site, point.number, scenario, report))
+        return Result(number, report)
+    return Result(number, report, report.scenario, _keep(plan, find_site(plan.site), number, report.scenario, report))
 
 
 def _still_fails(site: Site, scenario: Scenario, verdict: Verdict, faults: Sequence[AnyFault]) -> bool:

@@ -12,6 +12,7 @@ COLUMNS = (
     Verdict.TOLD,
     Verdict.HELD,
     Verdict.DELAYED,
+    Verdict.LATE,
     Verdict.STOPPED,
     Verdict.APART,
     Verdict.NOT_LIVE,

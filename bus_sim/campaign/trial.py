@@ -7,8 +7,8 @@ from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
-from bus_sim.campaign.recovery import Recovery, clocks_right_us
-from bus_sim.campaign.report import CONVERGED_US, Report, Verdict
+from bus_sim.campaign.recovery import Measure, Recovery, clocks_right_us, is_of_clock
+from bus_sim.campaign.report import CLOCKS_SERVED_US, CONVERGED_US, Report, Verdict
 from bus_sim.campaign.stage import Stage, StageMaker
 from bus_sim.campaign.systems import SYSTEMS, SystemStage
 from bus_sim.faults.arm import frame_faults
@@ -20,7 +20,7 @@ from onboard.core.site import Site
 #: Looks whether it is over, us.
 STEP_US = 1_000_000
 #: What the loop raises where virtual time does not go on, or not in time.
-_HANGS = (StandstillError, EventLimitError)
+HANGS = (StandstillError, EventLimitError)
 #: A wait that is longer than the same run's longest without faults by this counts as delayed, us (ours).
 DELAY_US = 60_000_000
 
@@ -37,9 +37,13 @@ def play(site: Site, scenario: Scenario, *, usual_wait_s: float | None = None, t
     try:
         with wall_limit(wall_limit_s(scenario.limit_s)):
             return run_on(loop, _play(site, scenario, usual_wait_s, trace, loop))
-    except (WallLimitError, *_HANGS) as hang:
-        # Whatever ran was torn out of it: nothing more can be asked of that run.
-        return Report(scenario, Verdict.HUNG, simulated_s=loop.now_us() / 1e6, error=str(hang))
+    except (WallLimitError, *HANGS) as hang:
+        return hung(scenario, loop, hang)
+
+
+def hung(scenario: Scenario, loop: VirtualTimeLoop, why: BaseException) -> Report:
+    """What ran was torn out of the run: nothing more can be asked of it."""
+    return Report(scenario, Verdict.HUNG, simulated_s=loop.now_us() / 1e6, error=str(why))
 
 
 async def _play(
@@ -48,6 +52,11 @@ async def _play(
     options = RunOptions(seed=scenario.seed, trace=trace, faults=frame_faults(scenario.faults, site))
     stage = stage_maker(site)(site, scenario, options, loop)
     stage.arm(scenario.faults)
+    return await play_stage(stage, scenario, usual_wait_s, loop)
+
+
+async def play_stage(stage: Stage, scenario: Scenario, usual_wait_s: float | None, loop: VirtualTimeLoop) -> Report:
+    """The same of a stage whose faults are armed."""
     judges = Judges(stage.run, disturbed=bool(scenario.faults))
     recovery = Recovery(stage.run, scenario.faults)
     right_us = clocks_right_us(scenario.faults)
@@ -55,7 +64,7 @@ async def _play(
         judges.excuse_clocks(right_us)
     held = Held()
     stage.run.observers.append(held.hear)
-    error, hung, ends = "", "", _End(stage, recovery)
+    error, hang, ends = "", "", _End(stage, recovery)
     try:
         stage.run.start()
         await run_until(
@@ -65,13 +74,13 @@ async def _play(
             STEP_US,
             lambda: judges.excuse(recovery.healed_us),
         )
-    except _HANGS as hang:
-        hung = str(hang)
+    except HANGS as problem:
+        hang = str(problem)
     except Exception as problem:  # noqa: BLE001  # a program error in one seed must not end the campaign: it is a result
         error = f"{type(problem).__name__}: {problem}"
     finally:
         stage.run.close()
-    return _judge(stage, scenario, usual_wait_s, (error, hung), judges, recovery, held)
+    return _judge(stage, scenario, usual_wait_s, (error, hang), judges, recovery, held)
 
 
 class _End:
@@ -102,7 +111,7 @@ def _judge(
     recovery: Recovery,
     held: Held,
 ) -> Report:
-    (error, hung), tally = errors, stage.tally()
+    (error, hang), tally = errors, stage.tally()
     unsafe, stalls = judges.finish()
     violations = (*stage.violations(), *unsafe)
     is_apart = stage.is_over and not recovery.mirrors_agree()
@@ -115,13 +124,14 @@ def _judge(
     verdicts = (
         (bool(violations), Verdict.VIOLATION),
         (bool(error), Verdict.CRASHED),
-        (bool(hung or stage.run.restless), Verdict.HUNG),
+        (bool(hang or stage.run.restless), Verdict.HUNG),
         # Whoever waits for it now waits for a person, and has been told so.
         (bool(held.since_us), Verdict.HELD),
         (bool(tally.waiting and halted), Verdict.STOPPED),
         (bool(tally.waiting), Verdict.NOT_SERVED),
         (bool(stalls), Verdict.NOT_LIVE),
         (is_apart, Verdict.APART),
+        (_heals_late(scenario, recovery), Verdict.LATE),
         (is_late, Verdict.DELAYED),
         (bool(tally.told), Verdict.TOLD),
         (True, Verdict.SERVED),
@@ -141,9 +151,15 @@ def _judge(
         _struck(stage.run),
         tuple((measure.value, us) for measure, us in sorted(recovery.longest_us.items())),
         is_apart,
-        error or hung,
+        error or hang,
         stage.who,
     )
+
+
+def _heals_late(scenario: Scenario, recovery: Recovery) -> bool:
+    """Whether clocks were all that was wrong, and who waited when they were right again was served too late."""
+    took_us = recovery.longest_us.get(Measure.HEAL_SERVED, 0)
+    return took_us > CLOCKS_SERVED_US and all(is_of_clock(fault) for fault in scenario.faults)
 
 
 def _struck(run: BusRun) -> tuple[tuple[str, int], ...]:

@@ -1,6 +1,6 @@
 """Puts faults to work: frame faults into the bus when it is built, everything else by timers once it runs."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Final
 
@@ -75,7 +75,11 @@ def frame_faults(faults: Iterable[AnyFault], site: Site) -> tuple[Fault, ...]:
     return tuple(found)
 
 
-def arm(simulation: Simulation, faults: Iterable[AnyFault]) -> None:
+def arm(
+    simulation: Simulation,
+    faults: Iterable[AnyFault],
+    actions: Mapping[str, Callable[[Simulation, Injection], None]] = ACTIONS,
+) -> None:
     """Set up all others; before ``Simulation.start``, with the customers on the street."""
     injections = [fault for fault in faults if isinstance(fault, Injection)]
     if not injections:
@@ -85,7 +89,7 @@ def arm(simulation: Simulation, faults: Iterable[AnyFault]) -> None:
         # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
         medium.attach("terminal block", None)
     for injection in injections:
-        action = ACTIONS.get(injection.kind)
+        action = actions.get(injection.kind)
         if action is None:
             continue
         if "at_s" in KINDS[injection.kind].settings and injection.kind not in _FROM_POWER_UP:

@@ -3,6 +3,7 @@
 import random
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from bus_sim.faults.holon import FROZEN_PPM, FaultyHolon
 from bus_sim.faults.injection import Injection
@@ -15,15 +16,7 @@ from onboard.core.site import Machine
 def crash(simulation: Simulation, injection: Injection) -> None:
     """At once, or from now on at the n-th frame that it sends or the n-th entry that it writes."""
     machine = machine_named(simulation, injection.target)
-
-    def strike() -> None:
-        if machine.node_id not in simulation.controllers:
-            return
-        simulation.crash(machine)
-        hurt(simulation.journals[machine.node_id], injection.text("journal"), injection.count("entries"))
-        if injection.text("restart") == "yes":
-            restart_later(simulation, machine, simulation.loop.now_us() + round(injection.number("restart_s") * 1e6))
-
+    strike = partial(lose_power, simulation, injection)
     if injection.count("frame"):
         _at_frame(simulation, machine, injection.count("frame"), strike)
     elif injection.count("write"):
@@ -31,6 +24,17 @@ def crash(simulation: Simulation, injection: Injection) -> None:
         _at_write(simulation, machine, injection.count("write"), durable=durable, strike=strike)
     else:
         strike()
+
+
+def lose_power(simulation: Simulation, injection: Injection) -> None:
+    """Now, and what else this crash brings: the harm to the journal, and the power coming back."""
+    machine = machine_named(simulation, injection.target)
+    if machine.node_id not in simulation.controllers:
+        return
+    simulation.crash(machine)
+    hurt(simulation.journals[machine.node_id], injection.text("journal"), injection.count("entries"))
+    if injection.text("restart") == "yes":
+        restart_later(simulation, machine, simulation.loop.now_us() + round(injection.number("restart_s") * 1e6))
 
 
 def _at_frame(simulation: Simulation, machine: Machine, number: int, strike: Callable[[], None]) -> None:

@@ -16,8 +16,9 @@ QEMU = "qemu-system-aarch64"
 #: Of Debian's package qemu-efi-aarch64.
 FIRMWARE = Path("/usr/share/qemu-efi-aarch64/QEMU_EFI.fd")
 MEMORY_MB = 512
-#: The guest's clock counts instructions while it works, and follows the host's while it waits. Jumping over waits, as
-#: ``hil.guest.machine`` does, would jump over those for the disk too: the service's start ran into its time-out.
+#: The guest's clock counts instructions while it works, and follows the host's while it waits, as that of
+#: ``hil.guest.machine`` does. Jumping over waits would jump over those for the disk too: the service's start ran into
+#: its time-out.
 _ICOUNT = "shift=1,sleep=on"
 #: Where the boot partition begins in an image.
 _BOOT_OFFSET = 1 << 20

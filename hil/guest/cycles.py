@@ -18,6 +18,7 @@ from pathlib import Path
 from bus_sim.sites import site_text
 from hil.guest.cycles_scene import KINDS, LATE
 from hil.guest.machine import GuestError, run_guest
+from hil.guest.quick import QUICK
 from onboard.config.site import parse_site
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records
@@ -28,23 +29,8 @@ LIVES_ON_S, STARTS_S = 10.0, 60.0
 #: from the host's disk, whose pace is not the guest's, it would be measured with it. It is counted.
 LOAD_S = 10.0
 ROOT = Path(__file__).parents[2]
-#: What a cycle may take of the guest's time, s, and what everything else does.
+#: What a cycle may take of the guest's time, s, and what everything else may: a car in before, and out after.
 _CYCLE_S, _REST_S = 14, 300
-#: Added to the site: machines so fast that a car is in and out again in a minute and a half.
-_QUICK = """
-[carrier]
-speed_mm_s = 6_000
-acceleration_mm_s2 = 6_000
-[shuttle]
-speed_mm_s = 5_000
-acceleration_mm_s2 = 5_000
-[lift]
-speed_mm_s = 3_000
-acceleration_mm_s2 = 3_000
-[timing]
-door_ms = 500
-grip_ms = 300
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,13 +62,13 @@ def play_cycles(share: Path, cycles: int) -> Found:
     """Play so many in a guest whose files are in ``share``. Raises ``GuestError`` where it came to no end."""
     shutil.rmtree(share, ignore_errors=True)
     share.mkdir(parents=True)
-    text = site_text("level1") + _QUICK
+    text = site_text("level1") + QUICK
     site = parse_site(text, "site.toml")
     nodes = {machine.name: node for node, machine in site.machines.items()}
     (share / "site.toml").write_text(text, encoding="utf-8")
-    # The car comes in before the first cycle and is fetched after the last one.
+    # By hand: the car comes in before the first cycle and is fetched after the last one, and then the run is over.
     plant_s = cycles * _CYCLE_S + _REST_S
-    begin = ["--one-car", str(cycles * _CYCLE_S), "--seed", "3", "--for", str(plant_s), "--json", "figures.json"]
+    begin = ["--by-hand", "--seed", "3", "--for", str(plant_s), "--json", "figures.json"]
     (share / "order.json").write_text(json.dumps({"machines": list(nodes), "begin": begin}), encoding="utf-8")
     plan = {"nodes": nodes, "cycles": cycles, "plant_s": plant_s}
     (share / "plan.json").write_text(json.dumps(plan), encoding="utf-8")

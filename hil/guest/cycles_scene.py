@@ -1,6 +1,7 @@
 """Interfaces that are gone, late and back, again and again, on a site that works. Runs in the guest (``cycles.py``)."""
 
 import json
+import socket
 import sys
 
 from hil.guest.ears import Ears
@@ -128,11 +129,16 @@ def scene(site: SiteRun) -> dict[str, object]:
     watch = Watch(Ears(TOOLS), set(nodes.values()))
     cycles = Cycles(site, nodes, watch)
     site.start_machines()
-    site.start_plant()
+    here, keys = socket.socketpair()
+    site.start_plant(stdin=here.fileno())
+    keys.send(b"i")
     # Rights to the car and to its place live through all cycles.
     site.wait(watch.ears, "the car is in", watch.is_car_in, LIMIT_S)
     cycles.wait_until_all_agree("all take part")
     told = [cycles.play(number) for number in range(plan["cycles"])]
+    keys.send(b"o")
+    # Closing it would not do: the machines that were forked since have it too.
+    keys.shutdown(socket.SHUT_WR)
     status = site.statuses(["plant"], plan["plant_s"])
     site.tell("the plant's run is over")
     status |= site.end(list(nodes))

@@ -18,13 +18,25 @@ Main = Callable[[Sequence[str]], int]
 class Forked:
     """One child; called as ``subprocess.Popen`` where it can do the same."""
 
-    def __init__(self, main: Main, words: Sequence[str], *, namespace: str, folder: Path, output: str) -> None:
-        """Run ``main(words)`` in this network namespace and folder, with both outputs in one file of the folder."""
+    def __init__(
+        self,
+        main: Main,
+        words: Sequence[str],
+        *,
+        namespace: str,
+        folder: Path,
+        output: str,
+        stdin: int | None = None,
+    ) -> None:
+        """Run ``main(words)`` in this network namespace and folder, with both outputs in one file of the folder.
+
+        ``stdin`` is a descriptor; without it the input is that of this process.
+        """
         self._status: int | None = None
         sys.stdout.flush()
         self.pid = os.fork()
         if self.pid == 0:
-            _live(main, words, namespace, folder / output)
+            _live(main, words, namespace, folder / output, stdin)
 
     def poll(self) -> int | None:
         """The exit status, negative for a signal, or None while it runs."""
@@ -58,13 +70,15 @@ class Forked:
             os.kill(self.pid, number)
 
 
-def _live(main: Main, words: Sequence[str], namespace: str, output: Path) -> None:
+def _live(main: Main, words: Sequence[str], namespace: str, output: Path, stdin: int | None) -> None:
     """The child's whole life; it never returns."""
     status = 70
     try:
         with Path("/run/netns", namespace).open("rb") as file:
             setns(file.fileno())
         os.chdir(output.parent)
+        if stdin is not None:
+            os.dup2(stdin, 0)
         with output.open("wb") as out:
             os.dup2(out.fileno(), 1)
             os.dup2(out.fileno(), 2)

@@ -17,8 +17,9 @@ QEMU = "qemu-system-x86_64"
 #: Programs of the host that run in the guest, and the packages that hold them.
 TOOLS = {"ip": "iproute2", "cangw": "can-utils", "candump": "can-utils", "script": "bsdutils"}
 MEMORY_MB = 1536
-#: The guest's clock counts its instructions, two nanoseconds each, and jumps to the next timer when nothing is to be
-#: done (QEMU, "TCG Instruction Counting"). So it sees a processor of 500 million instructions a second, about that of
+#: The guest's clock counts its instructions, two nanoseconds each, while it works, and waits with the host's when
+#: nothing is to be done (QEMU, "TCG Instruction Counting"): with ``sleep=off`` it would jump to the next timer, and by
+#: minutes over waits for a file of the host. So it sees a processor of 500 million instructions a second, about that of
 #: a small board, however busy the host is; on the host's clock a busy host would make every controller late.
 ICOUNT = "shift=1,sleep=on"
 #: The most processor time of the host for a second of the guest's: one of nothing but work takes one to two.

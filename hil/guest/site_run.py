@@ -85,12 +85,15 @@ class SiteRun:
         """Write down the mesh as seen from outside, where the interface tells who sent."""
         self.start("candump-outside", [*_CANDUMP, "any"], "outside.log")
 
-    def start_plant(self) -> None:
-        """The simulator without any controller: it moves bodies, and has no say on the fleet bus."""
+    def start_plant(self, *, stdin: int | None = None) -> None:
+        """The simulator without any controller: it moves bodies, and has no say on the fleet bus.
+
+        ``stdin`` is a descriptor that it reads a person's keys from.
+        """
         words = ["run", "site.toml", "--bus", "socketcan:can0"]
         for name in self.order.machines:
             words += ["--without", name, "--bus", f"{name}=socketcan:{device_channel(name)}"]
-        self._fork(PLANT, bus_sim, [*words, *self.order.begin], f"{PLANT}.txt")
+        self._fork(PLANT, bus_sim, [*words, *self.order.begin], f"{PLANT}.txt", stdin=stdin)
 
     def start_machines(self) -> None:
         """Every machine runs the ordinary program with its own file."""
@@ -102,8 +105,8 @@ class SiteRun:
         """One of them, for the first time or again; what it says goes to this file."""
         self._fork(name, onboard, ["--machine", f"{name}.toml", "--journal", f"{JOURNALS}/{name}"], output)
 
-    def _fork(self, name: str, main: Main, words: Sequence[str], output: str) -> None:
-        self.processes[name] = Forked(main, words, namespace=name, folder=self.share, output=output)
+    def _fork(self, name: str, main: Main, words: Sequence[str], output: str, stdin: int | None = None) -> None:
+        self.processes[name] = Forked(main, words, namespace=name, folder=self.share, output=output, stdin=stdin)
 
     def start(self, name: str, words: Sequence[str], output: str) -> None:
         """Start a program in the shared folder; both its outputs go to one file there."""

@@ -72,7 +72,7 @@ def test_the_command_plays_a_sample_of_the_points(capsys: pytest.CaptureFixture[
 
 def test_a_sample_of_nothing_is_a_mistake(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["campaign", SITE, "--sample", "3"]) == 2
-    assert "--sample 3: must be 1 or more, and goes with --exhaustive" in capsys.readouterr().err
+    assert "--sample 3: must be 1 or more, and goes with --exhaustive or --cold-start" in capsys.readouterr().err
 
 
 def test_every_write_of_every_machine_is_a_point_for_every_harm_to_its_journal() -> None:

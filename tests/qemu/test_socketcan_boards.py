@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 
 from hil.guest.machine import GuestRun, run_guest
+from hil.guest.quick import QUICK
 from onboard.config.site import parse_site
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records
-from tests.qemu.guest import QUICK, ROOT, once, require_guest, scene_script
+from tests.qemu.guest import ROOT, once, require_guest, scene_script
 
 SITE = (ROOT / "bus_sim" / "sites" / "level1.toml").read_text(encoding="utf-8") + QUICK
 MACHINES = ("IOC1", "MR1")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from hil.guest.machine import GuestRun, run_guest
+from hil.guest.quick import QUICK
 from onboard.config.site import parse_site
 from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.core.messages import EmergencyStop, Heartbeat, Itinerary, Message, Progress, SyncRequest, TaskReport
@@ -17,7 +18,7 @@ from onboard.trace.check.checks import Checks, check_records
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 from onboard.wire.site_dbc import site_dbc
-from tests.qemu.guest import QUICK, ROOT, once, require_guest, scene_script
+from tests.qemu.guest import ROOT, once, require_guest, scene_script
 from tests.qemu.park_scene import REPLAYED, UNPLUGGED
 
 SITE = (ROOT / "bus_sim" / "sites" / "small.toml").read_text(encoding="utf-8") + QUICK

@@ -35,6 +35,23 @@ def test_the_command_tells_each_start_and_fails_with_any(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert main(["campaign", "level1", "--cold-start"]) == 0
-    assert len(capsys.readouterr().out.splitlines()) == 3 * len(MOMENTS_S)
+    *starts, summary = capsys.readouterr().out.splitlines()
+    assert len(starts) == 3 * len(MOMENTS_S)
+    assert summary.startswith("9 starts, 0 failed; at most ")
     monkeypatch.setattr("bus_sim.campaign.cold_start.STARTS_S", 1.0)
     assert main(["campaign", "level1", "--cold-start"]) == 1
+
+
+def test_a_sample_of_the_starts_is_spread_over_moments_and_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+    played: list[tuple[float, str | None]] = []
+
+    def start(_site: object, name: str, at_s: float, missing: str | None) -> Start:
+        played.append((at_s, missing))
+        return Start(name, at_s, missing, 1.0, (), ())
+
+    monkeypatch.setattr("bus_sim.campaign.cold_start.cold_start", start)
+    site = find_site("level1")
+    assert len(list(cold_starts(site, "level1", sample=4))) == 4
+    assert {at_s for at_s, _ in played} == set(MOMENTS_S)
+    assert len({missing for _, missing in played}) > 1
+    assert len(list(cold_starts(site, "level1", sample=100))) == 9
