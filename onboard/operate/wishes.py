@@ -89,11 +89,15 @@ def _lost_of(site: Site, wish: Wish) -> Lost:
 
 def _regenerate(park: Park, node: int, *, site: Site, who: Lost) -> Order:
     """What was heard of the site already may speak against it. Raises ``OperateError``."""
+    seen = who.body.slots | who.blocked.slots
     for known in park.machines.values():
         # The latest word about it, however old: the time is not asked for here.
         word, machine = known.halted, known.machine
         if word is not None and word.reason is Reason.JOURNAL_FOREIGN and machine.node_id != who.absent:
             raise OperateError(f"{machine.name}: its journal is another machine's: {remedy(word.reason, machine.name)}")
+        at = park.where(machine.node_id)
+        if machine.kind in MOBILE_KINDS and machine.node_id not in (who.lost, who.absent) and at in map(str, seen):
+            raise OperateError(f"--body {at}: {machine.name} is there by its own word; look again")
     return Regenerate(park, node, who)
 
 
