@@ -27,6 +27,8 @@ DEAF_BEATS = 2
 
 #: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
 RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
+#: Holds for a person in which nothing is taken in: it could not be written down, or somebody else says it as well.
+_APART = (Reason.DUPLICATE_NODE_ID, Reason.JOURNAL_FOREIGN)
 
 
 class Hold(Enum):
@@ -103,8 +105,8 @@ class Holding:
         """Whether it also takes in nothing of rights and plans, as if it were off: it compares all when it is back."""
         if self.hold is Hold.ACTING:
             return False
-        own = self.hold is Hold.PERSON and self._decision.reason is Reason.DUPLICATE_NODE_ID
-        return own or self.hold in (Hold.OWN_NUMBER, Hold.HALTED)
+        lasting = self.hold is Hold.PERSON and self._decision.reason in _APART
+        return lasting or self.hold in (Hold.OWN_NUMBER, Hold.HALTED)
 
     @property
     def why(self) -> Why:
@@ -193,13 +195,15 @@ class Holding:
             return {"record": "released"}
         return {"record": "held", "reason": int(self._decision.reason), "cause": self._decision.cause}
 
-    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
-        """Take up a hold for a person that was not ended before the process was."""
+    def replay(self, entries: Iterable[Mapping[str, str | int]], of_journal: Reason = Reason.NONE) -> None:
+        """Take up a hold for a person that was not ended before the process was; ``of_journal``: its own reason."""
         for entry in entries:
             if entry.get("record") == "held":
                 self.for_person(Reason(int(entry["reason"])), int(entry["cause"]))
             elif entry.get("record") == "released" and self.hold is Hold.PERSON:
                 self._fire(HoldEvent.GO)
+        if of_journal is not Reason.NONE:
+            self.for_person(of_journal, NOBODY)
 
     # --- inner works -------------------------------------------------------------------------------------------
 

@@ -16,10 +16,10 @@ from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
-from onboard.core.effects import Effect, Halt, Record, Report, Send
+from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
 from onboard.core.holding import RIGHTS_LOST, Hold, Holding
 from onboard.core.holds import Holds
-from onboard.core.journal_state import INTACT, JournalCondition, reason_of
+from onboard.core.journal_state import INTACT, JournalCondition, reason_of, still_counting
 from onboard.core.messages import (
     Award,
     Bid,
@@ -44,19 +44,19 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
-from onboard.core.recovery_messages import Go, Halted
+from onboard.core.recovery_messages import Go, Halted, Regeneration
 from onboard.core.regeneration import Regenerating
 from onboard.core.rights import Rights
 from onboard.core.site import Machine, Site
 from onboard.core.timekeeper import Heard, Timekeeper
-from onboard.core.witness import Witness
+from onboard.core.witness import Doubt, Witness
 
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
 _OF_FOREIGNERS = (EmergencyStop, Heartbeat, Progress)
 #: All that a machine hears while it is apart: what may end that, who lives, and why others do not act.
-_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat)
+_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat, Regeneration)
 
 
 class Holon:
@@ -85,7 +85,7 @@ class Holon:
         self._told = ToldDrops()
         self.admission = Admission(site)
         self.tokens = TokenBook(site, machine.node_id)
-        entries = tuple(entries)
+        entries = still_counting(journal, entries)
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
         self.mirror = Mirror(site, machine.node_id)
@@ -95,7 +95,7 @@ class Holon:
         self.clock = self.time.clock
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
         self.holding = Holding(machine.node_id, site.timing.heartbeat_us)
-        self.holding.replay(entries)
+        self.holding.replay(entries, reason_of(journal))
         #: Whether the bus has taken my frames of late; the shell knows.
         self.is_acknowledged = True
         own = OwnNumber(machine.node_id, self.tokens, self.mirror)
@@ -118,7 +118,10 @@ class Holon:
         self.regeneration = Regenerating(self.tokens, lambda: self.mirror.cars, self._statements, self._thaw)
         self.regeneration.cars_told = self.fleet.cars_told
         self.regeneration.replay(entries)
+        self.regeneration.refuses = lambda: self.holding.why.reason if self.holding.is_apart else Reason.NONE
         self.rights.is_frozen = lambda: self.regeneration.is_frozen
+        if self.holding.why.reason in RIGHTS_LOST:
+            self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
         self._heartbeat_due_us: int | None = None
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
@@ -150,28 +153,24 @@ class Holon:
         return self.time.bus_us(local_us)
 
     def start(self, local_us: int) -> list[Effect]:
-        """First effects after power-up: the boot counter to the journal, then the first heartbeat.
-
-        Where the journal lacks what was once confirmed, the machine says so and holds: it cannot know its rights.
-        """
-        if not self.journal.is_reliable:
-            return self._without_journal()
+        """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
         local_us = self.time.steady(local_us)
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
         self._heartbeat_due_us = now_us
-        effects: list[Effect] = [Record({"record": "boot", "boot": self.boot})]
-        effects += self.behaviour.start(now_us)
-        effects += self._beat(now_us)
         self.presence.begins(now_us)
-        effects += self.witness.begin(now_us)
-        return self._settle(effects, now_us)
+        if self.journal.is_foreign:
+            return [Report(self.journal.told), *self._beat(now_us)]
+        effects = self._first_entries() + self.behaviour.start(now_us) + self._beat(now_us)
+        return self._settle(effects + self.witness.begin(now_us), now_us)
 
-    def _without_journal(self) -> list[Effect]:
-        """Rights that were given away since would seem to be mine: none is used, and nothing is written."""
-        why = f"{self.journal.why}; a person must regenerate its rights, or bring its own journal back"
-        return self._halt(why, reason_of(self.journal))
+    def _first_entries(self) -> list[Effect]:
+        """Of a short journal only that it was: another is begun, that stands for the hold until a person ends it."""
+        boot: dict[str, str | int] = {"record": "boot", "boot": self.boot}
+        if self.journal.is_reliable:
+            return [Record(boot)]
+        return [Renew((*self.fleet.entries, boot, self.holding.record())), Report(self.journal.told)]
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
@@ -210,6 +209,8 @@ class Holon:
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
+        if self.journal.is_foreign:
+            return []
         local_us = self.time.steady(local_us)
         if not self.clock.is_set:
             # Plans made before bus time is known would be told in a time of one's own.

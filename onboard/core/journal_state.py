@@ -1,9 +1,14 @@
 """What a machine knows of its own journal when it starts: whole, harmlessly cut, mended, or not to be relied on."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
 from onboard.core.codes import Reason
+
+#: Of a short journal these records still mean something: which lives there were, and what a person has decided. What
+#: it says of rights, tasks and places may be long over: nobody knows how much is missing.
+_STILL_COUNTS = frozenset({"boot", "epoch", "manual", "blocked", "clear"})
 
 
 class JournalState(Enum):
@@ -39,6 +44,20 @@ class JournalCondition:
         """Whether what was read is all that was ever confirmed, as far as the medium can know."""
         return self.state not in (JournalState.SHORT, JournalState.FOREIGN)
 
+    @property
+    def is_foreign(self) -> bool:
+        """Whether nothing may ever be written to it: it is somebody else's."""
+        return self.state is JournalState.FOREIGN
+
+    @property
+    def told(self) -> str:
+        """One line for a person: what is the matter, and the remedy; empty where the journal is reliable."""
+        if self.is_reliable:
+            return ""
+        if self.is_foreign:
+            return f"{self.why}; it holds: put the right board or its own journal in, or move that file away"
+        return f"{self.why}; it holds and begins another beside it: onboard operate regenerate"
+
 
 #: Nothing to tell.
 INTACT = JournalCondition()
@@ -49,3 +68,12 @@ def reason_of(condition: JournalCondition) -> Reason:
     if condition.is_reliable:
         return Reason.NONE
     return Reason.JOURNAL_FOREIGN if condition.state is JournalState.FOREIGN else Reason.JOURNAL_SHORT
+
+
+def still_counting(
+    condition: JournalCondition, entries: Iterable[Mapping[str, str | int]]
+) -> tuple[Mapping[str, str | int], ...]:
+    """What of a journal's entries a machine may go by: all where it is reliable, little where it is short."""
+    if condition.is_reliable:
+        return tuple(entries)
+    return tuple(entry for entry in entries if entry.get("record") in _STILL_COUNTS and not condition.is_foreign)

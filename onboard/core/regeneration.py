@@ -46,6 +46,8 @@ class Regenerating:
     cars: Callable[[], Mapping[Reference, CarRecord]]
     extra: Callable[[int], list[Effect]]
     on_end: Callable[[int, int], list[Effect]]
+    #: Why this machine can take no part in it; NONE where it can.
+    refuses: Callable[[], Reason] = lambda: Reason.NONE
     #: The epoch in which this machine lives, 0 for the first.
     epoch: int = 0
     phase: RegenerationPhase = RegenerationPhase.NONE
@@ -102,7 +104,12 @@ class Regenerating:
 
     def on_word(self, word: Regeneration, now_us: int) -> list[Effect]:
         """A step of the operator."""
+        why = self.refuses()
         match word.regeneration_phase:
+            case RegenerationPhase.FREEZE if why is not Reason.NONE:
+                return [self._state(RegenerationPhase.REFUSED, 0, 0, why, word.epoch)]
+            case _ if why is not Reason.NONE:
+                return []
             case RegenerationPhase.FREEZE:
                 return self._freeze(word, now_us)
             case RegenerationPhase.READ_BACK if self.is_frozen and word.epoch == self._next:

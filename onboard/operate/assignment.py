@@ -66,6 +66,15 @@ class Statements:
         if may_exist(self.site, key) and (known is None or word.version >= known.version):
             self.cars[key] = word
 
+    def holder_of(self, key: TokenKey) -> int:
+        """Who says to hold a token; who had it first, where nobody does."""
+        return min(self.held.get(key, ()), default=genesis_holder(self.site, key))
+
+    def slots_given_to(self, node: int) -> list[Segment]:
+        """Slots that went to ``node`` by the newest that others know, and that nobody says to hold."""
+        keys = [key for key, claim in sorted(self.seen.items()) if claim.node == node and key not in self.held]
+        return [Segment(key.number >> 8, key.number & 0xFF) for key in keys if key.kind is TokenKind.SEGMENT]
+
     def contradiction(self) -> tuple[TokenKey, list[int]] | None:
         """A token that two say to hold, or that one holds under a version older than another knows; with whom."""
         for key in sorted(self.held):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.codes import NOBODY, Reason, RegenerationPhase, TokenKind
+from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason, RegenerationPhase, TokenKind
 from onboard.core.messages import Blocked, CarAt, Heartbeat, Message, TokenGrant, TokenHeld
 from onboard.core.recovery_messages import (
     Regeneration,
@@ -23,7 +23,7 @@ from onboard.core.recovery_messages import (
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import TrackKind
 from onboard.operate.assignment import NO_BODY, Assignment, Body, Statements, Whose, assign
-from onboard.operate.order import AGAIN_US, NOT_CONFIRMED, Order
+from onboard.operate.order import AGAIN_US, MISTAKE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park
 from onboard.operate.words import reason_words, state_words
 
@@ -35,6 +35,7 @@ BURST, PAUSE_US = 50, 50_000
 TELL_AGAIN_US, READ_US = 3_000_000, 30_000_000
 #: ABORT is said so often, as nobody answers it. Ours.
 ABORTS = 3
+_SLOT = TokenKind.SEGMENT
 
 
 class Step(Enum):
@@ -87,6 +88,8 @@ class Regenerate(Order):
         self._bursts: Iterator[list[Message]] = iter(())
         self._again_us = 0
         self._aborts = 0
+        #: The exit status where it is broken off.
+        self._ending = NOT_CONFIRMED
 
     # --- with the person ---------------------------------------------------------------------------------------
 
@@ -218,8 +221,30 @@ class Regenerate(Order):
             return
         whose = Whose(self._who.lost, self._who.absent, self._who.body, self._who.blocked)
         self._assignment = assign(self._said, whose, self.node)
+        if (wrong := self._wrong_body(whose)) != "":
+            self._ending = MISTAKE
+            self._abort(wrong, now_us)
+            return
         self._show()
         self._go_to(Step.ASK, now_us)
+
+    def _wrong_body(self, whose: Whose) -> str:
+        """Where the person sees a body that a right says cannot be there: whose it is, and where it may be instead.
+
+        A machine that moves and gets no right to where it stands could never tell its place.
+        """
+        lost, name = self._who.lost, self.park.name(self._who.lost)
+        if self.park.site.machines[lost].kind not in MOBILE_KINDS or lost == self._who.absent:
+            return ""
+        mine = {one.token for one in self._assignment.given if (one.token_kind, one.holder) == (_SLOT, lost)}
+        for slot in sorted(self._who.body.slots):
+            if slot.number in mine:
+                continue
+            holder = self._said.holder_of(TokenKey(_SLOT, slot.number))
+            known = [str(one) for one in self._said.slots_given_to(lost)]
+            instead = f"; by the words of the others it may be in {', '.join(known)}" if known else ""
+            return f"--body {slot}: {self.park.name(holder)} holds it, so {name} cannot be there: look again{instead}"
+        return ""
 
     def _show(self) -> None:
         for node in self.park.machines:
@@ -265,7 +290,7 @@ class Regenerate(Order):
         if self._step is Step.ABORT:
             self._aborts += 1
             if self._aborts == ABORTS:
-                self.status = NOT_CONFIRMED
+                self.status = self._ending
         return [self._word(), *(self._blocks() if self._step is Step.COMMIT else [])]
 
     def _in_bursts(self) -> Iterator[list[Message]]:

@@ -17,6 +17,7 @@ from onboard.operate.park import Park
 from onboard.operate.regenerate import Lost, Regenerate
 from onboard.operate.status import Status
 from onboard.operate.stops import GoAgain, LetGo, Stop
+from onboard.operate.words import remedy
 
 #: Heartbeat periods for which the bus is listened to before anything is said: everybody is heard, and once lost.
 LISTEN_BEATS = 2
@@ -64,7 +65,7 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
         case "release":
             return partial(_release, site=site, machine=machine_of(site, wish.machine), seed=seed)
         case "regenerate":
-            return partial(Regenerate, who=_lost_of(site, wish))
+            return partial(_regenerate, site=site, who=_lost_of(site, wish))
     raise OperateError(f"{wish.command}: no command")
 
 
@@ -84,6 +85,20 @@ def _lost_of(site: Site, wish: Wish) -> Lost:
         return Lost(lost.node_id, body=body)
     absent = machine_of(site, wish.absent)
     return Lost(lost.node_id, absent.node_id, body, _body_of(site, absent, wish.absent_body, "--absent-body"))
+
+
+def _regenerate(park: Park, node: int, *, site: Site, who: Lost) -> Order:
+    """What was heard of the site already may speak against it. Raises ``OperateError``."""
+    seen = who.body.slots | who.blocked.slots
+    for known in park.machines.values():
+        # The latest word about it, however old: the time is not asked for here.
+        word, machine = known.halted, known.machine
+        if word is not None and word.reason is Reason.JOURNAL_FOREIGN and machine.node_id != who.absent:
+            raise OperateError(f"{machine.name}: its journal is another machine's: {remedy(word.reason, machine.name)}")
+        at = park.where(machine.node_id)
+        if machine.kind in MOBILE_KINDS and machine.node_id not in (who.lost, who.absent) and at in map(str, seen):
+            raise OperateError(f"--body {at}: {machine.name} is there by its own word; look again")
+    return Regenerate(park, node, who)
 
 
 def _body_of(site: Site, machine: Machine, told: tuple[str, ...], option: str) -> Body:

@@ -9,7 +9,8 @@ REMEDIES = {
     Reason.EMERGENCY_STOP: "onboard operate go",
     Reason.JOURNAL_LOST: "onboard operate regenerate {name}",
     Reason.JOURNAL_SHORT: "onboard operate regenerate {name}",
-    Reason.JOURNAL_FOREIGN: "put its own journal back, or onboard operate regenerate {name}",
+    Reason.JOURNAL_FOREIGN: "put the right board or its own journal in; where that is lost, move the file away, "
+    "start it and onboard operate regenerate {name}",
     Reason.DUPLICATE_NODE_ID: "find who else speaks under its node-ID, then onboard operate release {name}",
     Reason.OPERATOR: "onboard operate release {name}",
     Reason.REGENERATION: "onboard operate regenerate is under way, or was broken off: start it again",
@@ -30,6 +31,11 @@ def reason_words(reason: Reason) -> str:
     return reason.name.lower().replace("_", " ")
 
 
+def remedy(reason: Reason, name: str) -> str:
+    """What a person does about machine ``name`` that stands for this reason."""
+    return REMEDIES.get(reason, "go and see").format(name=name)
+
+
 def halted_words(park: Park, word: Halted) -> str:
     """Why a machine stands, who brought it about, and what to do where a person is needed."""
     said = f"stands: {reason_words(word.reason)}"
@@ -37,8 +43,8 @@ def halted_words(park: Park, word: Halted) -> str:
         said += f" by {park.name(word.cause)}"
     if word.sender != word.machine:
         said += f" (said by {park.name(word.sender)}; itself it is silent)"
-    remedy = REMEDIES.get(word.reason, "go and see").format(name=park.name(word.machine))
-    return said + (f"; needs a person: {remedy}" if word.needs_person else "; goes on by itself")
+    then = remedy(word.reason, park.name(word.machine))
+    return said + (f"; needs a person: {then}" if word.needs_person else "; goes on by itself")
 
 
 def state_words(park: Park, node: int, now_us: int) -> str:

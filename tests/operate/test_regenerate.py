@@ -17,7 +17,7 @@ from onboard.core.recovery_messages import (
 from onboard.core.site import Segment
 from onboard.operate.names import OperateError
 from onboard.operate.wishes import Wish, maker_of
-from tests.operate.hand import ALL, SECOND, SITE, Hand, beat
+from tests.operate.hand import ALL, SECOND, SITE, Hand, beat, halted
 
 MR1, MR2 = SITE.machine("MR1").node_id, SITE.machine("MR2").node_id
 ER1, ER2 = SITE.machine("ER1").node_id, SITE.machine("ER2").node_id
@@ -93,11 +93,10 @@ def seen(node: int, slot: Segment, version: int, holder: int) -> TokenSeen:
 HERE, NEXT, LEFT, OTHERS = Segment(1, 3), Segment(1, 4), Segment(1, 2), Segment(1, 8)
 STEWARD = SITE.stewards[1]
 PLACE = Progress(MR1, 1, 0, 1, 3, 900, 0)
+BODY = (PLACE, seen(STEWARD, HERE, 4, MR1), seen(STEWARD, NEXT, 6, MR1))
 WORDS = (
-    PLACE,
+    *BODY,
     held(MR2, OTHERS, 7),
-    seen(STEWARD, HERE, 4, MR1),
-    seen(STEWARD, NEXT, 6, MR1),
     seen(STEWARD, LEFT, 9, MR1),
     seen(MR2, LEFT, 8, MR1),
 )
@@ -144,6 +143,31 @@ def test_the_lost_rights_are_made_anew_above_every_version_and_nobody_elses() ->
     )
 
 
+@pytest.mark.parametrize(
+    ("body", "wrong", "whose"),
+    [(OTHERS, "p(1,8)", "MR2"), (Segment(1, 6), "p(1,6)", "IOC1")],
+    ids=["another robot's", "its steward's, that never moved"],
+)
+def test_a_body_where_somebody_else_has_the_right_to_be_is_a_mistake(body: Segment, wrong: str, whose: str) -> None:
+    hand, machines = started(wish=Wish("regenerate", machine="MR1", body=("p(1,3)", str(body))))
+    machines.turn(5)
+    told = f"--body {wrong}: {whose} holds it, so MR1 cannot be there: look again; "
+    assert told + "by the words of the others it may be in p(1,2), p(1,3), p(1,4)" in hand.lines
+    assert hand.order.status == 2 and phases(hand) == [FREEZE, ABORT] and not assigned(hand)
+
+
+def test_a_body_where_another_machine_says_to_be_is_refused_before_anything_is_said() -> None:
+    make = maker_of(SITE, Wish("regenerate", machine="MR1", body=("p(1,8)",)), 1)
+    with pytest.raises(OperateError, match=r"--body p\(1,8\): MR2 is there by its own word; look again"):
+        Hand(make, [*(beat(node) for node in ALL), Progress(MR2, 1, 0, 1, 8, 0, 0)])
+
+
+def test_a_machine_with_somebody_elses_journal_cannot_be_regenerated() -> None:
+    make = maker_of(SITE, Wish("regenerate", machine="MR1", body=("p(1,3)",)), 1)
+    with pytest.raises(OperateError, match="MR2: its journal is another machine's: put the right board"):
+        Hand(make, [*(beat(node) for node in ALL), halted(MR2, Reason.JOURNAL_FOREIGN, needs_person=True)])
+
+
 def test_all_stand_frozen_while_the_person_reads_and_no_is_no() -> None:
     hand, machines = started()
     machines.turn(60)
@@ -162,7 +186,7 @@ def test_nobody_answers_for_five_minutes_and_it_is_broken_off() -> None:
 
 def test_a_grant_on_its_way_to_who_lives_becomes_that_machines() -> None:
     """Its giver says so; the old grant is older than what everybody has read."""
-    hand, machines = started(PLACE, seen(STEWARD, LEFT, 9, MR2))
+    hand, machines = started(*BODY, seen(STEWARD, LEFT, 9, MR2))
     machines.turn(2)
     hand.order.answered(hand.now_us, agrees=True)
     machines.turn(5)
@@ -174,7 +198,7 @@ def test_a_car_goes_to_who_keeps_its_place() -> None:
     place = next(place for place in SITE.places if place.track == 3)
     key = TokenKey(TokenKind.CAR, car.origin << 16 | car.number)
     hand, machines = started(
-        PLACE,
+        *BODY,
         CarAt(MR2, car, place.number, 3, 2_700),
         TokenSeen(MR2, TokenKind.CAR, key.number, 3, MR1),
     )
@@ -207,7 +231,7 @@ def test_a_lost_steward_gets_back_what_it_did_not_give_away() -> None:
 
 
 def test_what_the_lost_machine_says_to_hold_is_not_believed() -> None:
-    hand, machines = started(PLACE, held(MR1, OTHERS, 3), held(MR2, OTHERS, 4))
+    hand, machines = started(*BODY, held(MR1, OTHERS, 3), held(MR2, OTHERS, 4))
     machines.turn(2)
     assert hand.order.has_question
 
@@ -218,7 +242,7 @@ def test_what_the_lost_machine_says_to_hold_is_not_believed() -> None:
     ids=["two holders", "an older version than another knows"],
 )
 def test_journals_that_do_not_agree_break_it_off(words: tuple[Message, ...]) -> None:
-    hand, machines = started(PLACE, *words)
+    hand, machines = started(*BODY, *words)
     machines.turn(5)
     assert hand.order.status == 1 and phases(hand) == [FREEZE, ABORT]
     assert any("do not agree about segment 0x0102" in line and "MR2" in line for line in hand.lines)
@@ -226,7 +250,7 @@ def test_journals_that_do_not_agree_break_it_off(words: tuple[Message, ...]) -> 
 
 def test_what_was_given_away_before_its_holder_stood_is_not_held_by_two() -> None:
     """Its giver said that it holds it right before, and was then asked for it."""
-    hand, machines = started(PLACE, held(STEWARD, LEFT, 4), seen(STEWARD, LEFT, 5, MR2), held(MR2, LEFT, 5))
+    hand, machines = started(*BODY, held(STEWARD, LEFT, 4), seen(STEWARD, LEFT, 5, MR2), held(MR2, LEFT, 5))
     machines.bend = lambda one: None if isinstance(one, RegenerationState) else one
     machines.turn(1)
     machines.bend = lambda one: None if one == held(STEWARD, LEFT, 4) else one

@@ -2,8 +2,9 @@
 
 import pytest
 
-from onboard.core.codes import DriveMode, KindCode, MachineState, TokenKind
-from onboard.core.messages import DriveOrder, DriveState, Heartbeat, Message, PlatformState, TokenHeld
+from onboard.core.codes import DriveMode, KindCode, MachineState, Reason, TokenKind
+from onboard.core.messages import BusTime, DriveOrder, DriveState, Heartbeat, Message, PlatformState, TokenHeld
+from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
 from tests.trace.checking import (
     ER1,
@@ -16,6 +17,7 @@ from tests.trace.checking import (
     at,
     grant,
     one_alley,
+    power_up,
     two_floors,
 )
 
@@ -59,6 +61,49 @@ def test_two_holders_are_found(messages: list[Message]) -> None:
 def test_a_right_that_was_given_on_is_not_claimed_later() -> None:
     tape = Tape(one_alley()).say(1, grant(SLOT, 1, 1, MR1), grant(SLOT, 2, MR1, 1))
     assert tape.say(3, held(MR1, 1)).broken() == {"one-holder": 1}
+
+
+def life(node: int, state: MachineState, boot: int = 2) -> Heartbeat:
+    return Heartbeat(node, 1, 1, 0, boot, KindCode.ROBOT, state)
+
+
+def test_an_old_journal_that_is_told_at_a_start_is_no_second_holder() -> None:
+    """It is for the others to compare; who then holds tells it again to all who ask."""
+    tape = Tape(None).say(1, grant(SLOT, 1, 1, MR1), grant(SLOT, 2, MR1, 1))
+    tape.say(3, life(MR1, MachineState.STARTING), held(MR1, 1))
+    tape.say(4, life(MR1, MachineState.OBSTACLE), Halted(MR1, MR1, Reason.JOURNAL_SHORT, 1, True, 2), held(MR1, 1))
+    assert tape.broken() == {}
+
+
+@pytest.mark.parametrize(
+    "then",
+    [
+        [life(MR1, MachineState.IDLE), held(MR1, 1)],
+        [grant(SLOT, 2, MR1, MR2)],
+        [grant(SLOT, 3, MR1, MR2)],
+        [held(MR1, 2)],
+    ],
+    ids=["keeps it and acts", "gives it again", "gives what it has not", "another's version"],
+)
+def test_who_uses_an_old_journal_is_found(then: list[Message]) -> None:
+    tape = Tape(one_alley()).say(1, grant(SLOT, 1, 1, MR1), grant(SLOT, 2, MR1, 1))
+    tape.say(3, life(MR1, MachineState.STARTING), held(MR1, 1))
+    assert tape.say(5, *then).broken() == {"one-holder": 1}
+
+
+@pytest.mark.parametrize(
+    ("said", "runs"),
+    [
+        # The word of five seconds waited for three: the only other machine was off, and nobody acknowledged it.
+        ([BusTime(1, 5_000_000)], 1),
+        ([BusTime(1, 0)], 2),
+        ([power_up(), BusTime(1, 3_000_000)], 2),
+    ],
+    ids=["held up", "stands still", "begins anew"],
+)
+def test_a_word_of_the_time_that_was_held_up_begins_no_other_run(said: list[Message], runs: int) -> None:
+    tape = Tape(one_alley()).say(1, grant(SLOT, 1, 1, MR1), BusTime(1, 1_000_000))
+    assert tape.say(8, *said).say(8.1, grant(SLOT, 2, MR1, 1)).verdict().runs == runs
 
 
 def test_a_log_that_begins_in_the_middle_takes_the_first_word_for_granted() -> None:

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from onboard.core.codes import Reason
+from onboard.core.codes import MachineState, Reason
 from onboard.core.frame import Frame
-from onboard.core.messages import BusTime, Message
+from onboard.core.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
 from onboard.trace.candump_reader import CandumpReader, Record
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
@@ -155,6 +155,9 @@ class Checks:
         self._last_us: int | None = None
         self._excused_us = 0
         self._clocks_until_us = 0
+        #: The newest bus time, us, and who was started since it told bus time last.
+        self._bus_time_us = 0
+        self._started: set[int] = set()
         self._begin()
 
     def _why_not(self, rule: type[Rule]) -> str:
@@ -240,11 +243,9 @@ class Checks:
 
     def _orderly(self, time_us: int, message: Message) -> int:
         """The time to go by: a little back is held, much back is another run, as is bus time that starts anew."""
-        last_us, offset_us = self._last_us, self._picture.offset_us
+        last_us = self._last_us
         back_us = 0 if last_us is None else last_us - time_us
-        anew = isinstance(message, BusTime) and offset_us is not None and time_us >= self._clocks_until_us
-        # A bus time that stands still while the log goes on is one that began anew as well.
-        anew = anew and isinstance(message, BusTime) and time_us - message.bus_time_us - (offset_us or 0) > BACK_US
+        anew = self._is_anew(time_us, message)
         if back_us > BACK_US or anew:
             self._end()
             self.verdict.runs += 1
@@ -254,6 +255,23 @@ class Checks:
             time_us = last_us or 0
         self._last_us = time_us
         return time_us
+
+    def _is_anew(self, time_us: int, message: Message) -> bool:
+        """Whether bus time began anew, going back or standing still while the log goes on.
+
+        A word of the same life that is late only was held up: with one other machine on the bus, and that one off,
+        nobody acknowledges frames, and the word waits until it is back.
+        """
+        if isinstance(message, Heartbeat) and message.state is MachineState.STARTING:
+            self._started.add(message.sender)
+        if not isinstance(message, BusTime):
+            return False
+        before_us, offset_us = self._bus_time_us, self._picture.offset_us
+        self._bus_time_us = message.bus_time_us
+        is_held_up = message.bus_time_us > before_us and message.sender not in self._started
+        self._started.discard(message.sender)
+        is_late = offset_us is not None and time_us - message.bus_time_us - offset_us > BACK_US
+        return is_late and not is_held_up and time_us >= self._clocks_until_us
 
     def _keep(self, finding: Finding) -> None:
         self.verdict.counts[finding.rule] += 1

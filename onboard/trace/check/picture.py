@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 
-from onboard.core.codes import KindCode, MachineState, ManualMode
+from onboard.core.codes import STILL, KindCode, MachineState, ManualMode
+from onboard.core.holding import RIGHTS_LOST
 from onboard.core.messages import BusTime, Heartbeat, ManualState, Message, Progress, TokenGrant, TokenHeld
-from onboard.core.recovery_messages import Regeneration, TokenAssigned
+from onboard.core.recovery_messages import Halted, Regeneration, TokenAssigned
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import Event
@@ -35,6 +36,8 @@ class Picture:
         #: Boot counter and last sign of life, us of the log, by node.
         self.boots: dict[int, int] = {}
         self.heard_us: dict[int, int] = {}
+        #: Machines that start, or hold for their journals: what they say that they hold is for the others to compare.
+        self.announcing: set[int] = set()
         #: Things that could not be judged, because the log does not tell enough.
         self.unjudged = 0
         #: Until then machines were broken on purpose, us of the log: no rule of liveness counts time before it.
@@ -113,6 +116,15 @@ class Picture:
                     self.tokens.from_start = beat.boot == 1 and beat.state is MachineState.STARTING
                 self.boots[beat.sender] = beat.boot
                 self.heard_us[beat.sender] = time_us
+                self._on_state(beat)
+            case Halted() as word if word.sender == word.machine and word.reason in RIGHTS_LOST:
+                self.announcing.add(word.sender)
+
+    def _on_state(self, beat: Heartbeat) -> None:
+        if beat.state is MachineState.STARTING:
+            self.announcing.add(beat.sender)
+        elif beat.state not in STILL:
+            self.announcing.discard(beat.sender)
 
     def _on_manual(self, state: ManualState, time_us: int) -> None:
         if state.manual_mode is not ManualMode.AUTOMATIC:

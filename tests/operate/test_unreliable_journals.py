@@ -1,0 +1,118 @@
+"""A machine whose journal is short or somebody else's stays on the bus, holds, says why, and comes back as it says."""
+
+import pytest
+
+from bus_sim.faults.arm import arm
+from bus_sim.faults.injection import parse_injection
+from bus_sim.run import Simulation
+from bus_sim.sites import find_site
+from onboard.core.codes import MachineState, Reason, RegenerationPhase
+from onboard.core.journal_state import JournalState
+from onboard.core.messages import BusTime, Diagnostic, DriveOrder, Heartbeat, Message, ShuttleOrder
+from onboard.core.recovery_messages import Halted, Regeneration, RegenerationState
+from tests.system.scene import Scene, play, stays
+
+SITE = find_site("small")
+CARS = stays((0, 400), (60, 500), (120, 600), (300, None))
+MR2 = SITE.machine("MR2").node_id
+
+
+def played(*faults: str, tool: bool = False) -> Scene:
+    """``tool``: some tool says FREEZE at 90 s, whatever is so."""
+
+    def plant(simulation: Simulation) -> None:
+        arm(simulation, [parse_injection(fault) for fault in faults])
+
+    def before(simulation: Simulation) -> None:
+        bus = simulation.fleet.attach("tool", 251)
+        for frame in simulation.codecs.fleet.encode(Regeneration(251, RegenerationPhase.FREEZE, 1, MR2, 0, 0, 0)):
+            simulation.loop.call_at(90.0, bus.send, frame)
+
+    return play(SITE, CARS, plant=plant, before=before if tool else None, limit_s=1_500)
+
+
+def said_by(scene: Scene, node: int, from_s: float, bus: str = "fleet") -> list[Message]:
+    return [
+        one.message
+        for one in scene.said
+        if one.bus == bus and one.message.sender == node and one.time_us > from_s * 1e6
+    ]
+
+
+def assert_safe(scene: Scene) -> None:
+    """Nothing is broken; that its task waits until others take it from a machine that holds is no fault of theirs."""
+    assert scene.simulation.plant.oracle.finish() == []
+    assert scene.verdict().counts.keys() <= {"something-happens"}
+    assert not [one for one in scene.simulation.controllers.values() if one.holon.halted]
+
+
+def served(scene: Scene) -> int:
+    return scene.simulation.plant.street.summary().served
+
+
+def told(scene: Scene) -> list[str]:
+    return [line for _, who, line in scene.simulation.log.lines if who == "operator"]
+
+
+@pytest.mark.parametrize(
+    ("name", "at_s", "body"),
+    [("MR1", 50, ",body=p(1;5)"), ("MR2", 20, ",body=p(3;8)"), ("IOC1", 190, ""), ("ER1", 50, "")],
+)
+@pytest.mark.parametrize("again", [False, True], ids=["once", "and started again while it holds"])
+def test_a_short_journal_is_brought_back_by_the_operator(name: str, at_s: int, body: str, again: bool) -> None:
+    came_s, node = at_s + 30, SITE.machine(name).node_id
+    faults = [f"crash:target={name},at_s={at_s},restart_s=5,journal=unsealed"]
+    faults += [f"crash:target={name},at_s={at_s + 12},restart_s=5"] if again else []
+    scene = played(*faults, f"operate:do=regenerate,at_s={came_s},target={name}{body}")
+    scene.assert_sound()
+    held = [one for one in said_by(scene, node, at_s + 5) if isinstance(one, Halted)]
+    assert {(one.machine, one.reason, one.needs_person) for one in held} == {(node, Reason.JOURNAL_SHORT, True)}
+    assert len(held) > (came_s - at_s - 12) * 1e6 / SITE.timing.heartbeat_us
+    assert (scene.simulation.plant.street.summary().parked, served(scene)) == (4, 3)
+    assert f"{name} is in epoch 1" in told(scene)
+    assert scene.simulation.journals[node].condition.state is JournalState.INTACT
+
+
+def test_while_its_journal_is_short_a_machine_moves_nothing_and_takes_no_part() -> None:
+    scene = played("crash:target=MR2,at_s=20,restart_s=5,journal=unsealed")
+    assert_safe(scene)
+    said = said_by(scene, MR2, 30)
+    assert {one.state for one in said if isinstance(one, Heartbeat)} == {MachineState.OBSTACLE}
+    assert {type(one).__name__ for one in said} <= {"Heartbeat", "Halted", "SyncRequest", "SyncDone", "Diagnostic"}
+    orders = [one for one in said_by(scene, MR2, 30, "MR2") if isinstance(one, DriveOrder | ShuttleOrder)]
+    assert not orders
+    assert served(scene) == 3, "the other robot goes on beside it"
+
+
+def test_somebody_elses_journal_is_never_written_and_its_machine_says_what_to_do() -> None:
+    scene = played(
+        "crash:target=MR2,at_s=20,restart_s=5,journal=foreign",
+        "operate:do=regenerate,at_s=40,target=MR2,body=p(3;8)",
+        tool=True,
+    )
+    assert_safe(scene)
+    said = said_by(scene, MR2, 20)
+    assert {type(one) for one in said} <= {Heartbeat, Halted, BusTime, Diagnostic, RegenerationState}
+    held = [one for one in said if isinstance(one, Halted)]
+    assert {(one.reason, one.needs_person) for one in held} == {(Reason.JOURNAL_FOREIGN, True)}
+    assert len(held) > 100
+    answer = [one for one in said if isinstance(one, RegenerationState)]
+    assert [(one.regeneration_phase, one.reason) for one in answer] == [
+        (RegenerationPhase.REFUSED, Reason.JOURNAL_FOREIGN)
+    ]
+    assert not [one for one in said_by(scene, MR2, 26, "MR2") if isinstance(one, DriveOrder | ShuttleOrder)]
+    medium = scene.simulation.journals[MR2].medium
+    assert medium is not None and b"another machine" in medium
+    assert any(line.startswith("MR2: its journal is another machine's") for line in told(scene))
+    assert served(scene) == 3, "the other robot goes on beside it"
+
+
+def test_a_foreign_journal_that_is_taken_out_is_a_lost_one() -> None:
+    """The remedy that its machine tells: that file away, start it, regenerate."""
+    scene = played(
+        "crash:target=MR2,at_s=20,restart_s=5,journal=foreign",
+        "crash:target=MR2,at_s=40,restart_s=5,journal=lost",
+        "operate:do=regenerate,at_s=60,target=MR2,body=p(3;8)",
+    )
+    scene.assert_sound()
+    assert served(scene) == 3 and "MR2 is in epoch 1" in told(scene)
