@@ -94,7 +94,10 @@ class Behaviour(Protocol):
         """A message of the machine's own device bus."""
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """A fleet message, after tokens, mirror and negotiation have seen it."""
+        """A fleet message, after tokens, mirror and negotiation have seen it.
+
+        After a heartbeat that says the same as its sender's last ``advance`` is called only where this has effects.
+        """
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Pre-assigned, outbid, awarded, or an own call closed."""
