@@ -10,7 +10,7 @@ from typing import Any
 
 from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
+from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory, Fleet
 from onboard.core.blocked_words import BlockedWords
 from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.car_words import CarWords
@@ -113,6 +113,7 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self._attentive = self.behaviour if isinstance(self.behaviour, Attentive) else None
         self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
@@ -124,7 +125,7 @@ class Holon:
         self._heartbeat_due_us: int | None = None
         #: When ``wake`` is due, bus time in us; not known after any event but a heartbeat that says nothing new.
         self._due_us: int | None = None
-        self._is_due_known = False
+        self.is_due_known = False
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
@@ -186,12 +187,9 @@ class Holon:
         """A message of the fleet bus, received at ``local_us``."""
         local_us = self.time.steady(local_us)
         now_us = self.clock.bus_us(local_us)
-        if isinstance(message, Heartbeat) and self.part.lives_on(message, now_us):
-            # Nothing fell due by it, so nobody has to go on because of it, but where it is answered.
-            effects = self.behaviour.hear(message, now_us)
-            self._is_due_known &= not effects
-            return self._settle(effects, now_us) if effects else effects
-        self._is_due_known = False
+        if isinstance(message, Heartbeat) and self._only_waits(now_us) and self.part.lives_on(message, now_us):
+            return []
+        self.is_due_known = False
         if message.sender == self.node_id:
             return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
@@ -222,7 +220,7 @@ class Holon:
     def sense(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the machine's own device bus."""
         local_us = self.time.steady(local_us)
-        self._is_due_known = False
+        self.is_due_known = False
         if not self.clock.is_set:
             # Plans made before bus time is known would be told in a time of one's own.
             self._sensed_early[type(message)] = message
@@ -233,7 +231,7 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         local_us = self.time.steady(local_us)
-        self._is_due_known = False
+        self.is_due_known = False
         # Who has slept counts nobody as silent, so that it does not take itself for the time source.
         effects = self._awake(self.clock.bus_us(local_us))
         self.time.elect(local_us)
@@ -258,8 +256,8 @@ class Holon:
         """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
         if self.halted is not None:
             return None
-        if not self._is_due_known:
-            self._due_us, self._is_due_known = self._earliest_due(), True
+        if not self.is_due_known:
+            self._due_us, self.is_due_known = self._earliest_due(), True
         return None if self._due_us is None else self.time.loop_us(self._due_us)
 
     def _earliest_due(self) -> int | None:
@@ -278,6 +276,12 @@ class Holon:
         if self.part.begins:
             times += (self._negotiation_due(), self.behaviour.next_wake())
         return min((time for time in times if time is not None), default=None)
+
+    def _only_waits(self, now_us: int) -> bool:
+        """Whether nothing is to be done here unless something happens: nothing is due, and nobody looks for it."""
+        if self._attentive is None or not self.is_due_known or self._due_us is None or self._due_us <= now_us:
+            return False
+        return not self._attentive.watches(now_us)
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
