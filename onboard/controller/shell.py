@@ -125,7 +125,9 @@ class Controller:
     def _post(self, handle: Callable[[Frame, int], list[Effect]], frame: Frame, time_us: int) -> None:
         if self._writing is None and not self._inbox:
             self._guarded(lambda: self._outbox.extend(handle(frame, time_us)))
-            self._carry_out()
+            # Where nothing is to be said and nothing can have fallen due, all is as it was when this was done last.
+            if self._outbox or not self.holon.is_due_known:
+                self._carry_out()
         elif len(self._inbox) < INBOX_LIMIT:
             self._inbox.append((handle, frame, time_us))
         else:
@@ -184,8 +186,9 @@ class Controller:
 
     def _may_compact(self) -> bool:
         """Nothing waits and nothing moves: whoever needs this machine's word meanwhile waits so long."""
-        is_idle = self.holon.halted is None and self.holon.behaviour.state is MachineState.IDLE
-        return self._fewer is not None and is_idle and self.ports.journal.has_grown
+        if self._fewer is None or not self.ports.journal.has_grown:
+            return False
+        return self.holon.halted is None and self.holon.behaviour.state is MachineState.IDLE
 
     def _work_off(self) -> None:
         while self._writing is None:

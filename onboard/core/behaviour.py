@@ -7,7 +7,7 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from onboard.core.authority import TokenBook, TokenKey, car_token
 from onboard.core.codes import KindCode, MachineState, Reason, TokenKind
@@ -110,6 +110,14 @@ class Behaviour(Protocol):
 
     def statements(self, now_us: int) -> list[Effect]:
         """Say again what this node vouches for: its itinerary and the cars in its custody."""
+
+
+@runtime_checkable
+class Attentive(Protocol):
+    """A behaviour that takes nothing from heartbeats, and need not be called at each: it knows when it only waits."""
+
+    def watches(self, now_us: int) -> bool:
+        """Whether time alone may have left ``advance`` something to do for which ``next_wake`` does not call."""
 
 
 class BehaviourFactory(Protocol):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.holding import RIGHTS_LOST, Hold, Holding, Outcome
-from onboard.core.messages import Heartbeat, Message
+from onboard.core.messages import EmergencyStop, Heartbeat, Message
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted
@@ -28,6 +28,10 @@ class Holds:
         """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
         self.drops[Reason.DUPLICATE_NODE_ID] += 1
         return self.apply(self.holding.own_frame(now_us, is_right=self.own.is_right(message)), now_us)
+
+    def on_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
+        """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
+        return self.apply(self.holding.stop(stop.sender, now_us), now_us)
 
     def on_go(self, go: Go, now_us: int) -> list[Effect]:
         """A person lets me, or whom an emergency stop holds, go on; that gives nobody the rights back that it lost."""

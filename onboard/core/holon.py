@@ -10,7 +10,7 @@ from typing import Any
 
 from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
+from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory, Fleet
 from onboard.core.blocked_words import BlockedWords
 from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.car_words import CarWords
@@ -48,6 +48,7 @@ from onboard.core.recovery_messages import Go, Halted, Regeneration
 from onboard.core.regeneration import Regenerating
 from onboard.core.rights import Rights
 from onboard.core.site import Machine, Site
+from onboard.core.taking_part import TakingPart
 from onboard.core.timekeeper import Heard, Timekeeper
 from onboard.core.witness import Doubt, Witness
 
@@ -112,6 +113,7 @@ class Holon:
         )
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self._attentive = self.behaviour if isinstance(self.behaviour, Attentive) else None
         self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
@@ -119,10 +121,14 @@ class Holon:
         self.regeneration.cars_told = self.fleet.cars_told
         self.regeneration.replay(entries)
         self.regeneration.refuses = lambda: self.holding.why.reason if self.holding.is_apart else Reason.NONE
+        self.part = TakingPart(self.presence, self.holding, self.regeneration, self.witness, self.time)
         self.rights.is_frozen = lambda: self.regeneration.is_frozen
         if self.holding.why.reason in RIGHTS_LOST:
             self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
         self._heartbeat_due_us: int | None = None
+        #: When ``wake`` is due, bus time in us; not known after any event but a heartbeat that says nothing new.
+        self._due_us: int | None = None
+        self.is_due_known = False
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
@@ -139,7 +145,7 @@ class Holon:
             CarAt: self._on_car,
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
-            EmergencyStop: self._on_emergency_stop,
+            EmergencyStop: self.holds.on_stop,
             Go: self.holds.on_go,
             Halted: self.holds.on_halted,
             Blocked: self.blocked_words.hear,
@@ -180,6 +186,9 @@ class Holon:
         """A message of the fleet bus, received at ``local_us``."""
         local_us = self.time.steady(local_us)
         now_us = self.clock.bus_us(local_us)
+        if isinstance(message, Heartbeat) and self._only_waits(now_us) and self.part.lives_on(message, now_us):
+            return []
+        self.is_due_known = False
         if message.sender == self.node_id:
             return self.holds.on_own_number(message, now_us)
         why = self.admission.why_not(message)
@@ -212,6 +221,7 @@ class Holon:
         if self.journal.is_foreign:
             return []
         local_us = self.time.steady(local_us)
+        self.is_due_known = False
         if not self.clock.is_set:
             # Plans made before bus time is known would be told in a time of one's own.
             self._sensed_early[type(message)] = message
@@ -222,6 +232,7 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         local_us = self.time.steady(local_us)
+        self.is_due_known = False
         # Who has slept counts nobody as silent, so that it does not take itself for the time source.
         effects = self._awake(self.clock.bus_us(local_us))
         self.time.elect(local_us)
@@ -230,14 +241,14 @@ class Holon:
         effects += self.regeneration.wake(now_us)
         if not self.holding.is_apart:
             effects += self.witness.wake(now_us)
-        if self._deals:
+        if self.part.deals:
             effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
         self._bus_time_lost = self.clock.is_lost(local_us)
         if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self._heartbeat_due_us = now_us
-        if not self._bus_time_lost and self._begins:
+        if not self._bus_time_lost and self.part.begins:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
         effects += self._beat(now_us)
         return self._settle(effects, now_us)
@@ -246,6 +257,12 @@ class Holon:
         """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
         if self.halted is not None:
             return None
+        if not self.is_due_known:
+            self._due_us, self.is_due_known = self._earliest_due(), True
+        return None if self._due_us is None else self.time.loop_us(self._due_us)
+
+    def _earliest_due(self) -> int | None:
+        """When the first of all parts has something to do, bus time in us: a matter of what they know, not of when."""
         times = [
             self._heartbeat_due_us,
             self.time.due_us,
@@ -255,12 +272,17 @@ class Holon:
         ]
         if not self.holding.is_apart:
             times.append(self.witness.next_wake())
-        if self._deals:
+        if self.part.deals:
             times += (self.tokens.next_wake(), self.rights.petition_due())
-        if self._begins:
+        if self.part.begins:
             times += (self._negotiation_due(), self.behaviour.next_wake())
-        due = [time for time in times if time is not None]
-        return self.time.loop_us(min(due)) if due else None
+        return min((time for time in times if time is not None), default=None)
+
+    def _only_waits(self, now_us: int) -> bool:
+        """Whether nothing is to be done here unless something happens: nothing is due, and nobody looks for it."""
+        if self._attentive is None or not self.is_due_known or self._due_us is None or self._due_us <= now_us:
+            return False
+        return not self._attentive.watches(now_us)
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
@@ -324,7 +346,7 @@ class Holon:
     def _may_not_bid(self, now_us: int) -> Reason:
         if self.clock.is_lost(self.clock.local_us(now_us)):
             return Reason.BUS_TIME_LOST
-        if not self._begins or self.behaviour.state in (
+        if not self.part.begins or self.behaviour.state in (
             MachineState.OBSTACLE,
             MachineState.STOPPED,
             MachineState.STARTING,
@@ -376,21 +398,7 @@ class Holon:
     def _statements(self, now_us: int) -> list[Effect]:
         return self.behaviour.statements(now_us) + self.blocked_words.statements()
 
-    def _on_emergency_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
-        """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
-        return self.holds.apply(self.holding.stop(stop.sender, now_us), now_us)
-
     # --- holds -------------------------------------------------------------------------------------------------
-
-    @property
-    def _is_still(self) -> bool:
-        """Whether this machine is an obstacle: it neither moves nor bids."""
-        return self.presence.is_held or self.holding.is_held or self.regeneration.is_frozen
-
-    @property
-    def _deals(self) -> bool:
-        """Whether this machine asks for rights and gives them away."""
-        return not (self.holding.is_apart or self.regeneration.is_frozen)
 
     def _thaw(self, lost: int, now_us: int) -> list[Effect]:
         """Rights were made anew, or it was broken off: who lost its own begins as after a restart, all others look."""
@@ -403,11 +411,6 @@ class Holon:
                 return self.holds.apply(self.holding.go(self.node_id), now_us)
         self.presence.listen_anew(now_us)
         return self.holds.words()
-
-    @property
-    def _begins(self) -> bool:
-        """Whether this machine may begin anything: whoever was started again waits until all have answered."""
-        return not (self._is_still or self.witness.is_waiting)
 
     def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Who is held gives no right away: it may be one that it does not have any more."""
@@ -434,13 +437,13 @@ class Holon:
         effects = effects + self._doubts()
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
-        for _ in range(MAX_ROUNDS if self._begins else 0):
+        for _ in range(MAX_ROUNDS if self.part.begins else 0):
             more = self.behaviour.advance(now_us)
             if not more:
                 break
             effects = effects + more
         else:
-            if self._begins:
+            if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
         self.holds.own.note(effects)
         return effects
@@ -486,7 +489,7 @@ class Holon:
             self.mirror.digest(),
             self.boot,
             self.machine.kind,
-            MachineState.OBSTACLE if self._is_still else self.behaviour.state,
+            MachineState.OBSTACLE if self.part.is_still else self.behaviour.state,
             self.regeneration.epoch,
         )
 

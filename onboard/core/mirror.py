@@ -37,6 +37,8 @@ class Peer:
     site_digest: int
     #: When the first heartbeat of its present life was heard.
     since_us: int = 0
+    #: That heartbeat itself; the same again is no news.
+    beat: Heartbeat | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +101,15 @@ class Mirror:
             self.boots_before[beat.sender] = known.boot if known is not None else 0
         since_us = now_us if known is None or fresh else known.since_us
         self.peers[beat.sender] = Peer(
-            beat.kind, beat.state, beat.boot, beat.mirror_digest, now_us, beat.contract, beat.site_digest, since_us
+            beat.kind,
+            beat.state,
+            beat.boot,
+            beat.mirror_digest,
+            now_us,
+            beat.contract,
+            beat.site_digest,
+            since_us,
+            beat,
         )
         return fresh
 

@@ -70,6 +70,21 @@ class Presence:
             self.listen_anew(now_us)
         return slept
 
+    def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
+        """Note a heartbeat that says nothing new: its sender's last word again, of a machine that takes part.
+
+        False, and nothing is noted, where it may be news: the sender or I was not heard for long, or it is an obstacle.
+        """
+        peer, before_us = self.mirror.peers.get(beat.sender), self._active_us
+        if peer is None or peer.beat != beat or now_us - peer.heard_at_us >= self.patience_us:
+            return False
+        if before_us is None or now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us:
+            return False
+        if beat.sender in self.mirror.obstacles.machines or beat.sender in self.foreign or beat.sender in self.halts:
+            return False
+        peer.heard_at_us = self._active_us = now_us
+        return True
+
     def listen_anew(self, now_us: int) -> None:
         """Be an obstacle until the others have said what they plan by now: I did not hear them for a while."""
         self._begin_anew(now_us)

@@ -1,5 +1,6 @@
 """Which tokens a site has, and who holds each before it first moves."""
 
+from functools import cache
 from typing import NamedTuple
 
 from onboard.core.codes import KindCode, TokenKind
@@ -13,8 +14,9 @@ class TokenKey(NamedTuple):
     number: int
 
 
+@cache
 def segment_token(segment: Segment) -> TokenKey:
-    """The token of one body slot."""
+    """The token of one body slot: always the same, so each is made once, 65,536 at most."""
     return TokenKey(TokenKind.SEGMENT, segment.number)
 
 

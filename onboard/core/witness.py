@@ -99,6 +99,10 @@ class Witness:
         del self.mismatches[beat.sender]
         return self.ask(beat.sender)
 
+    def agrees(self, beat: Heartbeat) -> bool:
+        """Whether a peer's mirror is as mine, and was so when it was heard last."""
+        return beat.mirror_digest == self.mirror.digest() and not self.mismatches[beat.sender]
+
     def begin(self, now_us: int) -> list[Effect]:
         """What the journal says that I hold and gave away, for all to compare, and the question to all."""
         self.tokens.is_synced = False

@@ -1,6 +1,6 @@
 """A track as a carrier's drive sees it: positions in mm, slots with tokens, and what lies beyond its ends."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -18,6 +18,9 @@ class TrackAxis:
 
     site: Site
     number: int
+    #: Worked out of the site, which never changes: rights by the index before and the one entered, slots by a body's ends.
+    _rights: dict[tuple[int, int], list[Segment]] = field(default_factory=dict, init=False, repr=False, compare=False)
+    _overlaps: dict[tuple[int, int], list[Segment]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def track(self) -> Track:
@@ -72,19 +75,27 @@ class TrackAxis:
 
     def rights(self, indices: list[int]) -> list[list[Segment]]:
         """What must be held to have the body at each of a line of neighbouring indices, entered in this order."""
-        needed = []
-        for place, index in enumerate(indices):
-            before = indices[place - 1] if place else index
-            needed.append([self.slot(index), *self._beside(index), *self.crossing(before, index)])
+        entered = zip(indices[:1] + indices, indices, strict=False)
+        return [self._rights.get(step) or self._rights_of(*step) for step in entered]
+
+    def _rights_of(self, before: int, index: int) -> list[Segment]:
+        needed = [self.slot(index), *self._beside(index), *self.crossing(before, index)]
+        self._rights[before, index] = needed
         return needed
 
     def overlapped(self, low_mm: int, high_mm: int) -> list[Segment]:
         """Slots that a body from ``low_mm`` to ``high_mm`` is in, and the gate where it is across a sill."""
-        indices = list(range(self.index_at(low_mm), self.index_at(high_mm) + 1))
+        ends = self.index_at(low_mm), self.index_at(high_mm)
+        return list(self._overlaps.get(ends) or self._overlap_of(*ends))
+
+    def _overlap_of(self, lowest: int, highest: int) -> list[Segment]:
+        indices = list(range(lowest, highest + 1))
         held = [self.slot(index) for index in indices]
         for one, other in pairwise(indices):
             held += self.crossing(one, other)
-        return [*held, *(slot for slot in self._beside(indices[-1]) if slot not in held)]
+        held += [slot for slot in self._beside(indices[-1]) if slot not in held]
+        self._overlaps[lowest, highest] = held
+        return held
 
     def _beside(self, index: int) -> list[Segment]:
         """What a body needs beside the slot that it is in: whoever turns in a mouth, the spur."""

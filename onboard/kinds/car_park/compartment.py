@@ -266,6 +266,10 @@ class Compartment:
         due = [time for time in (retry_us, self.stewardship.next_wake()) if time is not None]
         return min(due, default=None)
 
+    def watches(self, now_us: int) -> bool:
+        """It looks often whether an award of its own was never heard."""
+        return self.job is not None and not self.job.winner
+
     def statements(self, now_us: int) -> list[Effect]:
         """The cars in my custody and the tokens that I hold."""
         return self.stewardship.car_statements() + self.fleet.tokens.statements()

@@ -131,12 +131,16 @@ class GoingAround:
             self.turn_later(now_us)
         return self.take_up(kept, steps or (), works, now_us)
 
+    def drive_changes(self, now_us: int) -> bool:
+        """Whether drive or shuttle have got stuck by now, or are so no more."""
+        return (self.carriage.stall.is_stuck(now_us) or self.shuttle.stall.is_stuck(now_us)) is not self.is_stuck
+
     def watch_drive(self, now_us: int) -> list[Effect]:
         """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks.
 
         So does a shuttle that does not take up its order.
         """
-        if (self.carriage.stall.is_stuck(now_us) or self.shuttle.stall.is_stuck(now_us)) is self.is_stuck:
+        if not self.drive_changes(now_us):
             return []
         self.is_stuck = not self.is_stuck
         if not self.is_stuck:

@@ -229,6 +229,10 @@ class Lift:
         due = [time for time in (self._refresh_at_us, self.stewardship.next_wake()) if time is not None]
         return min(due, default=None)
 
+    def watches(self, now_us: int) -> bool:
+        """It looks often whether its drive has got stuck, or goes again."""
+        return self.stall.is_stuck(now_us) is not self._is_stuck
+
     def statements(self, now_us: int) -> list[Effect]:
         """Where the platform is, and the tokens that this node holds."""
         effects = self.stewardship.car_statements() + self.fleet.tokens.statements()
@@ -467,8 +471,7 @@ class Lift:
         site = self.fleet.site
         self.stall.ordered(now_us)
         self._refresh_at_us = now_us + site.timing.drive_refresh_us
-        order = DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s)
-        return [Actuate(order)]
+        return [Actuate(DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s))]
 
 
 def rides_of(track: int, robot: int, itinerary: Itinerary, seen: Progress | None, now_us: int) -> list[Ride]:

@@ -325,6 +325,12 @@ class Robot:
         due = [time for time in times if time is not None]
         return min(due) if due else None
 
+    def watches(self, now_us: int) -> bool:
+        """It looks often while it starts, waits for a slot or rides, and for a drive that got stuck, or goes again."""
+        step = self.program.step
+        waits = self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE)
+        return waits or not self.starting.is_over or self.going_around.drive_changes(now_us)
+
     def statements(self, now_us: int) -> list[Effect]:
         """My firm itinerary as I told it under its version, where I am in it, and the tokens that I hold."""
         effects: list[Effect] = []

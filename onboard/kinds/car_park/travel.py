@@ -75,9 +75,10 @@ class Carriage:
         return self._axis_of(self.track)
 
     def _axis_of(self, track: int) -> TrackAxis:
-        if track not in self._axes:
-            self._axes[track] = TrackAxis(self.fleet.site, track)
-        return self._axes[track]
+        axis = self._axes.get(track)
+        if axis is None:
+            axis = self._axes[track] = TrackAxis(self.fleet.site, track)
+        return axis
 
     @property
     def standing_at(self) -> Segment | None:
