@@ -15,6 +15,7 @@ from onboard.core.effects import Effect, Record
 from onboard.core.messages import CallForProposals, CarAt, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
+from onboard.core.negotiation.winners import Winners
 from onboard.core.petitions import Petitions
 from onboard.core.site import Machine, Segment, Site
 
@@ -32,6 +33,8 @@ class Fleet:
     #: Input that came to nothing, by reason: the holon's own count.
     drops: Counter[Reason] = field(default_factory=Counter)
     petitions: Petitions = field(init=False)
+    #: Who has this machine's tasks in hand, and whether it is at work.
+    winners: Winners = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
     admissions: int = 0
     #: After this machine's rights were made anew: the slots that it was given, which are those of its body.
@@ -46,6 +49,7 @@ class Fleet:
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)
+        self.winners = Winners(self.node_id, self.negotiation, self.mirror.obstacles.machines)
         self.mirror.on_forgotten.append(self._retire)
 
     def _retire(self, car: Reference) -> None:

@@ -11,10 +11,11 @@ from enum import Enum
 from typing import ClassVar, Generic, TypeVar
 
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason
+from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
+from onboard.core.negotiation.winners import STANDS_AFTER_US
 
 #: After power-up a desk listens so long before it calls: who has an order in hand says so. Ours.
 LISTEN_US = 3_000_000
@@ -46,6 +47,8 @@ class CounterOrder:
     calls: int = field(default=0, kw_only=True)
     answer_at_us: int | None = field(default=None, kw_only=True)
     ask_at_us: int | None = field(default=None, kw_only=True)
+    #: Whether a call of an earlier life of the desk may have found a winner that the desk has forgotten.
+    may_be_won: bool = field(default=False, kw_only=True)
 
     @property
     def told(self) -> str:
@@ -108,6 +111,14 @@ class Counter(ABC, Generic[AnOrder]):
     def on_report(self, order: AnOrder, report: TaskReport, now_us: int) -> list[Effect]:
         """Somebody says how an order stands that is not over."""
 
+    @abstractmethod
+    def may_take_back(self, order: AnOrder) -> bool:
+        """Whether an order that its winner does not carry out may go to another: it is not begun, by all I know."""
+
+    def stands_us(self, order: AnOrder) -> int:
+        """How long its winner may tell no change."""
+        return STANDS_AFTER_US
+
     def in_turn(self, waiting: Iterable[AnOrder]) -> Iterable[AnOrder]:
         """The order in which to call; as they came."""
         return waiting
@@ -130,6 +141,8 @@ class Counter(ABC, Generic[AnOrder]):
         for order in self.orders.values():
             order.answer_at_us = now_us
             order.ask_at_us = now_us + LISTEN_US if order.state is OrderState.IN_HAND else None
+            if order.state is OrderState.IN_HAND:
+                self.fleet.winners.takes(order.task, order.winner, now_us, stands_us=self.stands_us(order))
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
@@ -141,7 +154,17 @@ class Counter(ABC, Generic[AnOrder]):
             self.fleet.drops[Reason.NOT_OF_KIND] += 1
             return []
         order = self.orders.get(message.task)
-        return [] if order is None or order.state in OVER else self.on_report(order, message, now_us)
+        if order is None or order.state in OVER:
+            return []
+        in_hand = order.state is OrderState.IN_HAND
+        if message.sender == order.winner if in_hand else self._may_claim(order, message, now_us):
+            return self.on_report(order, message, now_us)
+        # Who has lost it, or never won it, says nothing that counts.
+        is_claim = message.phase is TaskPhase.AWARDED
+        return self.fleet.winners.remind(order.task, message.sender) if is_claim else []
+
+    def _may_claim(self, order: AnOrder, report: TaskReport, now_us: int) -> bool:
+        return order.may_be_won and self.fleet.winners.may_claim(order.task, report.sender, now_us)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """A call is over: somebody has the order, or nobody."""
@@ -151,13 +174,13 @@ class Counter(ABC, Generic[AnOrder]):
         if order.state is not OrderState.CALLED:
             return []
         if event.winner:
-            return self.put_in_hand(order, event.winner, now_us)
+            return self.put_in_hand(order, event.winner, now_us, event.call.call)
         refused = event.result is CallResult.REFUSED and order.calls >= self.max_calls
         return self.put(order, OrderState.REFUSED if refused else OrderState.HEARD, now_us)
 
     def advance(self, now_us: int) -> list[Effect]:
         """Call for orders, answer the counter, ask who has one in hand."""
-        effects: list[Effect] = []
+        effects = self._take_back(now_us)
         if self._listen_until_us is not None and self._listen_until_us <= now_us:
             self._listen_until_us = None
         if self._listen_until_us is None:
@@ -188,15 +211,30 @@ class Counter(ABC, Generic[AnOrder]):
         effects: list[Effect] = [item for item in said if not isinstance(item, NegotiationEvent)]
         return effects + self.put_in_hand(order, winner, now_us)
 
-    def put_in_hand(self, order: AnOrder, winner: int, now_us: int) -> list[Effect]:
-        """Somebody has it."""
-        order.winner = winner
+    def _take_back(self, now_us: int) -> list[Effect]:
+        """Orders whose winners are lost are called for anew, without those."""
+        effects: list[Effect] = []
+        for order in self.orders.values():
+            if order.state not in (OrderState.CALLED, OrderState.IN_HAND):
+                continue
+            reason = self.fleet.winners.lost(order.task, now_us)
+            if reason is not Reason.NONE and self.may_take_back(order):
+                effects += self.fleet.winners.take_back(order.task, reason, now_us)
+                effects += self.put(order, OrderState.HEARD, now_us)
+        return effects
+
+    def put_in_hand(self, order: AnOrder, winner: int, now_us: int, call: int = 0) -> list[Effect]:
+        """Somebody has it, by ``call`` where it is known."""
+        order.winner, order.may_be_won = winner, False
+        self.fleet.winners.takes(order.task, winner, now_us, call, self.stands_us(order))
         self.price(order)
         return self.put(order, OrderState.IN_HAND, now_us)
 
     def put(self, order: AnOrder, state: OrderState, now_us: int) -> list[Effect]:
         """Note how an order stands, and tell the counter."""
         order.state = state
+        if state in OVER:
+            self.fleet.winners.over(order.task)
         order.ask_at_us = now_us + self.ask_us if state is OrderState.IN_HAND else None
         entry: dict[str, str | int] = {"record": "order_state", "number": order.task.number, "state": state.name}
         return [Record({**entry, "winner": order.winner, **self.price_entry(order)}), *self.say(order, now_us)]
@@ -210,5 +248,6 @@ class Counter(ABC, Generic[AnOrder]):
         state = OrderState[str(entry["state"])]
         # A call does not outlive its desk: it is made again, unless somebody says that it has the order.
         order.state = OrderState.HEARD if state is OrderState.CALLED else state
+        order.may_be_won = state is OrderState.CALLED
         order.winner = int(entry["winner"])
         self.noted_price(order, entry)

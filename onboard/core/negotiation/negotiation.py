@@ -84,10 +84,10 @@ class Negotiation:
         return outcome
 
     def abandon(self, task: Reference, reason: Reason, now_us: int) -> Outcome:
-        """Give up own awards for a whole ``task`` whose winner was not heard; see ``Initiator.abandon``."""
+        """Give up own awards for a ``task`` whose winner was not heard; see ``Initiator.abandon``."""
         outcome: Outcome = []
         for initiator in self.initiators:
-            if initiator.terms.task == task and not initiator.terms.depth:
+            if initiator.terms.task == task:
                 outcome += initiator.abandon(reason, now_us)
         self.trust.forfeited(task, now_us)
         self._forget(now_us)
@@ -99,8 +99,8 @@ class Negotiation:
             initiator.begin_anew(now_us)
 
     def unheard(self, task: Reference, now_us: int) -> int:
-        """Who was awarded a whole ``task`` of mine long ago and is not heard acting on it; 0 for nobody."""
-        found = [one.unheard(now_us) for one in self.initiators if one.terms.task == task and not one.terms.depth]
+        """Who was awarded a ``task`` of mine long ago and is not heard acting on it; 0 for nobody."""
+        found = [one.unheard(now_us) for one in self.initiators if one.terms.task == task]
         return max(found, default=NOBODY)
 
     def standing_bid(self, key: CallKey) -> tuple[int, int] | None:
@@ -214,10 +214,12 @@ class Negotiation:
 
     def _judge(self, report: TaskReport, now_us: int) -> None:
         """What a winner says of its task is what it is worth in the next calls."""
-        is_winners = self.trust.winner(report.task) == report.sender
+        if self.trust.winner(report.task) != report.sender:
+            # Of who has not won it, or has lost it since, it is no word about its worth.
+            return
         if report.phase is TaskPhase.DONE:
             self.trust.done(report.task, report.sender, now_us)
-        elif report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED) and is_winners:
+        elif report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
             self.trust.forfeited(report.task, now_us)
 
     @property

@@ -12,7 +12,7 @@ from onboard.core.behaviour import Fleet
 from onboard.core.codes import NOBODY, OUTSIDE, TASK_VERSION_BITS, CallResult, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
-from onboard.core.obstacles import Obstacle
+from onboard.core.negotiation.winners import patience_us
 from onboard.core.petitions import UNORDERED
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
@@ -23,19 +23,11 @@ from onboard.kinds.car_park.bay_memory import BayMemory, winner_record
 MAX_CALLS = 64
 #: Cars that have left and are told still.
 MOST_GONE = 4
-#: A winner that is an obstacle for so long is lost, us: a restart takes some seconds, and its task is in its journal.
-#: Ours.
-LOST_AFTER_US = 8_000_000
 #: A winner that has said nothing for so long since its award does not know of it, or does not act on it, us: a little
 #: longer than its initiator says the award again at a quick pace. Ours.
 UNHEARD_AFTER_US = 6_000_000
 #: FORFEITED is said again this often until the task is awarded anew, us. Ours.
 SAY_AGAIN_US = 2_000_000
-
-
-def _patience_us(obstacle: Obstacle) -> int:
-    """How long a winner may be an obstacle: one that lives, and stands where it said that it goes, restarts nothing."""
-    return 0 if obstacle.reason is Reason.FALSE_STATEMENT else LOST_AFTER_US
 
 
 @dataclass
@@ -159,12 +151,12 @@ class Stewardship:
         times += [self._unheard_us[car] + UNHEARD_AFTER_US for car in waited]
         for car, winner in self.winners.items() if obstacles else ():
             if winner in obstacles and car in self.tasks and self._is_untouched(car):
-                times.append(obstacles[winner].since_us + _patience_us(obstacles[winner]))
+                times.append(obstacles[winner].since_us + patience_us(obstacles[winner]))
         return min(times, default=None)
 
     def _is_lost(self, winner: int, now_us: int) -> bool:
         obstacle = self.fleet.mirror.obstacles.machines.get(winner)
-        return obstacle is not None and now_us - obstacle.since_us >= _patience_us(obstacle)
+        return obstacle is not None and now_us - obstacle.since_us >= patience_us(obstacle)
 
     def _is_untouched(self, car: Reference) -> bool:
         """Whether I hold the car and its station, and nobody has a right to the front as its winner."""

@@ -21,7 +21,7 @@ from onboard.kinds.cell.contracts import Goal
 from onboard.kinds.cell.generation import call_terms
 from onboard.kinds.cell.geometry import Point
 from onboard.kinds.cell.goal_frames import Hearsay
-from onboard.kinds.cell.messages import OrderAnswer, OrderFrom, OrderResult, OrderTo, PartAt
+from onboard.kinds.cell.messages import ArmProgress, OrderAnswer, OrderFrom, OrderResult, OrderTo, PartAt
 from onboard.kinds.counter import Counter, CounterOrder, OrderState
 
 
@@ -69,6 +69,8 @@ class GoalManager(Counter[Order]):
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Offers, and main contractors' reports."""
         self.hearsay.hear(message)
+        if isinstance(message, ArmProgress):
+            self.fleet.winners.works(message.sender, (message.x_mm, message.y_mm, message.arm_phase), now_us)
         return super().hear(message, now_us)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
@@ -110,6 +112,11 @@ class GoalManager(Counter[Order]):
     def terms(self, order: Order) -> CallTerms:
         """A call to robots."""
         return call_terms(order.goal)
+
+    def may_take_back(self, order: Order) -> bool:
+        """While the part has never left my custody; one that has come back lies where it was wanted."""
+        key = car_token(*order.goal.part)
+        return self.fleet.tokens.holds(key) and key not in self.fleet.tokens.given
 
     def in_turn(self, waiting: Iterable[Order]) -> Iterable[Order]:
         """In the order of their deadlines (row C15)."""

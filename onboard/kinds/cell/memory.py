@@ -59,6 +59,11 @@ def stage_record(one: Undertaking) -> Record:
     return Record(entry | {"stage": one.stage.name, "next": one.successor if one.was_heard else 0})
 
 
+def lost_record(one: Undertaking) -> Record:
+    """It is another's now."""
+    return Record({"record": "contract_lost", "origin": one.task.origin, "number": one.task.number})
+
+
 def undertakings(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, Undertaking]:
     """Contracts in hand by task, from journal entries, oldest first; others are passed over."""
     found: dict[Reference, Undertaking] = {}
@@ -66,6 +71,8 @@ def undertakings(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, 
         if entry.get("record") == "contract":
             one = _undertaking(entry)
             found[one.task] = one
+        elif entry.get("record") == "contract_lost":
+            found.pop(Reference(int(entry["origin"]), int(entry["number"])), None)
         elif entry.get("record") == "stage":
             task = Reference(int(entry["origin"]), int(entry["number"]))
             if task in found:

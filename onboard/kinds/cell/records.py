@@ -9,5 +9,6 @@ _TASK = ("origin", "number")
 RECORDS: Rules = {
     **COUNTER_RECORDS,
     "contract": (Keep("contract", _TASK, Which.FIRST_AND_NEWEST),),
+    "contract_lost": (End(("contract", "stage"), _TASK),),
     "stage": (Keep("stage", _TASK), End(("contract", "stage"), _TASK, ("stage", (Stage.OVER.name,)), MOST_OVER)),
 }

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
@@ -21,7 +21,7 @@ from onboard.kinds.cell.contracts import Contract
 from onboard.kinds.cell.generation import ArmGeneration, call_terms
 from onboard.kinds.cell.geometry import Point
 from onboard.kinds.cell.goal_frames import contract_messages
-from onboard.kinds.cell.memory import Stage, Undertaking, stage_record, undertakings, won_record
+from onboard.kinds.cell.memory import Stage, Undertaking, lost_record, stage_record, undertakings, won_record
 from onboard.kinds.cell.messages import (
     ArmMode,
     ArmPhase,
@@ -80,6 +80,8 @@ class ArmRobot:
     _order_again_us: int | None = None
     _call_at_us: dict[Reference, int] = field(default_factory=dict)
     _ask_at_us: dict[Reference, int] = field(default_factory=dict)
+    #: Rests of goals whose calls an earlier life made: somebody may have won one.
+    _unsure: set[Reference] = field(default_factory=set)
     _progress_at_us: int | None = None
     _told: tuple[ArmPhase, ArmMode] | None = None
     _table: dict[ArmPhase, Callable[[Undertaking, int], list[Effect]]] = field(init=False, repr=False)
@@ -96,6 +98,7 @@ class ArmRobot:
                 self.in_hand[one.task] = one
                 if one.sub_goal is not None and not one.successor:
                     self._call_at_us[one.task] = 0
+                    self._unsure.add(one.task)
         self._engage()
         self._table = {
             ArmPhase.TO_PART: self._when_going_there,
@@ -120,6 +123,9 @@ class ArmRobot:
 
     def start(self, now_us: int) -> list[Effect]:
         """Nothing moves before the position is sensed."""
+        for one in self.in_hand.values():
+            if one.sub_goal is not None and one.successor:
+                self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
@@ -143,6 +149,10 @@ class ArmRobot:
                 return self._on_report(message, now_us)
             case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
                 return self._on_award(message)
+            case Award(result=CallResult.AWARDED | CallResult.REJECTED) if message.task in self.in_hand:
+                return self._yield(self.in_hand[message.task], message)
+            case ArmProgress():
+                self.fleet.winners.works(message.sender, (message.x_mm, message.y_mm, message.arm_phase), now_us)
             case CallForProposals() if message.task in self.in_hand or message.task in self.over:
                 return [self._report(message.task)]
         return []
@@ -225,22 +235,52 @@ class ArmRobot:
             return []
         return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
 
+    def _yield(self, one: Undertaking, award: Award) -> list[Effect]:
+        """Its manager gave to another, or to nobody, what I have not begun: whose part I have not got."""
+        is_mine = one.stage is not Stage.WON or self.fleet.tokens.holds(car_token(*one.contract.goal.part))
+        if is_mine or award.sender != one.manager:
+            return []
+        self.fleet.tokens.forget(car_token(*one.contract.goal.part))
+        effects: list[Effect] = [lost_record(one)]
+        if one.sub_goal is not None and one.successor:
+            effects += self.fleet.winners.remind(one.sub_goal.task, NOBODY)
+        self._drop(one)
+        return effects
+
+    def _drop(self, one: Undertaking) -> None:
+        del self.in_hand[one.task]
+        for times in (self._ask_at_us, self._call_at_us):
+            times.pop(one.task, None)
+        if one.sub_goal is not None:
+            self.fleet.winners.over(one.sub_goal.task)
+        self._engage()
+
     def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
         """A sub-contractor has the goal in hand, or has achieved it: then mine is achieved too (row C18)."""
         one = next((one for one in self.in_hand.values() if one.sub_goal and one.sub_goal.task == report.task), None)
         if one is None:
             return []
-        self._ask_at_us.pop(one.task, None)
+        assert one.sub_goal is not None
         effects: list[Effect] = []
-        if not one.successor and report.phase is not TaskPhase.FORFEITED:
+        if not one.successor and self._may_claim(one, report, now_us):
             # It has won a call that I do not remember.
             one.successor, one.was_heard = report.sender, True
+            self._unsure.discard(one.task)
+            self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
             effects.append(stage_record(one))
             self._call_at_us.pop(one.task, None)
             effects += self._withdraw_call(one, now_us)
+        if report.sender != one.successor:
+            is_claim = report.phase is TaskPhase.AWARDED
+            return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
+        self._ask_at_us.pop(one.task, None)
         if report.phase is TaskPhase.DONE and report.sender == one.successor and one.stage is Stage.PUT:
             return [*effects, *self._achieve(one)]
         return effects
+
+    def _may_claim(self, one: Undertaking, report: TaskReport, now_us: int) -> bool:
+        may_claim = one.task in self._unsure and report.phase is not TaskPhase.FORFEITED
+        return may_claim and self.fleet.winners.may_claim(report.task, report.sender, now_us)
 
     def _withdraw_call(self, one: Undertaking, now_us: int) -> list[Effect]:
         """Close the call for the rest of a goal, where one is open."""
@@ -256,6 +296,8 @@ class ArmRobot:
             return []
         if event.winner:
             one.successor, one.was_heard = event.winner, True
+            self._unsure.discard(one.task)
+            self.fleet.winners.takes(task, event.winner, now_us, event.call.call)
             return [stage_record(one)]
         if one.successor and event.result is not CallResult.REJECTED:
             return []
@@ -265,13 +307,10 @@ class ArmRobot:
 
     def _achieve(self, one: Undertaking) -> list[Effect]:
         one.stage = Stage.OVER
-        del self.in_hand[one.task]
         self.over[one.task] = one.manager
         if len(self.over) > MAX_OVER:
             del self.over[next(iter(self.over))]
-        for times in (self._ask_at_us, self._call_at_us):
-            times.pop(one.task, None)
-        self._engage()
+        self._drop(one)
         return [stage_record(one), self._report(one.task)]
 
     def _report(self, task: Reference) -> Send:
@@ -292,6 +331,7 @@ class ArmRobot:
                 del self._call_at_us[task]
                 effects += self.fleet.negotiation.open(call_terms(one.sub_goal), now_us)
         for task, one in list(self.in_hand.items()):
+            effects += self._take_back(one, now_us)
             if one.stage is Stage.PUT and one.sub_goal is None:
                 # The controller stopped between putting the part down and saying so.
                 effects += self._achieve(one)
@@ -302,6 +342,18 @@ class ArmRobot:
                 self._ask_at_us[task] = now_us + ASK_AGAIN_US
                 effects.append(Send(SyncRequest(self.fleet.node_id, one.successor)))
         return effects
+
+    def _take_back(self, one: Undertaking, now_us: int) -> list[Effect]:
+        """A sub-contractor that is lost while its part is in my custody: the rest is called for anew, without it."""
+        if one.sub_goal is None or not one.successor or not self.fleet.tokens.holds(car_token(*one.sub_goal.part)):
+            return []
+        reason = self.fleet.winners.lost(one.sub_goal.task, now_us)
+        # Before the part lies where it is to be taken it has nothing to do but to wait.
+        if reason is Reason.NONE or (reason is Reason.FALSE_STATEMENT and one.stage is not Stage.PUT):
+            return []
+        one.successor, one.was_heard = 0, False
+        self._call_at_us[one.task] = now_us
+        return [*self.fleet.winners.take_back(one.sub_goal.task, reason, now_us), stage_record(one)]
 
     # --- custody -----------------------------------------------------------------------------------------------
 
@@ -391,6 +443,8 @@ class ArmRobot:
     def _put(self, one: Undertaking, now_us: int) -> list[Effect]:
         one.stage = Stage.PUT
         self.active = None
+        if one.sub_goal is not None and one.successor and one.was_heard:
+            self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
         self._engage()
         effects: list[Effect] = [*self._grip_over(), stage_record(one), self._part_at(one)]
         if one.sub_goal is None:

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from onboard.core.effects import Record
 from onboard.core.messages import Reference
 
+#: From here to there: an errand that was called for and not begun.
+TRANSPORT_STOPS = 2
+
 
 @dataclass(frozen=True, slots=True)
 class Errand:
@@ -23,6 +26,11 @@ def errand_record(errand: Errand) -> Record:
     return Record(entry | {"stops": " ".join(str(stop) for stop in errand.stops)})
 
 
+def lost_record(task: Reference) -> Record:
+    """It is another's now."""
+    return Record({"record": "errand_lost", "origin": task.origin, "number": task.number})
+
+
 def errands(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, Errand]:
     """All tasks of the journal by name, in the order in which they were taken on; others are passed over."""
     found: dict[Reference, Errand] = {}
@@ -31,4 +39,6 @@ def errands(entries: Iterable[Mapping[str, str | int]]) -> dict[Reference, Erran
             task = Reference(int(entry["origin"]), int(entry["number"]))
             stops = tuple(int(stop) for stop in str(entry["stops"]).split())
             found[task] = Errand(task, stops, "cancelled" in entry)
+        elif entry.get("record") == "errand_lost":
+            found.pop(Reference(int(entry["origin"]), int(entry["number"])), None)
     return found

@@ -95,8 +95,7 @@ class RobotPlanning:
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """Whoever stands in the first node already and finds every edge free."""
-        length_mm = self.site.graph.distance_mm(NOWHERE, call.from_station, call.to_station) or 0
-        return self._finish_ms(call, now_us, length_mm, 2)
+        return least_finish_ms(self.site, call, now_us)
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """All that is to be done before, then this, by shortest ways; None where it cannot be done."""
@@ -127,12 +126,19 @@ class RobotPlanning:
             for ends in pairwise(way):
                 length_mm += graph.length_mm(*ends) + extra_mm.get(ends, 0)
             here, behind = stop, NOWHERE
-        return self._finish_ms(call, now_us, length_mm, len(stops))
+        return _finish_ms(self.site, call, now_us, length_mm, len(stops))
 
-    def _finish_ms(self, call: CallForProposals, now_us: int, length_mm: int, stops: int) -> int:
-        """Bus ms at which so long a way and so many loadings are over, begun when the call is decided."""
-        begin_us = from_bus_ms(call.deadline_ms, now_us)
-        return to_bus_ms(begin_us + length_mm * 1_000_000 // self.site.speed_mm_s + stops * self.site.load_ms * 1000)
+
+def least_finish_ms(site: FactoryGraph, call: CallForProposals, now_us: int) -> int:
+    """Bus ms before which nobody can have done a transport: from the first node at once, and every edge free."""
+    length_mm = site.graph.distance_mm(NOWHERE, call.from_station, call.to_station) or 0
+    return _finish_ms(site, call, now_us, length_mm, 2)
+
+
+def _finish_ms(site: FactoryGraph, call: CallForProposals, now_us: int, length_mm: int, stops: int) -> int:
+    """Bus ms at which so long a way and so many loadings are over, begun when the call is decided."""
+    begin_us = from_bus_ms(call.deadline_ms, now_us)
+    return to_bus_ms(begin_us + length_mm * 1_000_000 // site.speed_mm_s + stops * site.load_ms * 1000)
 
 
 def call_terms(task: Reference, start: int, end: int) -> CallTerms:

@@ -13,6 +13,7 @@ RECORDS: Rules = {
         Keep("errand", _TASK, Which.FIRST_AND_NEWEST),
         End(("errand",), _TASK, ("stops", ("",)), MOST_OVER),
     ),
+    "errand_lost": (End(("errand",), _TASK),),
     "visit": (
         Keep("visit", _TASK, Which.FIRST_AND_NEWEST),
         End(("visit",), _TASK, ("stage", (Stage.DONE.name, Stage.REFUSED.name)), MOST_OVER),

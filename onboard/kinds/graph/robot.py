@@ -17,7 +17,7 @@ from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
-from onboard.kinds.graph.errands import Errand, errand_record, errands
+from onboard.kinds.graph.errands import TRANSPORT_STOPS, Errand, errand_record, errands, lost_record
 from onboard.kinds.graph.messages import (
     NO_NODE,
     ApproachSensor,
@@ -182,6 +182,8 @@ class GraphRobot:
                 return self._take_on(task, stops) if stops else self._take_back(task)
             case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
                 return self._on_award(message)
+            case Award(result=CallResult.AWARDED | CallResult.REJECTED) if message.task in self.planning.errands:
+                return self._yield(self.planning.errands[message.task], message)
             case ManualOrder() if message.machine == self.fleet.node_id:
                 effects = self.manual.ordered(message)
                 self.planning.is_held = not self.manual.is_automatic
@@ -243,6 +245,15 @@ class GraphRobot:
         errand = Errand(task, stops)
         self.planning.errands[task] = errand
         return [errand_record(errand), self._report(task)]
+
+    def _yield(self, errand: Errand, award: Award) -> list[Effect]:
+        """A desk gave to another, or to nobody, what I have not begun."""
+        machine = self.site.machines.get(award.sender)
+        is_desks = machine is not None and machine.kind is KindCode.DESK
+        if not is_desks or len(errand.stops) != TRANSPORT_STOPS or self._loaded_at_us is not None:
+            return []
+        del self.planning.errands[errand.task]
+        return [lost_record(errand.task)]
 
     def _take_back(self, task: Reference) -> list[Effect]:
         """Who gave an order by name wants it no more: it ends its edge, and does nothing more for it."""

@@ -5,6 +5,7 @@ whoever plans to carry it.
 """
 
 from dataclasses import dataclass, field
+from functools import partial
 
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet, NoEstimator
@@ -44,10 +45,12 @@ from onboard.kinds.terminal.messages import (
     MissionAnswer,
     MissionKey,
     PlanHead,
+    StepReport,
     TaskTerms,
 )
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.missions import Orders, Transport
+from onboard.kinds.terminal.routes import least_end_ms
 from onboard.kinds.terminal.site import EntityKind, Terminal
 from onboard.kinds.terminal.vehicle import terminal
 
@@ -138,6 +141,8 @@ class Desk:
         self._won_at_us = dict.fromkeys(self.orders.won, now_us)
         self._look_at_us = now_us + LOOK_US
         self.mirror.remember(read_boxes(self.fleet.node_id, self.fleet.node_id, self.fleet.entries))
+        for task, winner in self.orders.won.items():
+            self.fleet.winners.takes(task, winner, now_us)
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
@@ -165,6 +170,8 @@ class Desk:
                 return self.mirror.ask(message)
             case PlanHead():
                 self._is_new = True
+            case StepReport():
+                self.fleet.winners.works(message.sender, (message.version, message.step), now_us)
             case CarAt() | TokenGrant():
                 self._is_moved = True
             case ManualState():
@@ -180,7 +187,7 @@ class Desk:
         task = event.call.task
         self.calls.pop(task, None)
         if event.result is CallResult.AWARDED:
-            return self.won(task, event.winner, now_us)
+            return self.won(task, event.winner, now_us, event.call.call)
         self.orders.give_back(task)
         self._look_at_us = now_us + (LOOK_US if event.result is CallResult.REFUSED else 1)
         return [Record(self.orders.record())]
@@ -205,7 +212,7 @@ class Desk:
             effects += [Send(order) for order in self._manual.values()]
         if self._is_new or (self._look_at_us is not None and self._look_at_us <= now_us):
             self._is_new = False
-            self._look_at_us = now_us + LOOK_US if self.orders.missions or self.orders.won else None
+            self._look_at_us = now_us + LOOK_US if self.orders.missions or self.orders.open else None
             effects += self._look_after(now_us) + self.call_next(now_us) + self._tell_buried()
         return effects
 
@@ -321,7 +328,7 @@ class Desk:
                 break
             taken.add(transport.box)
             effects += [Record(self.orders.record()), *self.call(transport, now_us)]
-        if self.orders.missions or self.orders.won:
+        if self.orders.missions or self.orders.open:
             self._look_at_us = self._look_at_us or now_us + LOOK_US
         return effects
 
@@ -339,15 +346,17 @@ class Desk:
             car=self.site.box(transport.box),
             wheelbase_mm=0,
             detail=(date,),
+            floor=partial(least_end_ms, self.site),
         )
         self.calls[transport.task] = terms
         return list(self.fleet.negotiation.open(terms, now_us))
 
-    def won(self, task: Reference, winner: int, now_us: int) -> list[Effect]:
-        """A robot has the task."""
+    def won(self, task: Reference, winner: int, now_us: int, call: int = 0) -> list[Effect]:
+        """A robot has the task, by ``call`` where it is known."""
         if task not in self.orders.open:
             return []
         self.orders.won[task] = winner
+        self.fleet.winners.takes(task, winner, now_us, call)
         self._won_at_us[task] = now_us
         self._look_at_us = now_us + 1
         return [Record(self.orders.record())]
@@ -358,11 +367,18 @@ class Desk:
         if report.sender not in self.site.vehicles:
             self.fleet.drops[Reason.NOT_OF_KIND] += 1
             return []
+        if self.orders.won.get(report.task) != report.sender:
+            # Who has lost a task, or never won it, says nothing that counts: where its box stands tells whether it is
+            # done.
+            is_claim = report.phase is TaskPhase.AWARDED and report.task not in self.calls
+            return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
         if report.phase is TaskPhase.DONE and self.orders.finish(report.task):
+            self.fleet.winners.over(report.task)
             self._won_at_us.pop(report.task, None)
             self._look_at_us = now_us
             return [Record(self.orders.record()), Report(f"task {report.task.number} is done")]
-        if report.phase is TaskPhase.FORFEITED and self.orders.won.get(report.task) == report.sender:
+        if report.phase is TaskPhase.FORFEITED:
+            self.fleet.winners.over(report.task)
             self.orders.give_back(report.task)
             self._look_at_us = now_us + LOOK_US
             return [Record(self.orders.record())]
@@ -370,9 +386,22 @@ class Desk:
             self._won_at_us[report.task] = now_us
         return []
 
+    def _take_back(self, task: Reference, transport: Transport, now_us: int) -> list[Effect]:
+        """A task whose winner is lost goes to another, while its box is in my books and in nobody's plan."""
+        reason = self.fleet.winners.lost(task, now_us)
+        is_mine = self.fleet.tokens.holds(car_token(*self.site.box(transport.box)))
+        if reason is Reason.NONE or not is_mine or self.mirror.in_plans(transport.box) is not None:
+            return []
+        self._won_at_us.pop(task, None)
+        self.calls.pop(task, None)
+        self.orders.give_back(task)
+        return [*self.fleet.winners.take_back(task, reason, now_us), Record(self.orders.record())]
+
     def _look_after(self, now_us: int) -> list[Effect]:
         """A won task whose box is at its target is done, though nobody was heard saying so; one in no plan is lost."""
         effects: list[Effect] = []
+        for task, one in list(self.orders.open.items()):
+            effects += self._take_back(task, one, now_us)
         for task, winner in list(self.orders.won.items()):
             transport = self.orders.open.get(task)
             if transport is None:
@@ -380,12 +409,14 @@ class Desk:
                 continue
             if self.mirror.station_of(transport.box) == transport.target:
                 self.orders.finish(task)
+                self.fleet.winners.over(task)
                 effects.append(Record(self.orders.record()))
             elif self.mirror.in_plans(transport.box) is not None:
                 self._won_at_us[task] = now_us
             elif now_us - self._won_at_us.get(task, now_us) >= LOST_US and self.mirror.station_of(transport.box):
                 self._won_at_us.pop(task, None)
                 self.orders.give_back(task)
+                effects += self.fleet.winners.take_back(task, Reason.FALSE_STATEMENT, now_us)
                 effects += [Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
         return effects
 

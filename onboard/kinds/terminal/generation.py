@@ -5,11 +5,11 @@ from dataclasses import dataclass, field, replace
 from onboard.core.codes import Operation
 from onboard.core.messages import CallForProposals
 from onboard.core.negotiation import CallKey, Proposal
-from onboard.core.serial import from_bus_ms, to_bus_ms
+from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine
 from onboard.kinds.terminal.mirror import TerminalMirror
 from onboard.kinds.terminal.plan import Load, Plan
-from onboard.kinds.terminal.routes import free_flow_us
+from onboard.kinds.terminal.routes import carry_us, free_flow_us, least_end_ms
 from onboard.kinds.terminal.search import Found, Job, Search, remaining
 from onboard.kinds.terminal.site import EntityKind, Terminal
 from onboard.kinds.terminal.traffic import Traffic, copy_of
@@ -30,17 +30,12 @@ class VehicleGeneration:
     #: Whether a person has a hand in the vehicle: it bids for nothing then (row M38).
     is_held: bool = False
     searches: int = 0
-    _handling_us: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._handling_us = self.site.dock_us + self.site.handle_us + self.site.undock_us
 
     # --- the Estimator -----------------------------------------------------------------------------------------
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
-        """Picked up at the call's deadline and carried straight to the station."""
-        way_us = self._carry_us(call)
-        return to_bus_ms(from_bus_ms(call.deadline_ms, now_us) + (way_us or 0))
+        """Picked up when it is called for, as plans begin before a call is decided, and carried straight."""
+        return least_end_ms(self.site, call, now_us)
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """Alone on all ways; None for a machine whose plan ends after T + delta T (M24), and for what nobody can do."""
@@ -51,8 +46,8 @@ class VehicleGeneration:
         if any(one is None or one.kind is not EntityKind.STATION for one in known):
             return None
         here, free_us = self.start(now_us)
-        way_us, carry_us = free_flow_us(self.site, here, call.from_station), self._carry_us(call)
-        return None if way_us is None or carry_us is None else to_bus_ms(free_us + way_us + carry_us)
+        way_us, loaded_us = free_flow_us(self.site, here, call.from_station), carry_us(self.site, call)
+        return None if way_us is None or loaded_us is None else to_bus_ms(free_us + way_us + loaded_us)
 
     def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
         """The end of the best plan; none while a bid for another call stands best: what that brings goes first."""
@@ -121,13 +116,6 @@ class VehicleGeneration:
             began = kept.end
             here = self.site.entities[found.plan.steps[-1].entity].area
         return kept
-
-    def _carry_us(self, call: CallForProposals) -> int | None:
-        source = self.site.entities.get(call.from_station)
-        if source is None or not source.area or call.to_station not in self.site.entities:
-            return None
-        way_us = free_flow_us(self.site, source.area, call.to_station)
-        return None if way_us is None else way_us + 2 * self._handling_us
 
 
 def _handled(left: Plan) -> tuple[Plan, tuple[Load, ...]]:

@@ -2,6 +2,9 @@
 
 import heapq
 
+from onboard.core.messages import CallForProposals
+from onboard.core.negotiation import RestartPolicy
+from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.kinds.terminal.site import EntityKind, Terminal
 
 
@@ -46,3 +49,18 @@ def free_flow_us(site: Terminal, origin: int, goal: int) -> int | None:
         site.entities[here].crossing_us(way[number - 1] if number else 0, way[number + 1])
         for number, here in enumerate(way[:-1])
     )
+
+
+def least_end_ms(site: Terminal, call: CallForProposals, now_us: int) -> int:
+    """Bus ms before which nobody can have done a transport: picked up when it is called for and carried straight."""
+    opened_us = from_bus_ms(call.deadline_ms, now_us) - RestartPolicy().window_us(call.attempt, site.timing)
+    return to_bus_ms(opened_us + (carry_us(site, call) or 0))
+
+
+def carry_us(site: Terminal, call: CallForProposals) -> int | None:
+    """The least from docking at a box's station to having put it down at its target; None where no way leads."""
+    source = site.entities.get(call.from_station)
+    if source is None or not source.area or call.to_station not in site.entities:
+        return None
+    way_us = free_flow_us(site, source.area, call.to_station)
+    return None if way_us is None else way_us + 2 * (site.dock_us + site.handle_us + site.undock_us)

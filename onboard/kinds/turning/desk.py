@@ -1,7 +1,7 @@
 """The order desk of a turning cell: calls for each order, tells the winner's price, and hears of completion."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from onboard.core.authority import TokenKey
@@ -11,11 +11,19 @@ from onboard.core.effects import Effect, Record
 from onboard.core.messages import Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
+from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.site import Machine, Site
 from onboard.kinds.counter import Counter, CounterOrder, OrderState
-from onboard.kinds.turning.generation import call_terms
+from onboard.kinds.turning.generation import call_terms, least_cents, longest_us, turning
 from onboard.kinds.turning.lathe import Job
-from onboard.kinds.turning.messages import BillBar, JobAnswer, JobEntry, JobResult
+from onboard.kinds.turning.messages import (
+    BillBar,
+    JobAnswer,
+    JobEntry,
+    JobResult,
+    LathePhase,
+    LatheProgress,
+)
 
 
 @dataclass
@@ -48,6 +56,8 @@ class OrderDesk(Counter[Order]):
     max_calls: ClassVar[int] = 2
 
     _prices: dict[tuple[int, Reference], int] = field(default_factory=dict)
+    #: Orders of which their winner has told that it has begun.
+    _begun: set[Reference] = field(default_factory=set)
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Orders at the counter; one that was heard before is only answered."""
@@ -67,7 +77,15 @@ class OrderDesk(Counter[Order]):
         """Prices, and lathes' reports."""
         if isinstance(message, BillBar) and message.manager == self.fleet.node_id:
             self._prices[message.sender, Reference(message.manager, message.task)] = message.total_ct
+        elif isinstance(message, LatheProgress):
+            self._on_progress(message, now_us)
         return super().hear(message, now_us)
+
+    def _on_progress(self, word: LatheProgress, now_us: int) -> None:
+        self.fleet.winners.works(word.sender, (word.manager, word.task, word.made, word.lathe_phase), now_us)
+        task = Reference(word.manager, word.task)
+        if word.lathe_phase is not LathePhase.QUEUED and self.fleet.winners.has(task, word.sender):
+            self._begun.add(task)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """A desk holds no tokens."""
@@ -80,14 +98,27 @@ class OrderDesk(Counter[Order]):
     # --- the Counter -------------------------------------------------------------------------------------------
 
     def terms(self, order: Order) -> CallTerms:
-        """A call to lathes."""
-        return call_terms(order.task, order.job)
+        """A call to lathes; no lathe can make a part for less than its bar and its handling."""
+        least_ct = least_cents(turning(self.fleet.site), order.job)
+        return replace(call_terms(order.task, order.job), floor=lambda _call, _now_us: least_ct)
+
+    def may_take_back(self, order: Order) -> bool:
+        """Not one that is begun: its parts are in the machine, and a second lathe would make them twice."""
+        return order.task not in self._begun
+
+    def stands_us(self, order: Order) -> int:
+        """As long as the slowest lathe takes for one part, setting up included, tells no change."""
+        return STANDS_AFTER_US + longest_us(turning(self.fleet.site), order.job)
 
     def on_report(self, order: Order, report: TaskReport, now_us: int) -> list[Effect]:
         """A lathe has an order, has made it, or gives it back."""
         if report.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
             gives_back = order.state is OrderState.IN_HAND and report.sender == order.winner
-            return self.put(order, OrderState.HEARD, now_us) if gives_back else []
+            if not gives_back:
+                return []
+            self.fleet.winners.over(order.task)
+            self._begun.discard(order.task)
+            return self.put(order, OrderState.HEARD, now_us)
         effects = self.won_unheard(order, report.sender, now_us) if order.state is not OrderState.IN_HAND else []
         if report.phase is TaskPhase.DONE and report.sender == order.winner:
             effects += self.put(order, OrderState.DONE, now_us)

@@ -9,11 +9,12 @@ from itertools import chain
 from onboard.core.codes import ANY_STATION, Criterion, KindCode, Operation
 from onboard.core.messages import CallForProposals, Message, Reference
 from onboard.core.negotiation import CallKey, CallTerms, Proposal
-from onboard.core.site import Machine
+from onboard.core.site import Machine, Site
+from onboard.kinds.turning.clamping import choose_clamping
 from onboard.kinds.turning.cost import Bill
 from onboard.kinds.turning.lathe import Job, Lathe, LatheState
 from onboard.kinds.turning.messages import BillBar, BillCutting, BillWaiting, TurningOrder
-from onboard.kinds.turning.process import Process, generate
+from onboard.kinds.turning.process import Process, bar_eur, generate
 from onboard.kinds.turning.site import Turning
 
 #: Most orders of others remembered; the oldest go first. An order is called for right after it is told.
@@ -53,8 +54,9 @@ class LatheGeneration:
             self._told[task] = job_of(message)
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
-        """Nothing is known to be dearer than nothing: prices are each lathe's own."""
-        return 0
+        """What the bar and its handling cost on the cheapest lathe; 0 where the order's frame was lost."""
+        job = self._told.get(call.task)
+        return 0 if job is None else least_cents(self.site, job)
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
         """The cost itself: working it out looks at nobody else."""
@@ -96,6 +98,41 @@ class LatheGeneration:
             if process is not None:
                 state = after(job, process, state)
         return state
+
+
+def turning(site: Site) -> Turning:
+    """The site as what it is. Raises ``TypeError`` for another system's."""
+    if not isinstance(site, Turning):
+        raise TypeError(f"site {site.name} is no turning cell")
+    return site
+
+
+def least_cents(site: Turning, job: Job) -> int:
+    """What no lathe can be below for one part, in cents: bar, loading and unloading; all else depends on its state."""
+    drawing, material = site.drawings.get(job.drawing), site.materials.get(job.material)
+    if drawing is None or material is None:
+        return 0
+    least = []
+    for lathe in site.lathes.values():
+        clamping = choose_clamping(job, drawing, lathe)
+        if clamping is not None:
+            handling_eur = lathe.hourly_eur * (lathe.load_min + lathe.unload_min) / 60
+            least.append(int(100 * (bar_eur(job, clamping, material) + handling_eur)))
+    return min(least, default=0)
+
+
+def longest_us(site: Turning, job: Job) -> int:
+    """The longest that any lathe takes between two words of its progress, us: for one part, and setting up for it."""
+    drawing, material = site.drawings.get(job.drawing), site.materials.get(job.material)
+    longest_min = 0.0
+    for lathe in site.lathes.values() if drawing is not None and material is not None else ():
+        assert drawing is not None and material is not None
+        process = generate(job, drawing, material, lathe, LatheState())
+        if process is not None:
+            edges_min = lathe.edge_change_min * len(process.tools)
+            own_min = lathe.setup_min + lathe.load_min + lathe.unload_min + edges_min
+            longest_min = max(longest_min, process.machining_min + own_min)
+    return round(60_000_000 * longest_min)
 
 
 def after(job: Job, process: Process, state: LatheState) -> LatheState:

@@ -126,6 +126,8 @@ class LatheMachine:
         match message:
             case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
                 return self._on_award(message)
+            case Award(result=CallResult.AWARDED | CallResult.REJECTED) if message.task in self.in_hand:
+                return self._yield(self.in_hand[message.task], message)
             case CallForProposals() if message.task in self.generation.known:
                 return [self._report(message.task)]
         return []
@@ -183,6 +185,14 @@ class LatheMachine:
         if self.fleet.negotiation.knows(award.sender, award.call):
             return []
         return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
+
+    def _yield(self, one: Undertaking, award: Award) -> list[Effect]:
+        """Its desk gave to another, or to nobody, what I have not begun."""
+        if one.stage is not Stage.WON or award.sender != one.task.origin:
+            return []
+        del self.in_hand[one.task]
+        self._engage()
+        return [Record(_named("job_lost", one))]
 
     def _forfeit(self, one: Undertaking) -> list[Effect]:
         """A journal from before the site file lost a drawing, say: nobody can make what is not drawn."""
@@ -281,13 +291,15 @@ class LatheMachine:
         return Send(LatheProgress(self.fleet.node_id, *one.task, made, one.job.batch, phase))
 
     def _replay(self, entry: Mapping[str, str | int]) -> None:
-        if entry.get("record") not in ("job", "job_stage", "job_over"):
+        if entry.get("record") not in ("job", "job_stage", "job_over", "job_lost"):
             return
         task = Reference(int(entry["origin"]), int(entry["number"]))
         if entry["record"] == "job":
             bar_mm, face_mm = int(entry["bar_mm"]), int(entry["face_um"]) / 1000
             job = Job(int(entry["drawing"]), int(entry["material"]), bar_mm, int(entry["batch"]), face_mm)
             self.in_hand[task] = Undertaking(task, job)
+        elif entry["record"] == "job_lost":
+            self.in_hand.pop(task, None)
         elif entry["record"] == "job_over":
             self.in_hand.pop(task, None)
             self.over.add(task)

@@ -9,6 +9,7 @@ RECORDS: Rules = {
     **COUNTER_RECORDS,
     "job": (Keep("job", _TASK),),
     "job_stage": (Keep("job_stage", _TASK),),
+    "job_lost": (End(("job", "job_stage"), _TASK),),
     # That a job is over is kept as long as MOST_OVER others; the job itself is not.
     "job_over": (
         End(("job", "job_stage"), _TASK),
