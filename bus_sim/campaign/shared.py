@@ -199,6 +199,8 @@ class Copies:
             there.close()
             self._running[here] = (process, crash)
             return False
+        # A person's interrupt goes to all of them: the process of the scene ends its copies.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
         for other in (self._to, here, *self._running):
             other.close()

@@ -16,7 +16,6 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main as bus_sim
-from hil.guest.quick import QUICK
 from onboard.config.site import parse_site
 from onboard.core.messages import Award, CallForProposals, Heartbeat, Message, TaskReport
 from onboard.trace.candump_reader import CandumpReader
@@ -28,13 +27,24 @@ Capture = pytest.CaptureFixture[str]
 
 DEADLINE_S = 300
 #: Machines so fast that a car is parked in less than a minute.
-SITE = (
-    """
+SITE = """
 [site]
 name = "fast"
 [floors]
 count = 3
 positions = 4
+[carrier]
+speed_mm_s = 3_000
+acceleration_mm_s2 = 3_000
+[shuttle]
+speed_mm_s = 5_000
+acceleration_mm_s2 = 5_000
+[lift]
+speed_mm_s = 3_000
+acceleration_mm_s2 = 3_000
+[timing]
+door_ms = 500
+grip_ms = 300
 [[compartments]]
 name = "IOC1"
 node = 1
@@ -52,8 +62,6 @@ name = "MR2"
 node = 12
 home = "p(3,2)"
 """
-    + QUICK
-)
 CAR = ["--one-car", "1", "--seed", "3", "--for", "60"]
 CHANGES = ["--join", "MR2=4", "--kill", "MR1=3", "--join", "MR1=6", "--leave", "MR2=12"]
 
