@@ -135,12 +135,12 @@ ADVICE: dict[Reason, Advice] = {
         "clear its journal only where it was declared absent: see replacing, above",
     ),
     Reason.JOURNAL_SHORT: Advice(
-        "a journal lacks what others know of it: an old copy, or its end is lost; the machine holds",
+        "a journal lacks what others know of it: an old copy, or its end is lost; the machine lives and holds",
         "`onboard operate regenerate`: see replacing, above",
     ),
     Reason.JOURNAL_FOREIGN: Advice(
-        "the journal is that of another machine or site",
-        "put this machine's own journal there; else see replacing, above",
+        "the journal is that of another machine or site; the machine lives and holds, and writes nothing",
+        "put the right board or its own journal in; else move that file away and see replacing, above",
     ),
     Reason.NO_FRESH_PROOF: Advice(
         "what a movement depends on was not confirmed just now: a sill, a bay, a platform", _NOTHING

@@ -4,13 +4,34 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onboard.core.codes import Reason
+from onboard.core.codes import Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.holding import RIGHTS_LOST, Hold, Holding, Outcome
-from onboard.core.messages import EmergencyStop, Heartbeat, Message
+from onboard.core.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    CarAt,
+    EmergencyStop,
+    Heartbeat,
+    Itinerary,
+    LeftOut,
+    Message,
+    TaskReport,
+    TokenGrant,
+    TokenHeld,
+    TokenRequest,
+)
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
-from onboard.core.recovery_messages import Go, Halted
+from onboard.core.recovery_messages import Go, Halted, TokenDispute, TokenGiven
+
+#: Words that make a contract, claim or move a right, or vouch for a car: not those of a machine whose journal is not
+#: to be relied on. That they are missing is for all others as if they were lost on the bus, which they bear.
+_OF_RIGHTS = (
+    *(CallForProposals, LeftOut, Bid, Award, Itinerary, CarAt),
+    *(TokenRequest, TokenGrant, TokenHeld, TokenGiven, TokenDispute),
+)
 
 
 @dataclass
@@ -73,3 +94,14 @@ class Holds:
         self.presence.listen_anew(now_us)
         records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": boot})]
         return [*records, Report("comes back: nobody sends under its number any more"), *self.words(), *ask]
+
+
+def without_rights(effects: list[Effect]) -> list[Effect]:
+    """What is left of them where nobody knows this machine's rights: it still tells how it is, and gives tasks back."""
+    return [effect for effect in effects if not (isinstance(effect, Send) and _is_of_rights(effect.message))]
+
+
+def _is_of_rights(message: Message) -> bool:
+    if isinstance(message, TaskReport):
+        return message.phase is not TaskPhase.FORFEITED
+    return isinstance(message, _OF_RIGHTS)

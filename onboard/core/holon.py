@@ -18,7 +18,7 @@ from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
 from onboard.core.holding import RIGHTS_LOST, Hold, Holding
-from onboard.core.holds import Holds
+from onboard.core.holds import Holds, without_rights
 from onboard.core.journal_state import INTACT, JournalCondition, reason_of, still_counting
 from onboard.core.messages import (
     Award,
@@ -446,7 +446,8 @@ class Holon:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
         self.holds.own.note(effects)
-        return effects
+        is_mute = self.fleet.has_no_rights and not self.regeneration.is_frozen
+        return without_rights(effects) if is_mute else effects
 
     def _doubts(self) -> list[Effect]:
         """Somebody knows that the journal is old: nothing of it is used any more."""

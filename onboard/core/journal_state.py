@@ -56,7 +56,7 @@ class JournalCondition:
             return ""
         if self.is_foreign:
             return f"{self.why}; it holds: put the right board or its own journal in, or move that file away"
-        return f"{self.why}; it holds and begins another beside it: onboard operate regenerate"
+        return f"{self.why}; it holds and begins another beside it: onboard operate status tells what to do"
 
 
 #: Nothing to tell.

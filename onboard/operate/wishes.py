@@ -7,7 +7,6 @@ from functools import partial
 from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason
 from onboard.core.holding import RIGHTS_LOST
 from onboard.core.site import Machine, Site
-from onboard.kinds.car_park.site import CarPark
 from onboard.operate.assignment import Body
 from onboard.operate.blocks import Mark
 from onboard.operate.holds import Hold
@@ -17,7 +16,7 @@ from onboard.operate.park import Park
 from onboard.operate.regenerate import Lost, Regenerate
 from onboard.operate.status import Status
 from onboard.operate.stops import GoAgain, LetGo, Stop
-from onboard.operate.words import remedy
+from onboard.operate.words import START_ANEW, has_regeneration, remedy
 
 #: Heartbeat periods for which the bus is listened to before anything is said: everybody is heard, and once lost.
 LISTEN_BEATS = 2
@@ -72,8 +71,10 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
 def _lost_of(site: Site, wish: Wish) -> Lost:
     """Who lost its rights, who is locked off, and where their bodies are. Raises ``OperateError``."""
     lost = machine_of(site, wish.machine)
-    if not isinstance(site, CarPark):
-        raise OperateError(f"{wish.machine}: {site.name} is a {site.system}; only a car park's rights can be made anew")
+    if not has_regeneration(site):
+        raise OperateError(
+            f"{wish.machine}: {site.name} is a {site.system}; only a car park's rights can be made anew; {START_ANEW}"
+        )
     if wish.absent == wish.machine:
         return Lost(lost.node_id, lost.node_id, blocked=_body_of(site, lost, wish.body, "--body"))
     body = _body_of(site, lost, wish.body, "--body")
@@ -94,7 +95,9 @@ def _regenerate(park: Park, node: int, *, site: Site, who: Lost) -> Order:
         # The latest word about it, however old: the time is not asked for here.
         word, machine = known.halted, known.machine
         if word is not None and word.reason is Reason.JOURNAL_FOREIGN and machine.node_id != who.absent:
-            raise OperateError(f"{machine.name}: its journal is another machine's: {remedy(word.reason, machine.name)}")
+            raise OperateError(
+                f"{machine.name}: its journal is another machine's: {remedy(site, word.reason, machine.name)}"
+            )
         at = park.where(machine.node_id)
         if machine.kind in MOBILE_KINDS and machine.node_id not in (who.lost, who.absent) and at in map(str, seen):
             raise OperateError(f"--body {at}: {machine.name} is there by its own word; look again")
@@ -117,7 +120,8 @@ def _release(park: Park, node: int, *, site: Site, machine: Machine, seed: int) 
     # The latest word about it, however old: the time is not asked for here.
     word = park.machines[machine.node_id].halted
     if word is not None and word.reason in RIGHTS_LOST:
-        raise OperateError(f"{machine.name}: its journal does not know its rights; onboard operate regenerate")
+        then = remedy(site, word.reason, machine.name)
+        raise OperateError(f"{machine.name}: its journal does not know its rights; {then}")
     if word is not None and word.reason is Reason.EMERGENCY_STOP:
         raise OperateError(f"{machine.name}: holds by an emergency stop; onboard operate go")
     if word is not None and word.sender == machine.node_id:

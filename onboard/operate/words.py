@@ -1,7 +1,10 @@
 """States and reasons in words for a person, with what to do where something is to be done."""
 
 from onboard.core.codes import MachineState, Reason
+from onboard.core.holding import RIGHTS_LOST
 from onboard.core.recovery_messages import Halted
+from onboard.core.site import Site
+from onboard.kinds.car_park.site import CarPark
 from onboard.operate.park import Park
 
 #: What a person does about a machine that stands for this reason (docs/operate.md).
@@ -31,9 +34,23 @@ def reason_words(reason: Reason) -> str:
     return reason.name.lower().replace("_", " ")
 
 
-def remedy(reason: Reason, name: str) -> str:
+#: Where rights cannot be made anew one by one: all machines begin as on the first day.
+START_ANEW = (
+    "bring all machines to where the site file has them, put all their journals away together, start them, and give "
+    "open orders again"
+)
+
+
+def remedy(site: Site, reason: Reason, name: str) -> str:
     """What a person does about machine ``name`` that stands for this reason."""
+    if reason in RIGHTS_LOST and not has_regeneration(site):
+        return f"its own journal, as it was last, in; else {START_ANEW}"
     return REMEDIES.get(reason, "go and see").format(name=name)
+
+
+def has_regeneration(site: Site) -> bool:
+    """Whether rights can be made anew: only of a car park is it known whose each right is, and what stands where."""
+    return isinstance(site, CarPark)
 
 
 def halted_words(park: Park, word: Halted) -> str:
@@ -43,7 +60,7 @@ def halted_words(park: Park, word: Halted) -> str:
         said += f" by {park.name(word.cause)}"
     if word.sender != word.machine:
         said += f" (said by {park.name(word.sender)}; itself it is silent)"
-    then = remedy(word.reason, park.name(word.machine))
+    then = remedy(park.site, word.reason, park.name(word.machine))
     return said + (f"; needs a person: {then}" if word.needs_person else "; goes on by itself")
 
 

@@ -8,8 +8,8 @@ from bus_sim.run import Simulation
 from bus_sim.sites import find_site
 from onboard.core.codes import MachineState, Reason, RegenerationPhase
 from onboard.core.journal_state import JournalState
-from onboard.core.messages import BusTime, Diagnostic, DriveOrder, Heartbeat, Message, ShuttleOrder
-from onboard.core.recovery_messages import Halted, Regeneration, RegenerationState
+from onboard.core.messages import BusTime, Diagnostic, DriveOrder, Heartbeat, Message, ShuttleOrder, SyncRequest
+from onboard.core.recovery_messages import Halted, Regeneration, RegenerationState, SyncDone, TokenSeen
 from tests.system.scene import Scene, play, stays
 
 SITE = find_site("small")
@@ -116,3 +116,15 @@ def test_a_foreign_journal_that_is_taken_out_is_a_lost_one() -> None:
     )
     scene.assert_sound()
     assert served(scene) == 3 and "MR2 is in epoch 1" in told(scene)
+
+
+def test_who_was_told_that_its_journal_is_old_vouches_for_nothing_any_more() -> None:
+    """Point 9,159 of `small --exhaustive journal --scene overlap`: it put a car back into its bay that had left."""
+    scene = played("crash:target=IOC1,at_s=190,restart_s=5,journal=rolled_back,entries=10")
+    assert_safe(scene)
+    node = SITE.machine("IOC1").node_id
+    at_us, word = scene.first(Halted, lambda one: one.sender == node)
+    assert word.reason is Reason.JOURNAL_SHORT and word.needs_person
+    said = {type(one) for one in said_by(scene, node, at_us / 1e6)}
+    assert SyncDone in said, "who asks is answered, and has not to wait"
+    assert said <= {Heartbeat, Halted, BusTime, SyncRequest, SyncDone, TokenSeen, Diagnostic}

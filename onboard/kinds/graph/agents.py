@@ -157,7 +157,8 @@ class NodeAgents:
             return []
         behind = NOWHERE if signal.behind == NO_NODE else signal.behind
         self.waiting[signal.sender] = _Waiting(Heading(behind, signal.node, signal.after), now_us)
-        return self._decide(signal.sender, now_us, again=True) if self._is_mine(signal.node) else []
+        decides = self._is_mine(signal.node) and not self.fleet.has_no_rights
+        return self._decide(signal.sender, now_us, again=True) if decides else []
 
     def _on_robot(self, at: RobotAt) -> None:
         one = self.waiting.get(at.sender)

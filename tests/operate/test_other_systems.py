@@ -1,0 +1,100 @@
+"""Where rights cannot be made anew a machine whose journal is lost or short holds by name too, and has a remedy."""
+
+from pathlib import Path
+
+import pytest
+
+from bus_sim.campaign.systems import usual_orders
+from bus_sim.campaign.trial import stage_maker
+from bus_sim.faults.injection import parse_injection
+from bus_sim.faults.scenario import Scenario
+from bus_sim.importers.command import import_files
+from bus_sim.importers.draft import site_text
+from bus_sim.importers.mapf import Wanted
+from bus_sim.run import RunOptions, run_until
+from bus_sim.sites import find_site
+from bus_sim.systems.orders import Orders
+from bus_sim.virtual_time import VirtualTimeLoop, run_on
+from onboard.core.codes import MachineState, Reason
+from onboard.core.messages import Award, Bid, CallForProposals, Heartbeat, Message, TokenGrant, TokenHeld, TokenRequest
+from onboard.core.recovery_messages import Halted, TokenGiven
+from onboard.core.site import Site
+from onboard.kinds.graph.messages import NodeAnswer
+from onboard.operate.names import OperateError
+from onboard.operate.park import Park
+from onboard.operate.status import Status
+from onboard.operate.wishes import Wish, maker_of
+from tests.faults.systems import PLANTS
+
+AT_S, OFF_S, END_S = 30, 3, 60
+#: What nobody says whose rights are not known.
+OF_RIGHTS = (CallForProposals, Bid, Award, TokenRequest, TokenGrant, TokenHeld, TokenGiven, NodeAnswer)
+
+
+@pytest.fixture(scope="module")
+def hotel(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path: Path = tmp_path_factory.mktemp("hotel") / "hotel.toml"
+    path.write_text(site_text(import_files([PLANTS / "hotel.building.yaml"], Wanted(tasks=3, seed=7))), "utf-8")
+    return str(path)
+
+
+def said_by(site: Site, name: str, journal: str) -> tuple[list[tuple[int, Message]], Park]:
+    """What a machine says after it came back with its journal so, and what an operator's station heard of all."""
+    loop, said, park = VirtualTimeLoop(), list[tuple[int, Message]](), Park(site)
+    faults = (parse_injection(f"crash:target={name},at_s={AT_S},restart_s={OFF_S},journal={journal}"),)
+    orders = Orders(4, usual_orders(site, None, None).apart_s)
+    stage = stage_maker(site)(site, Scenario(site.name, 1, END_S, orders=orders, faults=faults), RunOptions(), loop)
+
+    async def play() -> None:
+        stage.arm(faults)
+        stage.run.observers.append(lambda message, time_us: said.append((time_us, message)))
+        stage.run.observers.append(park.feed)
+        stage.run.start()
+        await run_until(stage.run, lambda: False, END_S * 1_000_000, 1_000_000)
+        stage.run.close()
+
+    run_on(loop, play())
+    assert stage.violations() == []
+    node, from_us = site.machine(name).node_id, (AT_S + OFF_S) * 1_000_000
+    return [one for one in said if one[0] >= from_us and one[1].sender == node], park
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        "cell R1",
+        "cell GM",
+        "graph NA",
+        "graph R1",
+        "graph OD",
+        "terminal Desk",
+        "terminal R1",
+        "turning L1",
+        "turning DESK",
+        "hotel",
+    ],
+)
+@pytest.mark.parametrize(("journal", "reason"), [("lost", Reason.JOURNAL_LOST), ("unsealed", Reason.JOURNAL_SHORT)])
+def test_a_machine_of_any_system_holds_for_its_journal_and_tells_the_remedy(
+    where: str, journal: str, reason: Reason, hotel: str
+) -> None:
+    system, _, name = where.partition(" ")
+    site = find_site(hotel if system == "hotel" else system)
+    name = name or next(iter(site.machines.values())).name
+    said, park = said_by(site, name, journal)
+    at_us = next(time_us for time_us, one in said if isinstance(one, Halted))
+    assert at_us < (AT_S + OFF_S + 4) * 1_000_000
+    after = [one for time_us, one in said if time_us > at_us + 100_000]
+    held = [one for one in after if isinstance(one, Halted)]
+    assert {(one.reason, one.needs_person) for one in held} == {(reason, True)}
+    assert len(held) >= (END_S - AT_S - OFF_S - 6) * 1_000_000 // site.timing.heartbeat_us
+    assert {one.state for one in after if isinstance(one, Heartbeat)} == {MachineState.OBSTACLE}
+    assert not [one for one in after if isinstance(one, OF_RIGHTS)]
+    remedy = "put all their journals away together, start them, and give open orders again"
+    with pytest.raises(OperateError, match=f"only a car park's rights can be made anew; .*{remedy}"):
+        maker_of(site, Wish("regenerate", machine=name), 1)
+    order = Status(park, 251, 1)
+    order.begin(END_S * 1_000_000)
+    order.wake(END_S * 1_000_000 + 1)
+    (line,) = [one for one in order.news() if one.startswith(f"{name} ") and "journal" in one]
+    assert remedy in line and "regenerate" not in line
