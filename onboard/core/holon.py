@@ -209,10 +209,10 @@ class Holon:
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects += handler(message, now_us) if handler is not None else []
-        if isinstance(message, Itinerary | Heartbeat):
+        if isinstance(message, (Itinerary, Heartbeat)):
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
-        if isinstance(message, TokenGrant | TokenHeld):
+        if isinstance(message, (TokenGrant, TokenHeld)):
             proven = self.car_words.settle(message.token_kind, message.token)
             effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
