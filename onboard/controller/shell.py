@@ -51,6 +51,7 @@ class Controller:
         self.halted_for: Reason | None = None
         self._codecs = (fleet, device)
         holon.listen(fleet.speakers)
+        holon.wire_drops = self.wire_drops
         self._decoders = (Decoder(fleet), Decoder(device))
         self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
         self._outbox: deque[Effect] = deque()
@@ -148,7 +149,6 @@ class Controller:
         self._timer_us = None
         if self._writing is not None:
             return
-        self.holon.wire_drops = self.wire_drops()
         self.holon.is_acknowledged = self._is_acknowledged()
         now_us = self._now_us()
         self.rest.woke(now_us)

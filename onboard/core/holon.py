@@ -80,9 +80,9 @@ class Holon:
         self.node_id = machine.node_id
         self.boot = boot
         self.halted: str | None = None
-        #: Input dropped here, and below by the shell's decoders and queues, by reason.
+        #: Input dropped here, and below by the shell's decoders and queues, by reason; they are asked for when told.
         self.drops: Counter[Reason] = Counter()
-        self.wire_drops: Counter[Reason] = Counter()
+        self.wire_drops: Callable[[], Counter[Reason]] = Counter
         self._told = ToldDrops()
         self.admission = Admission(site)
         self.tokens = TokenBook(site, machine.node_id)
@@ -181,7 +181,7 @@ class Holon:
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
-        self.admission.speakers = dict(speakers)
+        self.admission.listen(speakers)
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
@@ -470,7 +470,7 @@ class Holon:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
             effects += self.holds.words() + self.fleet.forgotten()
-            effects += self._told.words(self.node_id, self.drops + self.wire_drops)
+            effects += self._told.words(self.node_id, self.drops + self.wire_drops())
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
         if self.time.due_us is not None and self.time.due_us <= now_us:
             self.time.due_us = now_us + self.site.timing.bus_time_us
