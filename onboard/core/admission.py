@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, KindCode, Reason
 from onboard.core.effects import Effect, Report
 from onboard.core.messages import Blocked, BusTime, Clear, EmergencyStop, ManualOrder, Message, Speakers
-from onboard.core.site import Machine, Site
+from onboard.core.site import Site
 
 #: Highest number that a node can have on the wire.
 _LAST_NODE_ID = 255
@@ -28,25 +28,37 @@ class Admission:
     speakers: Speakers | None = None
     #: Nodes whose words came to nothing, each with the reason that was told to people.
     _named: set[tuple[int, Reason]] = field(default_factory=set)
+    #: Verdicts by sender and class of message: the site never changes, and new speakers begin them anew.
+    _verdicts: dict[tuple[int, type[Message]], Reason] = field(default_factory=dict)
+
+    def listen(self, speakers: Speakers) -> None:
+        """From now on only who may say a message is heard with it."""
+        self.speakers = dict(speakers)
+        self._verdicts.clear()
 
     def why_not(self, message: Message) -> Reason:
         """NONE where a message counts; else NOT_OF_SITE, NOT_OF_KIND, or NOT_AUTHORISED for a track of another's."""
-        if isinstance(message, EmergencyStop):
+        said = message.sender, type(message)
+        verdict = self._verdicts.get(said)
+        if verdict is None:
+            verdict = self._verdicts[said] = self._why_never(*said)
+        if verdict is not Reason.NONE or not isinstance(message, _OF_STEWARDS):
+            return verdict
+        is_gateway = message.sender not in self.site.machines
+        may_say = is_gateway or self.site.stewards.get(message.track) == message.sender
+        return Reason.NONE if may_say else Reason.NOT_AUTHORISED
+
+    def _why_never(self, sender: int, kind_of_message: type[Message]) -> Reason:
+        if issubclass(kind_of_message, EmergencyStop):
             return Reason.NONE
-        machine = self.site.machines.get(message.sender)
-        if machine is None and not MAX_NODE_ID < message.sender <= _LAST_NODE_ID:
+        machine = self.site.machines.get(sender)
+        if machine is None and not MAX_NODE_ID < sender <= _LAST_NODE_ID:
             return Reason.NOT_OF_SITE
         kind = KindCode.OBSERVER if machine is None else machine.kind
-        if self.speakers is not None and kind not in self.speakers.get(type(message), ()):
+        if self.speakers is not None and kind not in self.speakers.get(kind_of_message, ()):
             return Reason.NOT_OF_KIND
-        return Reason.NONE if machine is None else self._why_not_of(machine, message)
-
-    def _why_not_of(self, machine: Machine, message: Message) -> Reason:
-        if isinstance(message, _OF_FIXED) and machine.kind in MOBILE_KINDS:
-            return Reason.NOT_OF_KIND
-        if isinstance(message, _OF_STEWARDS) and self.site.stewards.get(message.track) != machine.node_id:
-            return Reason.NOT_AUTHORISED
-        return Reason.NONE
+        is_fixed_only = issubclass(kind_of_message, _OF_FIXED) and machine is not None
+        return Reason.NOT_OF_KIND if is_fixed_only and kind in MOBILE_KINDS else Reason.NONE
 
     def passed_over(self, message: Message, why: Reason) -> list[Effect]:
         """Tell people once of each sender and reason: what it may not say is as if it had not been heard."""

@@ -345,7 +345,7 @@ class TokenBook:
     def wake(self, now_us: int) -> list[Effect]:
         """Say again what has waited long enough: wanted tokens, and grants whose receiver was not heard."""
         effects: list[Effect] = []
-        if not self.is_synced:
+        if not self.is_synced or not (self.wanted or self.leaving):
             return effects
         waiting = len(self.wanted) + len(self.leaving)
         for key, due_us in self.wanted.items():
@@ -363,10 +363,10 @@ class TokenBook:
 
     def next_wake(self) -> int | None:
         """When something falls due to be said again, bus time in us."""
-        if not self.is_synced:
+        if not self.is_synced or not (self.wanted or self.leaving):
             return None
         times = [*self.wanted.values(), *(grant.repeat_at_us for grant in self.leaving.values())]
-        return min(times) if times else None
+        return min(times)
 
     def is_news(self, key: TokenKey, version: int) -> bool:
         """Whether ``version`` of a token is newer than all that is known of it, hints too."""

@@ -80,9 +80,9 @@ class Holon:
         self.node_id = machine.node_id
         self.boot = boot
         self.halted: str | None = None
-        #: Input dropped here, and below by the shell's decoders and queues, by reason.
+        #: Input dropped here, and below by the shell's decoders and queues, by reason; they are asked for when told.
         self.drops: Counter[Reason] = Counter()
-        self.wire_drops: Counter[Reason] = Counter()
+        self.wire_drops: Callable[[], Counter[Reason]] = Counter
         self._told = ToldDrops()
         self.admission = Admission(site)
         self.tokens = TokenBook(site, machine.node_id)
@@ -180,7 +180,7 @@ class Holon:
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
-        self.admission.speakers = dict(speakers)
+        self.admission.listen(speakers)
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
         """A message of the fleet bus, received at ``local_us``."""
@@ -208,10 +208,10 @@ class Holon:
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects += handler(message, now_us) if handler is not None else []
-        if isinstance(message, Itinerary | Heartbeat):
+        if isinstance(message, (Itinerary, Heartbeat)):
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
-        if isinstance(message, TokenGrant | TokenHeld):
+        if isinstance(message, (TokenGrant, TokenHeld)):
             proven = self.car_words.settle(message.token_kind, message.token)
             effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
@@ -434,7 +434,8 @@ class Holon:
 
     def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
-        effects = effects + self._doubts()
+        if self.witness.doubt is not None:
+            effects = effects + self._doubts(self.witness.doubt)
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
         for _ in range(MAX_ROUNDS if self.part.begins else 0):
@@ -449,10 +450,9 @@ class Holon:
         is_mute = self.fleet.has_no_rights and not self.regeneration.is_frozen
         return without_rights(effects) if is_mute else effects
 
-    def _doubts(self) -> list[Effect]:
+    def _doubts(self, doubt: Doubt) -> list[Effect]:
         """Somebody knows that the journal is old: nothing of it is used any more."""
-        doubt = self.witness.doubt
-        if doubt is None or self.holding.why.reason in RIGHTS_LOST:
+        if self.holding.why.reason in RIGHTS_LOST:
             return []
         self.fleet.has_no_rights = True
         return [Report(doubt.text), *self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), 0)]
@@ -472,7 +472,7 @@ class Holon:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
             effects += self.holds.words() + self.fleet.forgotten()
-            effects += self._told.words(self.node_id, self.drops + self.wire_drops)
+            effects += self._told.words(self.node_id, self.drops + self.wire_drops())
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
         if self.time.due_us is not None and self.time.due_us <= now_us:
             self.time.due_us = now_us + self.site.timing.bus_time_us

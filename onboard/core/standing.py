@@ -20,6 +20,10 @@ STANDS_AFTER_US = 20_000_000
 WAITS_AFTER_US = 600_000_000
 
 
+#: Words about one's plan; who asks for a right waits for it.
+_SPEAKS = (Waiting, TaskReport, TokenRequest)
+
+
 @dataclass
 class _Seen:
     """One machine: where, since when there and late, and when it last said something of its plan."""
@@ -30,6 +34,9 @@ class _Seen:
     #: Since when its plan, whichever, has not left it where it is.
     late_us: int | None = None
     stands: bool = False
+    #: The plan that was looked at last, and by when it has the machine leave this place, bus ms; None: never.
+    plan: Itinerary | None = None
+    leaves_ms: int | None = None
 
 
 @dataclass
@@ -54,8 +61,7 @@ class Standing:
             if known is not None:
                 self._seen[message.machine] = _Seen(known.place, now_us, now_us)
             return
-        # Who asks for a right waits for it.
-        speaks = isinstance(message, Waiting | TaskReport | TokenRequest)
+        speaks = isinstance(message, _SPEAKS)
         speaks = speaks or (isinstance(message, Itinerary) and message.grade is Grade.FIRM)
         if speaks and message.sender in self._seen:
             self._seen[message.sender].spoke_us = now_us
@@ -79,13 +85,18 @@ class Standing:
     def _leaves_us(self, node: int, seen: _Seen, now_us: int) -> int | None:
         """When its plan has it leave where it stands, at the latest; None where it may stand there for ever."""
         itinerary = self.mirror.itineraries.get(node)
-        here = Segment(seen.place[0], seen.place[1])
-        if itinerary is None or self._is_at(here, final_position(self.site, itinerary)):
+        if itinerary is not seen.plan:
+            seen.plan = itinerary
+            seen.leaves_ms = None if itinerary is None else self._leaves_ms(itinerary, Segment(*seen.place[:2]))
+        return None if seen.leaves_ms is None else from_bus_ms(seen.leaves_ms, now_us)
+
+    def _leaves_ms(self, itinerary: Itinerary, here: Segment) -> int | None:
+        if self._is_at(here, final_position(self.site, itinerary)):
             return None
         runs = [leg for leg in itinerary.legs if _goes(leg)]
         # The last run that begins or passes here: before it the machine may work here, or come here again.
         away = [leg for leg in runs if self._begins_or_passes(leg, here)] or runs
-        return from_bus_ms(away[-1].end_ms, now_us) if away else None
+        return away[-1].end_ms if away else None
 
     def _begins_or_passes(self, leg: Leg, here: Segment) -> bool:
         places = {one for one in (here, turned_in(self.site, here)) if one is not None}

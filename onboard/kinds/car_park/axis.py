@@ -18,7 +18,7 @@ class TrackAxis:
 
     site: Site
     number: int
-    #: Worked out of the site, which never changes: rights by the index before and the one entered, slots by a body's ends.
+    #: Worked out of the site, which never changes: rights by index before and index entered, slots by a body's ends.
     _rights: dict[tuple[int, int], list[Segment]] = field(default_factory=dict, init=False, repr=False, compare=False)
     _overlaps: dict[tuple[int, int], list[Segment]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
@@ -26,6 +26,11 @@ class TrackAxis:
     def track(self) -> Track:
         """The alley or spur."""
         return self.site.tracks[self.number]
+
+    @cached_property
+    def pitch_mm(self) -> int:
+        """From one index to the next."""
+        return self.track.pitch_mm
 
     @cached_property
     def mouth(self) -> Segment | None:
@@ -51,12 +56,12 @@ class TrackAxis:
 
     def position_mm(self, index: int) -> int:
         """Centre of an index."""
-        return (index - 1) * self.track.pitch_mm
+        return (index - 1) * self.pitch_mm
 
     def index_at(self, position_mm: int) -> int:
         """The index whose span holds a position."""
-        pitch_mm = self.track.pitch_mm
-        return max(self.lowest, min(self.highest, (position_mm + pitch_mm // 2) // pitch_mm + 1))
+        index = (position_mm + self.pitch_mm // 2) // self.pitch_mm + 1
+        return max(self.lowest, min(self.highest, index))
 
     def slot(self, index: int) -> Segment:
         """The body slot of an index: a segment of the track, a lift's platform, or a spur's mouth."""

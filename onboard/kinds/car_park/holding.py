@@ -60,8 +60,10 @@ class Holding:
 
     def stops(self, begun: bool) -> bool:
         """Whether nothing more is done for the step in hand, which is ``begun`` or not."""
+        if not self.is_held:
+            return False
         site, step = self.fleet.site, self.generation.program.step
-        if not self.is_held or any(slot.track in site.lifts for slot in self.carriage.occupied()):
+        if any(slot.track in site.lifts for slot in self.carriage.occupied()):
             return False
         if step is None or not begun or step.action is LegAction.STAND:
             return True

@@ -133,6 +133,7 @@ class Driver:
         holon.listen(codecs.fleet.speakers)
         self._codecs = codecs
         self._decoders = (Decoder(codecs.fleet), Decoder(codecs.device))
+        holon.wire_drops = lambda: self._decoders[0].drops + self._decoders[1].drops
         self._origin_us = origin_us
         self._journal_us = journal_us
         self._inbox: deque[tuple[int, bool, Frame]] = deque()
@@ -167,7 +168,6 @@ class Driver:
                 self._written_us = None
             else:
                 self._timer_us = None
-                self._holon.wire_drops = self._decoders[0].drops + self._decoders[1].drops
                 self._outbox.extend(self._holon.wake(self._now_us))
             yield from self._work_off()
 
