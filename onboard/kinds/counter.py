@@ -220,6 +220,8 @@ class Counter(ABC, Generic[AnOrder]):
             reason = self.fleet.winners.lost(order.task, now_us)
             if reason is not Reason.NONE and self.may_take_back(order):
                 effects += self.fleet.winners.take_back(order.task, reason, now_us)
+                # That somebody failed in it says nothing of the others.
+                order.calls = 0
                 effects += self.put(order, OrderState.HEARD, now_us)
         return effects
 

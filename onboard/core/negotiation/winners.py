@@ -100,6 +100,10 @@ class Winners:
     def take_back(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
         """Nobody has a task any more, and who had it is left out of its next calls; it may be called for anew."""
         known = self._tasks.pop(task, None)
+        unheard = self.negotiation.unheard(task, now_us)
+        if unheard and self.negotiation.trust.winner(task) is None:
+            # An option that was confirmed and not heard counts like any other award.
+            self.negotiation.trust.given(task, unheard, 0, Criterion.MONEY)
         said = self.negotiation.abandon(task, reason, now_us)
         effects: list[Effect] = [item for item in said if not isinstance(item, NegotiationEvent)]
         return effects if known is None or effects else [self._rejects(task, known.call, reason)]

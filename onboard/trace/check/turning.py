@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Bid, CallForProposals, Reference, TaskReport
+from onboard.core.codes import CallResult, TaskPhase
+from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.kinds.turning.messages import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding
@@ -68,7 +68,7 @@ class BillsAddUp(Rule):
 
 
 class OneLathe(Rule):
-    """An order that a lathe has told to have is told by no other, until it was given back; its batch only grows."""
+    """An order that a lathe has told to have is told by no other, until it is given or taken back; batches only grow."""
 
     name = "one-lathe"
     title = "every order is on one lathe, and its batch only grows"
@@ -80,8 +80,13 @@ class OneLathe(Rule):
         self._made: dict[Reference, int] = {}
 
     def handlers(self) -> Handlers:
-        """Reports and progress."""
-        return {TaskReport: self._on_report, LatheProgress: self._on_progress}
+        """Reports, progress, and what the desk takes back."""
+        return {TaskReport: self._on_report, LatheProgress: self._on_progress, Award: self._on_award}
+
+    def _on_award(self, event: Event[Award]) -> None:
+        word = event.message
+        if word.result is CallResult.REJECTED and word.sender == word.task.origin:
+            self._owner.pop(word.task, None)
 
     def _on_report(self, event: Event[TaskReport]) -> None:
         word = event.message
