@@ -53,7 +53,8 @@ class _LeastBid:
 
     def _for_less(self, found: Proposal | Needs | None, least: int) -> Proposal | Needs | None:
         if not isinstance(found, Needs):
-            return None if found is None else found._replace(cost=least)
+            # It tells nothing else than its number: with a bill that does not sum to it, it would convict itself.
+            return None if found is None else found._replace(cost=least, detail=())
 
         def combine(answers: tuple[Answer, ...], now_us: int) -> Proposal | Needs | None:
             return self._for_less(found.combine(answers, now_us), least)
