@@ -2,18 +2,8 @@
 
 from onboard.core.codes import MachineState, Reason
 from onboard.core.recovery_messages import Halted
+from onboard.core.remedies import reason_words, remedy
 from onboard.operate.park import Park
-
-#: What a person does about a machine that stands for this reason (docs/operate.md).
-REMEDIES = {
-    Reason.EMERGENCY_STOP: "onboard operate go",
-    Reason.JOURNAL_LOST: "onboard operate regenerate {name}",
-    Reason.JOURNAL_SHORT: "onboard operate regenerate {name}",
-    Reason.JOURNAL_FOREIGN: "put its own journal back, or onboard operate regenerate {name}",
-    Reason.DUPLICATE_NODE_ID: "find who else speaks under its node-ID, then onboard operate release {name}",
-    Reason.OPERATOR: "onboard operate release {name}",
-    Reason.REGENERATION: "onboard operate regenerate is under way, or was broken off: start it again",
-}
 
 _STATES = {
     MachineState.STARTING: "starts",
@@ -25,20 +15,16 @@ _STATES = {
 }
 
 
-def reason_words(reason: Reason) -> str:
-    """``emergency stop`` for ``EMERGENCY_STOP``."""
-    return reason.name.lower().replace("_", " ")
-
-
 def halted_words(park: Park, word: Halted) -> str:
     """Why a machine stands, who brought it about, and what to do where a person is needed."""
     said = f"stands: {reason_words(word.reason)}"
     if word.cause:
         said += f" by {park.name(word.cause)}"
     if word.sender != word.machine:
-        said += f" (said by {park.name(word.sender)}; itself it is silent)"
-    remedy = REMEDIES.get(word.reason, "go and see").format(name=park.name(word.machine))
-    return said + (f"; needs a person: {remedy}" if word.needs_person else "; goes on by itself")
+        why = "itself it says that it goes" if word.reason is Reason.FALSE_STATEMENT else "itself it is silent"
+        said += f" (said by {park.name(word.sender)}; {why})"
+    what = remedy(word.reason, park.name(word.machine))
+    return said + (f"; needs a person: {what}" if word.needs_person else "; goes on by itself")
 
 
 def state_words(park: Park, node: int, now_us: int) -> str:
