@@ -1,5 +1,6 @@
 """Forged words of people, of other sites, and about time, starts and stops."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 
 from bus_sim.attacks.attack import TICK_US, Attack, Node
@@ -27,7 +28,7 @@ _SECOND_US = 1_000_000
 _GHOSTS = 6
 
 
-class _Repeated(Attack):
+class _Repeated(Attack, ABC):
     """Says its words at the begin and again after every ``every_us``."""
 
     every_us = 5 * _SECOND_US
@@ -36,9 +37,9 @@ class _Repeated(Attack):
         super().__init__(node)
         self._due_us = 0
 
+    @abstractmethod
     def words(self, now_us: int) -> Iterator[Message]:
         """What is said."""
-        raise NotImplementedError
 
     def tick(self, now_us: int) -> None:
         """See ``Attack``."""

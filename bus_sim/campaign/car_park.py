@@ -33,6 +33,11 @@ class CarPark:
         return bool(self._oracle.violations)
 
     @property
+    def customers(self) -> list[Customer]:
+        """All who come."""
+        return self._street.customers
+
+    @property
     def is_over(self) -> bool:
         """See ``Stage``."""
         return is_over(self._street)

@@ -21,13 +21,14 @@ from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
-from bus_sim.campaign.systems import SYSTEMS, usual_orders, with_orders
+from bus_sim.campaign.systems import SYSTEMS, patience_s, usual_orders, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
 from bus_sim.stranger import Stranger
 from bus_sim.systems.orders import Orders
+from bus_sim.systems.stranger import WORKERS
 from onboard.core.site import Site
 
 #: What comes to a car park in a run, and how far apart, s.
@@ -138,7 +139,8 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     parser.add_argument(
         "--stranger",
         choices=[one.value for one in Stranger],
-        help="no faults: the first robot bids and does not do what it wins, beside the same seeds without it",
+        help="no faults: the first machine that works bids and does not do what it wins, beside the same seeds "
+        "without it",
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the results as JSON too")
     parser.add_argument(
@@ -182,12 +184,16 @@ def run_campaign_command(args: argparse.Namespace) -> int:
 
 
 def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
-    if site.system in SYSTEMS:
-        raise DemandError(f"--stranger {args.stranger}: {site.name} is a {site.system}, and only a car park has it")
-    strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, plan.limit_s or SCENE_LIMIT_S)
-    pairs = sorted(
-        play_pairs(strange, read_seeds(args.seeds), args.jobs or os.cpu_count() or 1), key=lambda one: one.seed
-    )
+    if site.system in SYSTEMS and site.system not in WORKERS:
+        known = ", ".join(WORKERS)
+        raise DemandError(
+            f"--stranger {args.stranger}: {site.name} is a {site.system}; use a car park or one of {known}"
+        )
+    seeds = read_seeds(args.seeds)
+    drawn = with_orders(site, plan.orders, seeds[0])
+    limit_s = plan.limit_s or (patience_s(drawn) if site.system in SYSTEMS else SCENE_LIMIT_S)
+    strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, limit_s, plan.orders)
+    pairs = sorted(play_pairs(strange, seeds, args.jobs or os.cpu_count() or 1), key=lambda one: one.seed)
     for pair in pairs:
         print(pair.line())
     bad = [pair for pair in pairs if not pair.is_good]

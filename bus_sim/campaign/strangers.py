@@ -5,13 +5,19 @@ from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 
+from bus_sim import stranger as car_park
 from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.judges import Judges
+from bus_sim.campaign.trial import stage_maker
 from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.plant.customer import Customer
 from bus_sim.run import RunOptions, run_until
 from bus_sim.sites import find_site
-from bus_sim.stranger import Stranger, factories_with
+from bus_sim.stranger import Stranger
+from bus_sim.systems import stranger as systems
+from bus_sim.systems.orders import Orders
+from bus_sim.systems.stranger import WORKERS
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.codes import KindCode
 from onboard.core.site import Site
@@ -30,6 +36,8 @@ class StrangerPlan:
     how: Stranger
     arrivals: Arrivals
     limit_s: float
+    #: What comes to a site that is no car park.
+    orders: Orders | None = None
 
 
 @dataclass(frozen=True)
@@ -39,7 +47,7 @@ class Outcome:
     served: int
     told: int
     waiting: int
-    #: What each customer who was served waited in all, s; None for the others.
+    #: What each customer of a car park who was served waited in all, s; None for the others.
     waits_s: tuple[float | None, ...]
     broken: tuple[str, ...]
 
@@ -90,11 +98,15 @@ def _play(plan: StrangerPlan, site: Site, seed: int, *, strange: bool) -> Outcom
 
 
 async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop, *, strange: bool) -> Outcome:
-    target = next(one for one in site.machines.values() if one.kind is KindCode.ROBOT)
+    kind = WORKERS.get(site.system, KindCode.ROBOT)
+    target = next(one for one in site.machines.values() if one.kind is kind)
     options = RunOptions(seed=seed, without=frozenset() if strange else frozenset({target.name}))
-    stage = CarPark(site, Scenario(plan.site, seed, plan.limit_s, plan.arrivals), options, loop)
-    if strange:
-        stage.run.factories = factories_with(target.node_id, plan.how)
+    scenario = Scenario(plan.site, seed, plan.limit_s, plan.arrivals, orders=plan.orders)
+    stage = stage_maker(site)(site, scenario, options, loop)
+    if strange and site.system in WORKERS:
+        stage.run.factories = systems.factories_with(site, target.node_id, plan.how)
+    elif strange:
+        stage.run.factories = car_park.factories_with(target.node_id, plan.how)
     # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
     stage.run.devices[target.node_id].attach("terminal block", None)
     judges = Judges(stage.run, disturbed=False)
@@ -108,12 +120,15 @@ async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop,
         )
     finally:
         stage.run.close()
-    tally, visits = stage.tally(), [customer.visit for customer in stage.run.plant.street.customers]
-    waits = tuple(
-        (visit.in_wait_us + visit.out_wait_us) / 1e6
-        if visit.in_wait_us is not None and visit.out_wait_us is not None
-        else None
-        for visit in visits
-    )
+    tally = stage.tally()
+    waits = tuple(map(_wait_s, stage.customers)) if isinstance(stage, CarPark) else ()
     broken = (*stage.violations(), *(judges.finish()[0]))
     return Outcome(tally.served, tally.told, tally.waiting, waits, broken)
+
+
+def _wait_s(customer: Customer) -> float | None:
+    """What a customer waited in all, in and out; None for one who was not served."""
+    visit = customer.visit
+    if visit.in_wait_us is None or visit.out_wait_us is None:
+        return None
+    return (visit.in_wait_us + visit.out_wait_us) / 1e6

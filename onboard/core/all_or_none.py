@@ -9,11 +9,14 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from onboard.core.authority import TokenBook, segment_token
-from onboard.core.effects import Effect
+from onboard.core.backoff import PACE_US, QUICK
+from onboard.core.effects import Effect, Send
 from onboard.core.site import Segment
 
 #: Token repeats for which an incomplete set is kept; then it is given back. Ours: two lost frames and the journals.
 PATIENCE_REPEATS = 10
+#: What a slot that is taken and given back in one round costs: request, word that it is held, grant.
+FRAMES_A_SLOT = 3
 
 
 @dataclass
@@ -27,6 +30,9 @@ class AllOrNone:
     slots: tuple[Segment, ...] = ()
     due_us: int | None = None
     _rests: bool = False
+    #: Rounds that ended without the whole set, and what it held when it began to rest.
+    _rounds: int = 0
+    _kept: int = 0
 
     @property
     def is_complete(self) -> bool:
@@ -46,6 +52,7 @@ class AllOrNone:
         self.tokens.unordered = set()
         self.due_us = None
         self._rests = False
+        self._rounds = 0
 
     def passed(self, occupied: Collection[Segment]) -> None:
         """Let go of slots that lie behind the body; the last one ends the set."""
@@ -59,23 +66,40 @@ class AllOrNone:
     def advance(self, occupied: Collection[Segment], now_us: int) -> list[Effect]:
         """Ask for what is missing; after a while without success give back all but what the body is in, and rest."""
         if self.is_complete:
-            self.due_us = None
+            self.due_us, self._rounds = None, 0
             return []
         if self.due_us is None:
             self._set_due(now_us)
+        if self._rests and self._held() > self._kept:
+            # What was missing has come: there is no need to rest on.
+            self.due_us = now_us
         effects: list[Effect] = []
         if self.due_us is not None and self.due_us <= now_us:
             self._rests = not self._rests
-            self._set_due(now_us)
             if self._rests:
-                return self._give_back(occupied, now_us)
+                return self._rest(occupied, now_us)
+            self._set_due(now_us)
         if not self._rests:
             for slot in self.slots:
                 effects += self.tokens.want(segment_token(slot), now_us)
         return effects
 
     def _set_due(self, now_us: int) -> None:
-        self.due_us = now_us + self.tokens.site.timing.token_repeat_us * (1 if self._rests else PATIENCE_REPEATS)
+        self.due_us = now_us + self.tokens.site.timing.token_repeat_us * PATIENCE_REPEATS
+
+    def _held(self) -> int:
+        return sum(self.tokens.holds(segment_token(slot)) for slot in self.slots)
+
+    def _rest(self, occupied: Collection[Segment], now_us: int) -> list[Effect]:
+        """Give back; the first rests are short, then each lasts as long as what its round said may take (rule 10)."""
+        self._rounds += 1
+        effects = self._give_back(occupied, now_us)
+        self._kept = self._held()
+        said = FRAMES_A_SLOT * sum(isinstance(effect, Send) for effect in effects)
+        # Half of the pace is for what is asked for meanwhile.
+        paced_us = 2 * said * PACE_US if self._rounds > QUICK else 0
+        self.due_us = now_us + max(self.tokens.site.timing.token_repeat_us, paced_us)
+        return effects
 
     def _give_back(self, occupied: Collection[Segment], now_us: int) -> list[Effect]:
         effects: list[Effect] = []

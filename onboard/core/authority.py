@@ -317,8 +317,7 @@ class TokenBook:
             else:
                 self.behind_since_us.pop(key, None)
             asked_us = now_us + REFUSED_REPEATS * self.site.timing.token_repeat_us
-            is_behind = refusal.reason is Reason.MIRROR_BEHIND
-            self.wanted[key] = asked_us if is_behind else max(asked_us, self.wanted[key])
+            self.wanted[key] = max(asked_us, 0 if refusal.reason is Reason.MIRROR_BEHIND else self.wanted[key])
             self.changes += 1
 
     def newest(self, key: TokenKey) -> TokenSeen:
@@ -351,7 +350,8 @@ class TokenBook:
         for key, due_us in self.wanted.items():
             if due_us <= now_us:
                 claim = no_claim(key) if key in self.unordered else self.claim(key)
-                longest_us = self.backoff.longest_us if claim.itinerary_version else self.backoff.unordered_us
+                of_set = self.backoff.unordered_us * max(1, len(self.unordered & self.wanted.keys()))
+                longest_us = self.backoff.longest_us if claim.itinerary_version else of_set
                 self.wanted[key] = self.backoff.say(("wanted", key), now_us, waiting, longest_us)
                 effects.append(Send(TokenRequest(self.node_id, *key, _told(self.version_of(key)), *claim)))
         for key, grant in self.leaving.items():

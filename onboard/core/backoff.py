@@ -12,7 +12,7 @@ QUICK = 3
 #: The longest time between two repeats of one thing, in token repeats: 5 s at the default of 200 ms. Ours.
 LONGEST_REPEATS = 25
 #: The same for what is asked for without an agreed order: the oldest petition keeps all younger ones back. Ours.
-UNORDERED_REPEATS = 5
+UNORDERED_REPEATS = 10
 #: Petitions lapse after this many of the longest times, in halves: two repeats may be lost (rule 10).
 LAPSE_HALVES = 5
 #: All that one machine repeats comes to no more than one frame in this time, us (issue 13, item 5).

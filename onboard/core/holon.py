@@ -474,6 +474,7 @@ class Holon:
             effects += self.holds.words() + self.fleet.forgotten()
             effects += self._told.words(self.node_id, self.drops + self.wire_drops())
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
+            effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
         if self.time.due_us is not None and self.time.due_us <= now_us:
             self.time.due_us = now_us + self.site.timing.bus_time_us
             effects.append(self._bus_time(now_us))

@@ -38,7 +38,7 @@ class Petitions:
         self._prune(now_us)
         known = self.open.setdefault(key, {}).get(request.sender)
         since_us = now_us
-        if known is not None and not self._is_over(known, now_us):
+        if known is not None and not self._is_over(request.sender, known, now_us):
             # Whoever gives up an agreed order begins anew: its age must be the same for all holders.
             kept = (known.itinerary_version == UNORDERED) == (request.itinerary_version == UNORDERED)
             since_us = known.since_us if kept else now_us
@@ -57,7 +57,7 @@ class Petitions:
         """
         ages = []
         for node, petition in self.open.get(key, {}).items():
-            if petition.itinerary_version == UNORDERED and not self._is_over(petition, now_us):
+            if petition.itinerary_version == UNORDERED and not self._is_over(node, petition, now_us):
                 ages.append((self._unordered_since_us(node), node))
         return bool(ages) and min(ages)[1] == requester
 
@@ -81,7 +81,7 @@ class Petitions:
     def due(self, key: TokenKey, now_us: int) -> list[int]:
         """Requesters of a token whose requests are to be looked at now, oldest first; those that lapsed are closed."""
         waiting = self.open.get(key, {})
-        for requester in [node for node, petition in waiting.items() if self._is_over(petition, now_us)]:
+        for requester in [node for node, petition in waiting.items() if self._is_over(node, petition, now_us)]:
             self.close(key, requester)
         found = [(petition.since_us, node) for node, petition in waiting.items() if petition.due_us <= now_us]
         for _, node in found:
@@ -93,10 +93,17 @@ class Petitions:
         if now_us < self._prune_at_us:
             return
         self._prune_at_us = now_us + self.repeat_us
-        lapsed = [(key, one) for key, by in self.open.items() for one in by if self._is_over(by[one], now_us)]
+        lapsed = [(key, one) for key, by in self.open.items() for one in by if self._is_over(one, by[one], now_us)]
         for key, requester in lapsed:
             self.close(key, requester)
 
-    def _is_over(self, petition: Petition, now_us: int) -> bool:
-        lapses_us = BackOff(self.repeat_us).lapses_us(is_ordered=petition.itinerary_version != UNORDERED)
-        return petition.heard_us + lapses_us < now_us
+    def _is_over(self, node: int, petition: Petition, now_us: int) -> bool:
+        is_ordered = petition.itinerary_version != UNORDERED
+        lapses_us = BackOff(self.repeat_us).lapses_us(is_ordered=is_ordered)
+        # Who asks for a whole set repeats one of it at a time.
+        return petition.heard_us + lapses_us * (1 if is_ordered else self._set_of(node)) < now_us
+
+    def _set_of(self, node: int) -> int:
+        """For how many tokens a machine asks without an agreed order."""
+        waiting = (by[node] for by in self.open.values() if node in by)
+        return max(1, sum(petition.itinerary_version == UNORDERED for petition in waiting))

@@ -10,7 +10,7 @@ more machines speak another contract or know another site than speak its own, it
 from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenBook
-from onboard.core.codes import MOBILE_KINDS, NOBODY, STILL, MachineState, Reason
+from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, STILL, MachineState, Reason
 from onboard.core.messages import Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
 from onboard.core.obstacles import holder_in
@@ -132,12 +132,26 @@ class Presence:
             del self.halts[beat.sender]
 
     def halted_ones(self, now_us: int) -> list[Halted]:
-        """What I say of machines that are silent, as the lowest live machine that is no obstacle itself."""
+        """What I say of machines that are silent, or stand with a car, as the lowest live one that is no obstacle."""
         obstacles = self.mirror.obstacles.machines
         alive = self.mirror.alive(now_us)
         if self.is_held or min([node for node in alive if node not in obstacles], default=self.node_id) < self.node_id:
             return []
-        return [self._told_of(node) for node in sorted(obstacles) if node not in alive and node not in self.foreign]
+        silent = [node for node in sorted(obstacles) if node not in alive and node not in self.foreign]
+        standing = [node for node in sorted(alive & obstacles.keys()) if self._is_stuck(node)]
+        return [self._told_of(node) for node in silent] + [self.standing_word(node) for node in standing]
+
+    def _is_stuck(self, node: int) -> bool:
+        """Whether a machine lives and stands with a car, which nobody can take from it."""
+        stands = self.mirror.obstacles.machines[node].reason is Reason.FALSE_STATEMENT
+        return stands and any(
+            record.custodian == node and record.station == ANY_STATION for record in self.mirror.cars.values()
+        )
+
+    def standing_word(self, node: int) -> Halted:
+        """A machine that says that it goes does not: nobody but a person can help."""
+        peer = self.mirror.peers.get(node)
+        return Halted(self.node_id, node, Reason.FALSE_STATEMENT, NOBODY, True, 0 if peer is None else peer.boot)
 
     def _told_of(self, node: int) -> Halted:
         """Why a silent machine does not act: its own last word, where it had one."""

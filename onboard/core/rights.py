@@ -168,5 +168,10 @@ class Rights:
         return effects
 
     def _on_refusal(self, refusal: TokenRefusal, now_us: int) -> list[Effect]:
+        """Only who holds a token, by what was proved or by what was heard last, can refuse it: else I go on asking."""
+        key, beliefs = TokenKey(refusal.token_kind, refusal.token), self.tokens.beliefs
+        if refusal.sender not in (beliefs.of(key).holder, beliefs.latest(key).holder):
+            self.drops[Reason.NOT_THE_HOLDER] += 1
+            return []
         self.tokens.on_refusal(refusal, now_us)
         return []

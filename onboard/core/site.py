@@ -131,6 +131,8 @@ class Site:
 
     #: Which system this is, as the site file says it; it chooses the kinds' behaviours.
     system: ClassVar[str] = ""
+    #: Whether rights can be made anew one by one: only where it is known whose each right is, and what stands where.
+    has_regeneration: ClassVar[bool] = False
 
     name: str
     digest: int

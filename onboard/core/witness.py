@@ -24,6 +24,9 @@ DIGEST_PATIENCE = 2
 ANSWER_PERIOD_US = 250_000
 #: So many heartbeat periods after the last start seen all have asked; then everybody is answered at once. Ours.
 STARTING_BEATS = 2
+#: So many heartbeat periods after its start a machine has been compared with by all that live: the first word may be
+#: lost, and the next. Ours.
+COMPARING_BEATS = 4
 
 
 class Doubt(NamedTuple):
@@ -202,8 +205,23 @@ class Witness:
     def on_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
         """Answer at once; whoever asks soon after shares one answer with all others who do."""
         if request.whom == self.node_id and self._has_forgotten(request):
+            if not self._may_know_better(request.sender, now_us):
+                self.tokens.drops[Reason.LATE] += 1
+                return self._answer_to(request, now_us)
             self._doubt(Reason.JOURNAL_LOST, request.sender, f"knew this node under boot {request.boot_before}")
             return []
+        return self._answer_to(request, now_us)
+
+    def _may_know_better(self, node: int, now_us: int) -> bool:
+        """Whether a machine may have known an earlier life of mine without having said so yet.
+
+        Whoever was there when I was started has compared then; a word of that kind later would stop any machine.
+        """
+        since_us = self._since_us or 0
+        just_begun = now_us < since_us + COMPARING_BEATS * self.site.timing.heartbeat_us
+        return just_begun or not self.is_over or node not in self.answered
+
+    def _answer_to(self, request: SyncRequest, now_us: int) -> list[Effect]:
         known = self.mirror.peers.get(request.sender)
         effects: list[Effect] = []
         patience_us = self.site.timing.heartbeat_us // 2

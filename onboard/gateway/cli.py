@@ -17,7 +17,15 @@ from onboard.gateway.settings import GatewayError, GatewaySettings, level
 from onboard.io.broker_address import BrokerAddress
 from onboard.io.journal import FileJournal, JournalDamagedError
 from onboard.io.mqtt import MqttBroker
-from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings, open_bus
+from onboard.io.open_bus import (
+    BusOpenError,
+    BusSettings,
+    OpenBus,
+    add_site_arguments,
+    bus_settings,
+    open_bus,
+    parse_with_bus,
+)
 from onboard.io.signals import ended_by
 from onboard.kinds.registry import system_of
 from onboard.ports.broker import BrokerError
@@ -46,7 +54,7 @@ def build_parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    add_site_arguments(parser)
     parser.add_argument(
         "--spool",
         type=Path,
@@ -61,16 +69,12 @@ def build_parser() -> argparse.ArgumentParser:
         help="take orders too, and speak on the bus under this node-ID, 251 to 255, that nobody else there has",
     )
     add_mqtt_arguments(parser, required=True)
-    add_bus_arguments(parser)
     return parser
 
 
 def main(argv: Sequence[str]) -> int:
     """Entry point; returns the exit status."""
-    parser = build_parser()
-    args = parser.parse_args(argv)
-    if not hasattr(args, "interface"):
-        parser.error("name a bus: -i INTERFACE -c CHANNEL")
+    args = parse_with_bus(build_parser(), argv)
     try:
         site = load_site(args.site)
         settings = gateway_settings(args, node_id=args.orders)

@@ -26,6 +26,7 @@ from onboard.core.messages import (
     TaskReport,
     Waiting,
 )
+from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.whereabouts import Tracker, Whereabouts, tracker_of
 
@@ -68,6 +69,9 @@ class Body:
     is_held: bool = False
     #: By its own word: held, and come to rest.
     is_paused: bool = False
+    #: Why it does not act, by its own word or another's, and when that was said last.
+    halted: Halted | None = None
+    halted_us: int = 0
 
 
 @dataclass
@@ -108,8 +112,26 @@ class Machines:
         match message:
             case CarAt():
                 self._on_car(message)
+            case Halted():
+                self._on_halted(message, now_us)
             case Award() if message.result is CallResult.WITHDRAWN:
                 self._on_withdrawal(message)
+
+    def halted(self, node_id: int, now_us: int) -> Halted | None:
+        """Why a machine does not act, as long as that is said, in each heartbeat period."""
+        body = self.bodies[node_id]
+        is_said = now_us - body.halted_us <= SILENT_BEATS * self.site.timing.heartbeat_us
+        return body.halted if is_said else None
+
+    def _on_halted(self, word: Halted, now_us: int) -> None:
+        body = self.bodies.get(word.machine)
+        is_false = word.reason is Reason.FALSE_STATEMENT
+        if body is None or not (word.sender == word.machine or is_false or self.is_silent(word.machine, now_us)):
+            return
+        before = self.halted(word.machine, now_us)
+        body.halted, body.halted_us = word, now_us
+        if before is None or (before.reason, before.needs_person) != (word.reason, word.needs_person):
+            self.changed.add(word.machine)
 
     def is_silent(self, node_id: int, now_us: int) -> bool:
         """Whether a machine was never heard, or not for three of its heartbeats."""
@@ -158,6 +180,9 @@ class Machines:
         if message.state in (MachineState.IDLE, MachineState.WORKING):
             # None that stands because it is held says so: its word that it was let go may have been lost.
             body.is_held = body.is_paused = False
+            if body.halted is not None and body.halted.sender == message.sender:
+                body.halted = None
+                self.changed.add(message.sender)
         if message.state in (MachineState.IDLE, MachineState.WORKING) and self.emergency is not None:
             # Whoever is held by an emergency stop says OBSTACLE: one that works was let go, or the stop is old.
             self.emergency = None

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from onboard.core.codes import MachineState, Operation, TaskPhase
 from onboard.core.messages import Reference
+from onboard.core.recovery_messages import Halted
+from onboard.core.remedies import reason_words, remedy
 from onboard.core.site import Segment
 from onboard.gateway.dialect import Connection, Dialect, Json
 from onboard.gateway.machines import Body, Machines, TaskInHand
@@ -135,11 +137,14 @@ def _actions(task: TaskInHand | None, does: Operation | None) -> list[Json]:
 def _errors(machines: Machines, body: Body, now_us: int) -> list[Json]:
     node = body.machine.node_id
     found: list[Json] = []
+    word = machines.halted(node, now_us)
+    if word is not None:
+        found.append(_halted(machines, word))
     if machines.is_silent(node, now_us):
         found.append(_error("machineSilent", "FATAL", "no sign of life on the bus"))
-    elif body.state is MachineState.STOPPED:
+    elif word is None and body.state is MachineState.STOPPED:
         found.append(_error("machineStopped", "FATAL", "the controller has stopped; a person must start it"))
-    elif body.state is MachineState.OBSTACLE and not body.is_held:
+    elif word is None and body.state is MachineState.OBSTACLE and not body.is_held:
         found.append(_error("machineObstacle", "WARNING", "takes no part: another contract or site"))
     for segment, message in machines.blocked.items():
         references = [{"referenceKey": "nodeId", "referenceValue": str(segment)}]
@@ -153,6 +158,16 @@ def _errors(machines: Machines, body: Body, now_us: int) -> list[Json]:
         what = f"the task was given up: {task.reason.name}"
         found.append(_error("orderFailed", "WARNING", what) | {"errorReferences": references})
     return found
+
+
+def _halted(machines: Machines, word: Halted) -> Json:
+    """A machine that does not act: FATAL where a person is needed, and what to do; else it goes on by itself."""
+    name = machines.site.machines[word.machine].name
+    said = f"{name} stands: {reason_words(word.reason)}"
+    if not word.needs_person:
+        return _error("machineHalted", "WARNING", f"{said}; it goes on by itself")
+    hint = {"errorHint": remedy(machines.site, word.reason, name)}
+    return _error("machineHalted", "FATAL", f"{said}; it needs a person") | hint
 
 
 def _error(kind: str, level: str, description: str) -> Json:

@@ -7,13 +7,24 @@ board on the asyncio client does not have to spend.
 import argparse
 import re
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, Protocol
 
 from onboard.io.settings import BusOpenError, BusSettings, Interface
 from onboard.io.socketcand import open_socketcand
 from onboard.ports.bus import Bus
 
-__all__ = ["OWN_INTERFACES", "BusOpenError", "BusSettings", "OpenBus", "add_bus_arguments", "bus_settings", "open_bus"]
+__all__ = [
+    "OWN_INTERFACES",
+    "BusOpenError",
+    "BusSettings",
+    "OpenBus",
+    "add_bus_arguments",
+    "add_site_arguments",
+    "bus_settings",
+    "open_bus",
+    "parse_with_bus",
+]
 
 #: Interfaces of ours beside python-can's: ``socketcand-asyncio`` speaks the protocol of python-can's ``socketcand``.
 OWN_INTERFACES = ("socketcand-asyncio",)
@@ -24,6 +35,20 @@ class OpenBus(Bus, Protocol):
 
     async def wait_lost(self) -> str:
         """Return, with the reason in words, once the bus is gone for good; never while it may come back."""
+
+
+def add_site_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what every program needs that joins the bus of a site: the site file, and the bus."""
+    parser.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    add_bus_arguments(parser)
+
+
+def parse_with_bus(parser: argparse.ArgumentParser, argv: Sequence[str]) -> argparse.Namespace:
+    """Parse a command line in which a bus has to be named; ends the program with status 2 where it is not."""
+    args = parser.parse_args(argv)
+    if not hasattr(args, "interface"):
+        parser.error("name a bus: -i INTERFACE -c CHANNEL")
+    return args
 
 
 def add_bus_arguments(parser: argparse.ArgumentParser) -> None:

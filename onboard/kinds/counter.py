@@ -218,8 +218,12 @@ class Counter(ABC, Generic[AnOrder]):
             if order.state not in (OrderState.CALLED, OrderState.IN_HAND):
                 continue
             reason = self.fleet.winners.lost(order.task, now_us)
-            if reason is not Reason.NONE and self.may_take_back(order):
+            if reason is not Reason.NONE and not self.may_take_back(order):
+                self.fleet.winners.keeps(order.task)
+            elif reason is not Reason.NONE:
                 effects += self.fleet.winners.take_back(order.task, reason, now_us)
+                # That somebody failed in it says nothing of the others.
+                order.calls = 0
                 effects += self.put(order, OrderState.HEARD, now_us)
         return effects
 

@@ -3,10 +3,11 @@
 from onboard.core.codes import Reason
 from onboard.core.messages import Blocked, Clear, Message, SyncRequest
 from onboard.core.recovery_messages import SyncDone
+from onboard.core.remedies import reason_words
 from onboard.core.site import Segment
 from onboard.operate.order import AGAIN_US, DONE, Order
 from onboard.operate.park import Park
-from onboard.operate.words import reason_words, state_words
+from onboard.operate.words import state_words
 
 #: A steward that lives says all that it keeps within this after it was asked, us: a burst of frames. Ours.
 ANSWER_US = 2_000_000

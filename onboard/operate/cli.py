@@ -6,12 +6,11 @@ import signal
 import sys
 import time
 from collections.abc import Awaitable, Callable, Sequence
-from pathlib import Path
 
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
-from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
+from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
 from onboard.kinds.registry import system_of
 from onboard.operate.asking import Asker
 from onboard.operate.names import OperateError, tool_of
@@ -46,7 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     common = argparse.ArgumentParser(add_help=False)
-    common.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    add_site_arguments(common)
     common.add_argument(
         "--node",
         type=int,
@@ -54,7 +53,6 @@ def build_parser() -> argparse.ArgumentParser:
         help="speak under this node-ID, 251 to 255, that nobody else there has (default: the lowest that is not heard)",
     )
     common.add_argument("--yes", action="store_true", help="do not ask")
-    add_bus_arguments(common)
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     def command(name: str, told: str) -> argparse.ArgumentParser:
@@ -96,10 +94,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str]) -> int:
     """Entry point; returns the exit status."""
-    parser = build_parser()
-    args = parser.parse_args(argv)
-    if not hasattr(args, "interface"):
-        parser.error("name a bus: -i INTERFACE -c CHANNEL")
+    args = parse_with_bus(build_parser(), argv)
     try:
         site = load_site(args.site)
         if args.node is not None:

@@ -120,8 +120,9 @@ class Park:
         about = self.machines.get(word.machine)
         if about is None:
             return
-        # Others speak for a silent machine only: its own word is better.
-        if word.sender == word.machine or not self.lives(word.machine, now_us):
+        # Others speak for a machine that is silent, or that says something else than it does: else its own word counts.
+        is_false = word.reason is Reason.FALSE_STATEMENT
+        if word.sender == word.machine or is_false or not self.lives(word.machine, now_us):
             about.halted, about.halted_us = word, now_us
 
     def _foreign(self, beat: Heartbeat) -> Reason:

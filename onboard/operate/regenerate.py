@@ -20,12 +20,13 @@ from onboard.core.recovery_messages import (
     TokenSeen,
     assignment_digest,
 )
+from onboard.core.remedies import reason_words
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import TrackKind
 from onboard.operate.assignment import NO_BODY, Assignment, Body, Statements, Whose, assign
 from onboard.operate.order import AGAIN_US, MISTAKE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park
-from onboard.operate.words import reason_words, state_words
+from onboard.operate.words import state_words
 
 #: How long all may stand frozen while the person reads and decides, us. Ours: a site that waits longer is forgotten.
 DECIDE_US = 300_000_000

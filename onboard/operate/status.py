@@ -2,9 +2,10 @@
 
 from onboard.core.codes import MOBILE_KINDS, Reason
 from onboard.core.messages import Message
+from onboard.core.remedies import reason_words
 from onboard.operate.order import DONE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park
-from onboard.operate.words import reason_words, state_words
+from onboard.operate.words import state_words
 
 
 class Status(Order):

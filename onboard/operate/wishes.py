@@ -6,6 +6,7 @@ from functools import partial
 
 from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason
 from onboard.core.holding import RIGHTS_LOST
+from onboard.core.remedies import START_ANEW, remedy
 from onboard.core.site import Machine, Site
 from onboard.operate.assignment import Body
 from onboard.operate.blocks import Mark
@@ -16,7 +17,6 @@ from onboard.operate.park import Park
 from onboard.operate.regenerate import Lost, Regenerate
 from onboard.operate.status import Status
 from onboard.operate.stops import GoAgain, LetGo, Stop
-from onboard.operate.words import START_ANEW, has_regeneration, remedy
 
 #: Heartbeat periods for which the bus is listened to before anything is said: everybody is heard, and once lost.
 LISTEN_BEATS = 2
@@ -71,7 +71,7 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
 def _lost_of(site: Site, wish: Wish) -> Lost:
     """Who lost its rights, who is locked off, and where their bodies are. Raises ``OperateError``."""
     lost = machine_of(site, wish.machine)
-    if not has_regeneration(site):
+    if not site.has_regeneration:
         raise OperateError(
             f"{wish.machine}: {site.name} is a {site.system}; only a car park's rights can be made anew; {START_ANEW}"
         )

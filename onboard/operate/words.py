@@ -1,23 +1,9 @@
 """States and reasons in words for a person, with what to do where something is to be done."""
 
 from onboard.core.codes import MachineState, Reason
-from onboard.core.holding import RIGHTS_LOST
 from onboard.core.recovery_messages import Halted
-from onboard.core.site import Site
-from onboard.kinds.car_park.site import CarPark
+from onboard.core.remedies import reason_words, remedy
 from onboard.operate.park import Park
-
-#: What a person does about a machine that stands for this reason (docs/operate.md).
-REMEDIES = {
-    Reason.EMERGENCY_STOP: "onboard operate go",
-    Reason.JOURNAL_LOST: "onboard operate regenerate {name}",
-    Reason.JOURNAL_SHORT: "onboard operate regenerate {name}",
-    Reason.JOURNAL_FOREIGN: "put the right board or its own journal in; where that is lost, move the file away, "
-    "start it and onboard operate regenerate {name}",
-    Reason.DUPLICATE_NODE_ID: "find who else speaks under its node-ID, then onboard operate release {name}",
-    Reason.OPERATOR: "onboard operate release {name}",
-    Reason.REGENERATION: "onboard operate regenerate is under way, or was broken off: start it again",
-}
 
 _STATES = {
     MachineState.STARTING: "starts",
@@ -29,39 +15,16 @@ _STATES = {
 }
 
 
-def reason_words(reason: Reason) -> str:
-    """``emergency stop`` for ``EMERGENCY_STOP``."""
-    return reason.name.lower().replace("_", " ")
-
-
-#: Where rights cannot be made anew one by one: all machines begin as on the first day.
-START_ANEW = (
-    "bring all machines to where the site file has them, put all their journals away together, start them, and give "
-    "open orders again"
-)
-
-
-def remedy(site: Site, reason: Reason, name: str) -> str:
-    """What a person does about machine ``name`` that stands for this reason."""
-    if reason in RIGHTS_LOST and not has_regeneration(site):
-        return f"its own journal, as it was last, in; else {START_ANEW}"
-    return REMEDIES.get(reason, "go and see").format(name=name)
-
-
-def has_regeneration(site: Site) -> bool:
-    """Whether rights can be made anew: only of a car park is it known whose each right is, and what stands where."""
-    return isinstance(site, CarPark)
-
-
 def halted_words(park: Park, word: Halted) -> str:
     """Why a machine stands, who brought it about, and what to do where a person is needed."""
     said = f"stands: {reason_words(word.reason)}"
     if word.cause:
         said += f" by {park.name(word.cause)}"
     if word.sender != word.machine:
-        said += f" (said by {park.name(word.sender)}; itself it is silent)"
-    then = remedy(park.site, word.reason, park.name(word.machine))
-    return said + (f"; needs a person: {then}" if word.needs_person else "; goes on by itself")
+        why = "itself it says that it goes" if word.reason is Reason.FALSE_STATEMENT else "itself it is silent"
+        said += f" (said by {park.name(word.sender)}; {why})"
+    what = remedy(park.site, word.reason, park.name(word.machine))
+    return said + (f"; needs a person: {what}" if word.needs_person else "; goes on by itself")
 
 
 def state_words(park: Park, node: int, now_us: int) -> str:

@@ -155,7 +155,7 @@ class SiteView:
             case Heartbeat():
                 self._on_heartbeat(message)
             case Progress():
-                self.positions[message.sender] = (Segment(message.track, message.index), message.offset_mm)
+                self._on_progress(message)
             case CarAt():
                 self._on_car(message)
             case CallForProposals():
@@ -171,10 +171,18 @@ class SiteView:
             case Waiting() | Blocked() | Clear() | ManualState() | Halted():
                 self._on_word(message, time_us)
 
+    def _on_progress(self, told: Progress) -> None:
+        here, word = (Segment(told.track, told.index), told.offset_mm), self.halts.get(told.sender)
+        if word is not None and word.reason is Reason.FALSE_STATEMENT and here != self.positions.get(told.sender):
+            # Said by others, because it stood: it moves.
+            del self.halts[told.sender]
+        self.positions[told.sender] = here
+
     def _on_heartbeat(self, beat: Heartbeat) -> None:
         self.states[beat.sender] = beat.state
-        if beat.state not in STILL:
-            self.halts.pop(beat.sender, None)
+        word = self.halts.get(beat.sender)
+        if word is not None and beat.state not in STILL and word.reason is not Reason.FALSE_STATEMENT:
+            del self.halts[beat.sender]
 
     def _on_word(self, message: Waiting | Blocked | Clear | ManualState | Halted, time_us: int) -> None:
         if isinstance(message, Halted):

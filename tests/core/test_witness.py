@@ -270,3 +270,28 @@ def test_a_disputed_grant_ends_with_its_givers_life() -> None:
     assert not alice.tokens.holds(KEY)
     alice.tokens.on_grant(given, START_US)
     assert alice.tokens.holds(KEY)
+
+
+def test_a_machine_of_the_site_stops_nobody_who_has_begun_long_ago() -> None:
+    alice = Machine(ALICE)
+    alice.knows(STEWARD, BOB)
+    alice.start()
+    for node in (STEWARD, BOB):
+        alice.hear(SyncDone(node, ALICE, 2), START_US + BEAT_US)
+    later_us = START_US + 10 * BEAT_US
+    alice.knows(STEWARD, BOB, at_us=later_us)
+    assert alice.tokens.is_synced
+    alice.hear(SyncRequest(BOB, ALICE, 7), later_us)
+    assert alice.witness.doubt is None, "it was there when I began, and has said nothing of that kind"
+    assert alice.tokens.is_synced
+
+
+def test_who_was_away_when_a_machine_began_still_tells_it_of_a_life_that_it_forgot() -> None:
+    alice = Machine(ALICE)
+    alice.knows(STEWARD)
+    alice.start()
+    alice.hear(SyncDone(STEWARD, ALICE, 2), START_US + BEAT_US)
+    later_us = START_US + 10 * BEAT_US
+    alice.hear(SyncRequest(BOB, ALICE, 7), later_us)
+    assert alice.witness.doubt is not None
+    assert alice.witness.doubt.cause == BOB

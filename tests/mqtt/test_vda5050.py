@@ -10,6 +10,7 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.core.codes import KindCode, MachineState, OperatorAction, Reason
 from onboard.core.messages import Blocked, EmergencyStop, Heartbeat, OperatorOrder, Progress, Reference, Waiting
+from onboard.core.recovery_messages import Halted
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.settings import GatewayError, GatewaySettings
 from tests.mqtt.logs import EPOCH_US, VERSIONS, content, published, record, validator
@@ -209,3 +210,32 @@ def test_what_cannot_be_a_topic_is_refused_in_one_line(settings: dict[str, str])
     with pytest.raises(GatewayError, match=r"^--") as caught:
         GatewaySettings(**settings)  # type: ignore[arg-type]  # options by name
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_machine_that_needs_a_person_is_told_as_such_with_what_to_do(version: str) -> None:
+    """``Halted`` in VDA 5050's words: FATAL where a person is needed, with a hint; gone once it works again."""
+    told = Told(version=version)
+    told.hear(beat(11, MachineState.WORKING), 1_000_000)
+    told.hear(Halted(1, 11, Reason.FALSE_STATEMENT, 0, True, 1), 1_200_000)
+    told.wait(3_000_000)
+    state = told.last("MR1", "state")
+    assert not list(validator(version, "state").iter_errors(state))
+    (error,) = state["errors"]
+    assert (error["errorType"], error["errorLevel"]) == ("machineHalted", "FATAL")
+    assert "MR1 stands: false statement; it needs a person" in error["errorDescription"]
+    assert "tow it" in error["errorHint"]
+    told.hear(Halted(11, 11, Reason.JOURNAL_SHORT, 0, True, 1), 3_100_000)
+    told.wait(4_000_000)
+    assert "onboard operate regenerate MR1" in told.last("MR1", "state")["errors"][0]["errorHint"]
+    told.hear(beat(11), 4_200_000)
+    told.wait(6_000_000)
+    assert told.last("MR1", "state")["errors"] == []
+
+
+def test_a_word_about_a_machine_that_acts_and_does_not_stand_is_no_error() -> None:
+    told = Told()
+    told.hear(beat(11), 1_000_000)
+    told.hear(Halted(12, 11, Reason.NODE_SILENT, 0, False, 1), 1_200_000)
+    told.wait(3_000_000)
+    assert told.last("MR1", "state")["errors"] == [], "others speak for silent machines only"

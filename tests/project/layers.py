@@ -17,6 +17,7 @@ CORE_TYPES = (
     "onboard.core.journal_state",
     "onboard.core.messages",
     "onboard.core.recovery_messages",
+    "onboard.core.remedies",
     "onboard.core.serial",
     "onboard.core.site",
 )

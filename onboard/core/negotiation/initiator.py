@@ -12,7 +12,7 @@ from enum import Enum
 
 from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Operation, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, TaskReport
+from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Reference, TaskReport
 from onboard.core.negotiation.bidding import beats, cut_off_us, is_below
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import CallTerms, Closed, NegotiationEvent
@@ -41,6 +41,11 @@ ACCEPT_WITHIN_US = 5_000_000
 def nobody_is(node: int) -> bool:
     """No machine is in the way."""
     return False
+
+
+def is_any_sound(task: Reference, bid: Bid) -> bool:
+    """Bids say nothing beyond their number that it could differ from."""
+    return True
 
 
 class State(Enum):
@@ -122,6 +127,10 @@ class Initiator:
     trust: Trust = field(default_factory=Trust)
     #: Whether a node's bids count for nothing, because it is in the way by its own word or by its silence.
     is_obstacle: Callable[[int], bool] = nobody_is
+    #: Whether a bid goes with what its bidder said right before it, where a system's bids say more than a number.
+    is_sound: Callable[[Reference, Bid], bool] = is_any_sound
+    #: Of a sub-call: whom the call leaves out for which it is asked.
+    left_out_above: frozenset[int] = frozenset()
     deadline_us: int | None = None
     hold_until_us: int = 0
     state: State = State.OPEN
@@ -170,7 +179,7 @@ class Initiator:
         )
         self.floor = None if terms.floor is None else terms.floor(self.call, now_us)
         last = self.attempt >= self.timing.max_attempts
-        self.left_out = self.trust.left_out(terms.task, now_us, last_attempt=last)
+        self.left_out = self.trust.left_out(terms.task, now_us, last_attempt=last) | self.left_out_above
         before = [*left_out_words(self.node_id, self.call.call, self.left_out), *self.terms.detail]
         return [*(Send(message) for message in before), Send(self.call)]
 
@@ -180,7 +189,8 @@ class Initiator:
         if self.state is not State.OPEN or now_us > cut_off_us(self.due_us, self.timing):
             self.counters.late_bids_ignored += 1
             return []
-        if bid.sender in self.left_out or self.is_obstacle(bid.sender) or self._is_below_floor(bid.cost):
+        no_account = bid.sender in self.left_out or self.is_obstacle(bid.sender) or self._is_below_floor(bid.cost)
+        if no_account or not self.is_sound(self.terms.task, bid):
             self.counters.bids_of_no_account += 1
             return []
         self.bids[bid.sender] = bid.cost

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from onboard.core.codes import NOBODY, KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect
@@ -9,7 +10,7 @@ from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, LeftO
 from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import Awarded, CallKey, CallTerms, Estimator, NegotiationEvent, PreAssigned
-from onboard.core.negotiation.initiator import Initiator, RestartPolicy, nobody_is
+from onboard.core.negotiation.initiator import Initiator, RestartPolicy, is_any_sound, nobody_is
 from onboard.core.negotiation.initiator import State as InitiatorState
 from onboard.core.negotiation.participant import Participant
 from onboard.core.negotiation.sub_calls import SubCalls
@@ -51,6 +52,8 @@ class Negotiation:
     trust: Trust = field(default_factory=Trust)
     #: Whether a node's bids count for nothing, by this machine's mirror.
     is_obstacle: Callable[[int], bool] = nobody_is
+    #: Whether a bid for a task goes with what its bidder said right before it; a kind sets it where its bids say more.
+    is_sound: Callable[[Reference, Bid], bool] = is_any_sound
     #: The newest word of each initiator about whom it leaves out: the call, and the nodes.
     _left_out: dict[int, tuple[int, frozenset[int]]] = field(default_factory=dict)
     _last_call: int = field(init=False)
@@ -70,6 +73,7 @@ class Negotiation:
             self.counters,
             self.trust,
             self.is_obstacle,
+            self.is_sound,
         )
         self.initiators.append(initiator)
         return [item for item in initiator.open(now_us) if not isinstance(item, NegotiationEvent)]
@@ -187,6 +191,7 @@ class Negotiation:
             outcome += one.supersede(now_us)
         self.participants.pop(key, None)
         outcome += self._make_room(now_us)
+        left_out = self._out_of(call)
         participant = Participant(
             self.node_id,
             call,
@@ -195,11 +200,12 @@ class Negotiation:
             self.counters,
             self.silent,
             deadline_us,
-            SubCalls(call, deadline_us, self.timing, self._open_sub_call),
+            SubCalls(call, deadline_us, self.timing, partial(self._open_sub_call, left_out)),
             self.delay,
             self.slot,
             self.is_obstacle,
-            self._out_of(call),
+            left_out,
+            self.is_sound,
         )
         self.participants[key] = participant
         return outcome + participant.open(now_us)
@@ -244,7 +250,7 @@ class Negotiation:
         return replace(self.timing, bid_delay_us=self.timing.bid_delay_us * window_us // self.timing.call_window_us)
 
     def _open_sub_call(
-        self, terms: CallTerms, deadline_us: int, hold_until_us: int, now_us: int
+        self, left_out: frozenset[int], terms: CallTerms, deadline_us: int, hold_until_us: int, now_us: int
     ) -> tuple[Initiator, Outcome]:
         initiator = Initiator(
             self.node_id,
@@ -254,6 +260,8 @@ class Negotiation:
             self._next_call,
             counters=self.counters,
             is_obstacle=self.is_obstacle,
+            is_sound=self.is_sound,
+            left_out_above=left_out,
             deadline_us=deadline_us,
             hold_until_us=hold_until_us,
         )

@@ -15,7 +15,7 @@ from enum import Enum
 
 from onboard.core.codes import CallResult, Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Bid, CallForProposals
+from onboard.core.messages import Award, Bid, CallForProposals, Reference
 from onboard.core.negotiation.bidding import (
     ANY_TIME,
     DelayRule,
@@ -39,7 +39,7 @@ from onboard.core.negotiation.events import (
     Proposal,
     Released,
 )
-from onboard.core.negotiation.initiator import nobody_is
+from onboard.core.negotiation.initiator import is_any_sound, nobody_is
 from onboard.core.negotiation.sub_calls import SubCalls
 from onboard.core.site import Timing
 
@@ -99,6 +99,7 @@ class Participant:
     #: Whose bids do not count: obstacles, by my mirror, and those that the initiator named.
     is_obstacle: Callable[[int], bool] = nobody_is
     left_out: frozenset[int] = frozenset()
+    is_sound: Callable[[Reference, Bid], bool] = is_any_sound
     state: State = State.WAITING_BOUND
     due_us: int | None = None
     heard_us: int = 0
@@ -156,7 +157,8 @@ class Participant:
         if now_us > self.cut_off_us:
             self.counters.late_bids_ignored += 1
             return []
-        if self.is_obstacle(bid.sender) or bid.sender in self.left_out or self._is_below_floor(bid.cost):
+        no_account = self.is_obstacle(bid.sender) or bid.sender in self.left_out or self._is_below_floor(bid.cost)
+        if no_account or not self.is_sound(self.call.task, bid):
             self.counters.bids_of_no_account += 1
             return []
         if self.best is None or beats(bid.cost, bid.sender, *self.best, self.call.criterion):

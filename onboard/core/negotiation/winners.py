@@ -47,6 +47,7 @@ class Winners:
     _tasks: dict[Reference, _Task] = field(default_factory=dict)
     #: The newest sign of work of each machine and since when it is so.
     _signs: dict[int, tuple[Hashable, int]] = field(default_factory=dict)
+    _kept: set[Reference] = field(default_factory=set)
 
     def takes(
         self,
@@ -97,9 +98,22 @@ class Winners:
         known = self._tasks.get(task)
         return known is not None and now_us >= self._stands_at_us(known)
 
+    def keeps(self, task: Reference) -> None:
+        """A winner that is lost keeps its task, as it is begun: only a person can help where it lives and stands."""
+        self._kept.add(task)
+
+    def stuck(self, now_us: int) -> list[int]:
+        """Machines that keep a task, live and stand, until something of them changes."""
+        self._kept = {task for task in self._kept if self.lost(task, now_us) is Reason.FALSE_STATEMENT}
+        return sorted({self._tasks[task].winner for task in self._kept if task in self._tasks})
+
     def take_back(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
         """Nobody has a task any more, and who had it is left out of its next calls; it may be called for anew."""
         known = self._tasks.pop(task, None)
+        unheard = self.negotiation.unheard(task, now_us)
+        if unheard and self.negotiation.trust.winner(task) is None:
+            # An option that was confirmed and not heard counts like any other award.
+            self.negotiation.trust.given(task, unheard, 0, Criterion.MONEY)
         said = self.negotiation.abandon(task, reason, now_us)
         effects: list[Effect] = [item for item in said if not isinstance(item, NegotiationEvent)]
         return effects if known is None or effects else [self._rejects(task, known.call, reason)]

@@ -33,6 +33,7 @@ class CarPark(Site):
     """A robotized car park (rows P30 to P33)."""
 
     system: ClassVar[str] = "car-park"
+    has_regeneration: ClassVar[bool] = True
 
     shuttle: Axis
     shuttle_reach_mm: int

@@ -57,6 +57,10 @@ class GoalManager(Counter[Order]):
     hearsay: Hearsay = field(default_factory=Hearsay)
     _half_told: dict[int, OrderFrom] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.fleet.negotiation.is_sound = self.hearsay.is_sound
+
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Orders at the counter; one that was heard before is only answered."""
         match message:

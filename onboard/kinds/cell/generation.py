@@ -10,7 +10,7 @@ from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine
 from onboard.kinds.cell.contracts import Arm, Contract, Goal, Move, filtered, moves
 from onboard.kinds.cell.geometry import Point, distance_m, shortest_way, way_length_m
-from onboard.kinds.cell.goal_frames import Hearsay, goal_messages, offer_messages
+from onboard.kinds.cell.goal_frames import Hearsay, cost_of_bid, goal_messages, offer_messages
 from onboard.kinds.cell.messages import MAX_PATH
 from onboard.kinds.cell.site import Cell
 
@@ -194,4 +194,4 @@ def _mm(cost: float) -> int:
 
 
 def _proposal(contract: Contract, parts: tuple[int, ...] = ()) -> Proposal:
-    return Proposal(round(1000 * contract.cost), None, (contract,), (), parts, offer_messages(contract))
+    return Proposal(cost_of_bid(contract.cost), None, (contract,), (), parts, offer_messages(contract))

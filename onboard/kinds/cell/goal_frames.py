@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from onboard.core.messages import CallForProposals, Message, Reference
+from onboard.core.messages import Bid, CallForProposals, Message, Reference
 from onboard.kinds.cell.contracts import Contract, Goal
 from onboard.kinds.cell.geometry import Point
 from onboard.kinds.cell.messages import (
@@ -118,6 +118,16 @@ class Hearsay:
         cost = from_halves(high.bits, low.bits)
         # Not a number, and infinite, are no costs either.
         return Offer(cost, nodes_of(nodes)) if 0 <= cost < float("inf") else None
+
+    def is_sound(self, task: Reference, bid: Bid) -> bool:
+        """Whether a bid is what its offer costs: one without its offer could not be a part of another's."""
+        offer = self.offer(bid.sender, task)
+        return offer is not None and bid.cost == cost_of_bid(offer.cost)
+
+
+def cost_of_bid(cost: float) -> int:
+    """An offer's cost as its bid tells it: thousandths of the paper's unit."""
+    return round(1000 * cost)
 
 
 def _take(table: dict[_Key, dict[type[Message], _Kind]], key: _Key, message: _Kind, begins: bool) -> None:

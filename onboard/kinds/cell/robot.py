@@ -89,6 +89,7 @@ class ArmRobot:
     def __post_init__(self) -> None:
         site = self.generation.site
         self.driver = Driver(self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
+        self.fleet.negotiation.is_sound = self.generation.hearsay.is_sound
         # Names of goals of an earlier life may still be about.
         self.generation.number = last_boot(self.fleet.entries) << 8
         for one in undertakings(self.fleet.entries).values():

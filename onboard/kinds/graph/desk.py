@@ -240,6 +240,8 @@ class OrderDesk:
             taken_back = Send(VisitList(self.fleet.node_id, order.task.number, order.robot, *five(())))
             return [taken_back, *self._set(order, Stage.REFUSED, now_us, None)]
         reason = self.fleet.winners.lost(order.task, now_us)
+        if reason is not Reason.NONE and order.is_begun:
+            self.fleet.winners.keeps(order.task)
         if reason is Reason.NONE or order.is_begun:
             return []
         return self.fleet.winners.take_back(order.task, reason, now_us) + self._set(order, Stage.HEARD, now_us, 0)

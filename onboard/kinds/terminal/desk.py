@@ -390,7 +390,10 @@ class Desk:
         """A task whose winner is lost goes to another, while its box is in my books and in nobody's plan."""
         reason = self.fleet.winners.lost(task, now_us)
         is_mine = self.fleet.tokens.holds(car_token(*self.site.box(transport.box)))
-        if reason is Reason.NONE or not is_mine or self.mirror.in_plans(transport.box) is not None:
+        if reason is Reason.NONE:
+            return []
+        if not is_mine or self.mirror.in_plans(transport.box) is not None:
+            self.fleet.winners.keeps(task)
             return []
         self._won_at_us.pop(task, None)
         self.calls.pop(task, None)

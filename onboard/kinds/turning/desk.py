@@ -8,7 +8,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import Reason, TaskPhase
 from onboard.core.effects import Effect, Record
-from onboard.core.messages import Message, Reference, TaskReport
+from onboard.core.messages import Bid, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.negotiation.winners import STANDS_AFTER_US
@@ -58,6 +58,13 @@ class OrderDesk(Counter[Order]):
     _prices: dict[tuple[int, Reference], int] = field(default_factory=dict)
     #: Orders of which their winner has told that it has begun.
     _begun: set[Reference] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.fleet.negotiation.is_sound = self._is_sound
+
+    def _is_sound(self, task: Reference, bid: Bid) -> bool:
+        return self._prices.get((bid.sender, task)) == bid.cost
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Orders at the counter; one that was heard before is only answered."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 
 from onboard.core.codes import ANY_STATION, Criterion, KindCode, Operation
-from onboard.core.messages import CallForProposals, Message, Reference
+from onboard.core.messages import Bid, CallForProposals, Message, Reference
 from onboard.core.negotiation import CallKey, CallTerms, Proposal
 from onboard.core.site import Machine, Site
 from onboard.kinds.turning.clamping import choose_clamping
@@ -38,6 +38,8 @@ class LatheGeneration:
     promised: dict[CallKey, Job] = field(default_factory=dict)
     known: set[Reference] = field(default_factory=set)
     _told: dict[Reference, Job] = field(default_factory=dict)
+    #: The sums of the newest bills of others.
+    _totals_ct: dict[tuple[int, Reference], int] = field(default_factory=dict)
 
     @property
     def lathe(self) -> Lathe:
@@ -45,13 +47,23 @@ class LatheGeneration:
         return self.site.lathes[self.machine.node_id]
 
     def hear(self, message: Message) -> None:
-        """Take up what an order is."""
+        """Take up what an order is, and what others would take for it."""
+        if isinstance(message, BillBar):
+            bill = (message.sender, Reference(message.manager, message.task))
+            self._totals_ct.pop(bill, None)
+            if len(self._totals_ct) >= MAX_KNOWN:
+                del self._totals_ct[next(iter(self._totals_ct))]
+            self._totals_ct[bill] = message.total_ct
         if isinstance(message, TurningOrder):
             task = Reference(message.sender, message.task)
             self._told.pop(task, None)
             if len(self._told) >= MAX_KNOWN:
                 del self._told[next(iter(self._told))]
             self._told[task] = job_of(message)
+
+    def is_sound(self, task: Reference, bid: Bid) -> bool:
+        """Whether a bid is the sum of its bill."""
+        return self._totals_ct.get((bid.sender, task)) == bid.cost
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """What the bar and its handling cost on the cheapest lathe; 0 where the order's frame was lost."""

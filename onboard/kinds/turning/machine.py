@@ -87,6 +87,7 @@ class LatheMachine:
     _told: tuple[Reference, int, LathePhase] | None = None
 
     def __post_init__(self) -> None:
+        self.fleet.negotiation.is_sound = self.generation.is_sound
         for entry in self.fleet.entries:
             self._replay(entry)
         self._engage()

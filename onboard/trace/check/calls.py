@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import NOBODY, CallResult, Criterion
-from onboard.core.messages import Award, Bid, CallForProposals, LeftOut, Progress
+from onboard.core.messages import Award, Bid, CallForProposals, LeftOut, Progress, Reference
 from onboard.core.recovery_messages import Halted
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
@@ -183,10 +183,16 @@ class BidsGoDown(_CallRule):
         self._places: dict[int, tuple[int, int, int]] = {}
         #: Since when a machine has not moved though it has won something.
         self._won_us: dict[int, int] = {}
+        #: Bids that do not go with what was said before them: initiator, call and bidder.
+        self._unsound: OrderedDict[tuple[int, int, int], None] = OrderedDict()
 
     def handlers(self) -> Handlers:
         """Beside calls, whose bids do not count."""
         return {**super().handlers(), LeftOut: self._on_left_out, Progress: self._on_progress}
+
+    def is_sound(self, bid: Bid, task: Reference) -> bool:
+        """Whether a bid goes with what its bidder said before it, where a system's bids say more than a number."""
+        return True
 
     def _on_left_out(self, event: Event[LeftOut]) -> None:
         word = event.message
@@ -206,11 +212,20 @@ class BidsGoDown(_CallRule):
         """Whether a bid counts: not of who is left out, nor of who has won something and stands."""
         since_us = self._won_us.get(node)
         stands = since_us is not None and now_us - since_us >= STANDS_US
-        return not stands and node not in self._left_out.get((seen.call.sender, seen.call.call), ())
+        own, above = (seen.call.sender, seen.call.call), (seen.call.parent.origin, seen.call.parent.number)
+        if stands or (*own, node) in self._unsound:
+            return False
+        # Whom a call leaves out, that is left out of what is asked for a bid in it.
+        return all(node not in self._left_out.get(call, ()) for call in (own, above))
 
     def judge_bid(self, event: Event[Bid], seen: CallSeen) -> None:
         """Not better than one heard before."""
         bid = event.message
+        if not self.is_sound(bid, seen.call.task):
+            self._unsound[bid.initiator, bid.call, bid.sender] = None
+            while len(self._unsound) > MOST_LEFT_OUT:
+                self._unsound.popitem(last=False)
+            return
         for time_us, node, cost in seen.bids:
             if (node, cost) == (bid.sender, bid.cost):
                 return

@@ -1,9 +1,10 @@
 """Rules of the manufacturing cell, from the frames alone: working areas, custody of parts, who may answer a goal."""
 
 from collections.abc import Callable
+from math import isfinite
 
 from onboard.core.messages import Bid, CallForProposals, Reference
-from onboard.kinds.cell.messages import ArmProgress, GoalPath, PartAt, nodes_of
+from onboard.kinds.cell.messages import ArmProgress, GoalPath, OfferHigh, OfferLow, PartAt, from_halves, nodes_of
 from onboard.kinds.cell.site import Area, Cell, Point
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding
@@ -101,6 +102,33 @@ class PredecessorsSilent(Rule):
             self.find(event, (bid.sender, bid.initiator), f"bids for goal {task.origin}.{task.number} of its own path")
 
 
+class OffersGoDown(BidsGoDown):
+    """As everywhere; a bid that is not what its offer costs does not count."""
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._high: dict[tuple[int, Reference], int] = {}
+        self._costs: dict[tuple[int, Reference], float] = {}
+
+    def handlers(self) -> Handlers:
+        """Offers too."""
+        return {**super().handlers(), OfferHigh: self._on_high, OfferLow: self._on_low}
+
+    def _on_high(self, event: Event[OfferHigh]) -> None:
+        word = event.message
+        self._high[word.sender, Reference(word.manager, word.goal)] = word.bits
+
+    def _on_low(self, event: Event[OfferLow]) -> None:
+        word = event.message
+        offer = word.sender, Reference(word.manager, word.goal)
+        self._costs[offer] = from_halves(self._high.get(offer, 0), word.bits)
+
+    def is_sound(self, bid: Bid, task: Reference) -> bool:
+        """Thousandths of the offer's cost; what is no finite number is none."""
+        cost = self._costs.get((bid.sender, task))
+        return cost is not None and isfinite(cost) and round(1000 * cost) == bid.cost
+
+
 def _shrunk(area: Area) -> Area:
     one, other = Point(area.x0_mm + ROUNDING_MM, area.y0_mm + ROUNDING_MM), ROUNDING_MM
     return Area(*one, area.x1_mm - other, area.y1_mm - other)
@@ -111,7 +139,7 @@ RULES: tuple[type[Rule], ...] = (
     OneHolder,
     CallsClosed,
     BidsInTime,
-    BidsGoDown,
+    OffersGoDown,
     InsideArea,
     PassedOn,
     PredecessorsSilent,

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Bid, CallForProposals, Reference, TaskReport
+from onboard.core.codes import CallResult, TaskPhase
+from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.kinds.turning.messages import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding
@@ -67,8 +67,28 @@ class BillsAddUp(Rule):
             self.find(event, (bid.sender,), f"bids {bid.cost} ct, its terms sum to {sum(terms.values())} ct")
 
 
+class BillsGoDown(BidsGoDown):
+    """As everywhere; a bid that is not the sum of its bill does not count."""
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._totals_ct: dict[tuple[int, Reference], int] = {}
+
+    def handlers(self) -> Handlers:
+        """Bills too."""
+        return {**super().handlers(), BillBar: self._on_bar}
+
+    def _on_bar(self, event: Event[BillBar]) -> None:
+        word = event.message
+        self._totals_ct[word.sender, Reference(word.manager, word.task)] = word.total_ct
+
+    def is_sound(self, bid: Bid, task: Reference) -> bool:
+        """The sum as it was told."""
+        return self._totals_ct.get((bid.sender, task)) == bid.cost
+
+
 class OneLathe(Rule):
-    """An order that a lathe has told to have is told by no other, until it was given back; its batch only grows."""
+    """An order that a lathe has told to have is told by no other, until it is given or taken back; its batch grows."""
 
     name = "one-lathe"
     title = "every order is on one lathe, and its batch only grows"
@@ -80,8 +100,13 @@ class OneLathe(Rule):
         self._made: dict[Reference, int] = {}
 
     def handlers(self) -> Handlers:
-        """Reports and progress."""
-        return {TaskReport: self._on_report, LatheProgress: self._on_progress}
+        """Reports, progress, and what the desk takes back."""
+        return {TaskReport: self._on_report, LatheProgress: self._on_progress, Award: self._on_award}
+
+    def _on_award(self, event: Event[Award]) -> None:
+        word = event.message
+        if word.result is CallResult.REJECTED and word.sender == word.task.origin:
+            self._owner.pop(word.task, None)
 
     def _on_report(self, event: Event[TaskReport]) -> None:
         word = event.message
@@ -106,4 +131,4 @@ class OneLathe(Rule):
 
 
 #: What a turning cell's log is judged by: the rules of every system that apply, and its own.
-RULES: tuple[type[Rule], ...] = (CallsClosed, BidsInTime, BidsGoDown, BillsAddUp, OneLathe)
+RULES: tuple[type[Rule], ...] = (CallsClosed, BidsInTime, BillsGoDown, BillsAddUp, OneLathe)

@@ -1,0 +1,129 @@
+"""A machine of any system but the car park that bids what nobody can beat, and does not do what it wins.
+
+It takes the node-ID of a machine of the site and, but for a liar, stands where that one stands.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from bus_sim.stranger import Stranger
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet, Plain
+from onboard.core.codes import KindCode, Reason, TaskPhase
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import CallForProposals, Message, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Answer, Awarded, Estimator, Needs, NegotiationEvent, Proposal
+from onboard.core.site import Machine, Site
+from onboard.kinds.registry import factory_for
+
+#: Machines that carry out orders, by system.
+WORKERS = {
+    "graph": KindCode.VEHICLE,
+    "terminal": KindCode.VEHICLE,
+    "cell": KindCode.ARM,
+    "turning": KindCode.LATHE,
+}
+
+
+@dataclass
+class _LeastBid:
+    """Bids the least that counts: for what it can do, or (``is_empty``) for everything."""
+
+    honest: Estimator
+    is_empty: bool
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """As all compute it."""
+        return self.honest.floor(call, now_us)
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """The least."""
+        can = self.is_empty or self.honest.lower_bound(call, now_us) is not None
+        return self.floor(call, now_us) if can else None
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+        """What it would do, for less than that takes; or nothing at all."""
+        honest, least = self.honest.estimate(call, now_us), self.floor(call, now_us)
+        if not self.is_empty:
+            return self._for_less(honest, least)
+        # Where a bid has to go with what is said before it, the true one is the best that it can say.
+        is_bound = isinstance(honest, Proposal) and honest.detail
+        return honest if is_bound else Proposal(least, None, (), ())
+
+    def _for_less(self, found: Proposal | Needs | None, least: int) -> Proposal | Needs | None:
+        if not isinstance(found, Needs):
+            # It tells nothing else than its number: with a bill that does not sum to it, it would convict itself.
+            return None if found is None else found._replace(cost=least, detail=())
+
+        def combine(answers: tuple[Answer, ...], now_us: int) -> Proposal | Needs | None:
+            return self._for_less(found.combine(answers, now_us), least)
+
+        return Needs(least, found.parts, combine)
+
+
+@dataclass
+class _Standing(Plain):
+    """It says that it has what it wins, unless it is ``silent``, and does nothing. ``picture`` hears what all hear."""
+
+    picture: Behaviour | None = None
+    silent: bool = False
+    _has: list[Effect] = field(default_factory=list)
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """A task is won: that is said where anything is."""
+        if self.silent or not isinstance(event, Awarded):
+            return []
+        call = event.call
+        accepts = Send(TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE))
+        self._has.append(accepts)
+        return [accepts]
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Only to know what calls are about."""
+        if self.picture is not None:
+            self.picture.hear(message, now_us)
+        return []
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """It stands there."""
+        return Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """What it has, whoever asks, and its rights."""
+        return [*self._has, *self.fleet.tokens.statements()]
+
+
+@dataclass
+class _Factory:
+    """Makes machines of one kind, one of which is the stranger."""
+
+    target: int
+    how: Stranger
+    honest: BehaviourFactory
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
+        """What it bids."""
+        honest = self.honest.estimator(site, machine, mirror)
+        is_strange = machine.node_id == self.target
+        return _LeastBid(honest, is_empty=self.how is not Stranger.LIAR) if is_strange else honest
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
+        """What it does."""
+        if not isinstance(estimator, _LeastBid):
+            return self.honest.behaviour(fleet, estimator)
+        honest = self.honest.behaviour(fleet, estimator.honest)
+        if self.how is Stranger.LIAR:
+            return honest
+        return _Standing(fleet, kind=honest.kind, picture=honest, silent=self.how is Stranger.SILENT)
+
+
+def factories_with(site: Site, target: int, how: Stranger) -> Callable[[Site, KindCode], BehaviourFactory]:
+    """For ``BusRun.factories``: node ``target`` is a stranger, all others are what they are."""
+    worker = WORKERS[site.system]
+    stranger = _Factory(target, how, factory_for(site, worker))
+
+    def choose(of: Site, kind: KindCode) -> BehaviourFactory:
+        return stranger if kind is worker else factory_for(of, kind)
+
+    return choose

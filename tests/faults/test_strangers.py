@@ -1,0 +1,28 @@
+"""A machine that bids and does nothing starves nobody, on any system that calls: served, or told why."""
+
+import pytest
+
+from bus_sim.campaign.strangers import StrangerPlan, play_pair
+from bus_sim.campaign.systems import patience_s, with_orders
+from bus_sim.cli import main
+from bus_sim.faults.scenario import Arrivals
+from bus_sim.sites import find_site
+from bus_sim.stranger import Stranger
+from bus_sim.systems.orders import Orders
+
+ORDERS = {"graph": Orders(3, 20.0), "terminal": Orders(2, 30.0), "cell": Orders(3, 20.0), "turning": Orders(2, 30.0)}
+
+
+@pytest.mark.parametrize("how", list(Stranger))
+@pytest.mark.parametrize("name", list(ORDERS))
+def test_orders_are_served_or_told_why_beside_a_stranger(name: str, how: Stranger) -> None:
+    site = find_site(name)
+    limit_s = patience_s(with_orders(site, ORDERS[name], 1))
+    pair = play_pair(StrangerPlan(name, how, Arrivals(1, 1.0, 0.0), limit_s, ORDERS[name]), 1)
+    assert pair.is_good, pair.line()
+    assert pair.strange.served, "not all of them refused"
+
+
+def test_a_site_without_calls_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["campaign", "mapd", "--stranger", "stands", "--seeds", "1-1"]) == 2
+    assert "use a car park or one of graph, terminal, cell, turning" in capsys.readouterr().err
