@@ -19,7 +19,7 @@ from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
 from onboard.core.holding import RIGHTS_LOST, Hold, Holding
 from onboard.core.holds import Holds, without_rights
-from onboard.core.journal_state import INTACT, JournalCondition, reason_of, still_counting
+from onboard.core.journal_state import INTACT, OLD, JournalCondition, reason_of, still_counting
 from onboard.core.messages import (
     Award,
     Bid,
@@ -41,7 +41,7 @@ from onboard.core.messages import (
     TokenHeld,
 )
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import EVENT_TYPES, Negotiation, NegotiationEvent, slot_of
+from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_of
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted, Regeneration
@@ -101,16 +101,9 @@ class Holon:
         self.is_acknowledged = True
         own = OwnNumber(machine.node_id, self.tokens, self.mirror)
         self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
-        estimator = factory.estimator(site, machine, self.mirror)
-        self.negotiation = Negotiation(
-            machine.node_id,
-            machine.kind,
-            site.timing,
-            estimator,
-            boot=boot,
-            slot=slot_of(site, machine.node_id),
-            is_obstacle=self.mirror.obstacles.machines.__contains__,
-        )
+        self._factory, estimator = factory, factory.estimator(site, machine, self.mirror)
+        is_obstacle = self.mirror.obstacles.machines.__contains__
+        self.negotiation = negotiation_of(site, machine, estimator, boot, is_obstacle)
         self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self._attentive = self.behaviour if isinstance(self.behaviour, Attentive) else None
@@ -168,15 +161,15 @@ class Holon:
         self.presence.begins(now_us)
         if self.journal.is_foreign:
             return [Report(self.journal.told), *self._beat(now_us)]
-        effects = self._first_entries() + self.behaviour.start(now_us) + self._beat(now_us)
+        effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self._beat(now_us)
         return self._settle(effects + self.witness.begin(now_us), now_us)
 
-    def _first_entries(self) -> list[Effect]:
+    def _first_entries(self, journal: JournalCondition) -> list[Effect]:
         """Of a short journal only that it was: another is begun, that stands for the hold until a person ends it."""
         boot: dict[str, str | int] = {"record": "boot", "boot": self.boot}
-        if self.journal.is_reliable:
+        if journal.is_reliable:
             return [Record(boot)]
-        return [Renew((*self.fleet.entries, boot, self.holding.record())), Report(self.journal.told)]
+        return [Renew((*self.fleet.entries, boot, self.holding.record())), Report(journal.told)]
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
@@ -435,7 +428,7 @@ class Holon:
     def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
         if self.witness.doubt is not None:
-            effects = effects + self._doubts(self.witness.doubt)
+            effects = effects + self._doubts(now_us)
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
         for _ in range(MAX_ROUNDS if self.part.begins else 0):
@@ -450,12 +443,21 @@ class Holon:
         is_mute = self.fleet.has_no_rights and not self.regeneration.is_frozen
         return without_rights(effects) if is_mute else effects
 
-    def _doubts(self, doubt: Doubt) -> list[Effect]:
-        """Somebody knows that the journal is old: nothing of it is used any more."""
-        if self.holding.why.reason in RIGHTS_LOST:
+    def _doubts(self, now_us: int) -> list[Effect]:
+        """Somebody knows that the journal is old: nothing of it is used any more, as if it were short."""
+        doubt = self.witness.doubt
+        if doubt is None or self.holding.why.reason in RIGHTS_LOST:
             return []
         self.fleet.has_no_rights = True
-        return [Report(doubt.text), *self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), 0)]
+        held = self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), now_us)
+        return [*(self._forget(now_us) if self._has_past else []), Report(doubt.text), *held]
+
+    def _forget(self, now_us: int) -> list[Effect]:
+        """What the behaviour took up from an old journal may be long over: it begins anew, and so does the journal."""
+        self.fleet.entries = still_counting(OLD, self.fleet.entries)
+        self.negotiation.estimator = estimator = self._factory.estimator(self.site, self.machine, self.mirror)
+        self.behaviour = self._factory.behaviour(self.fleet, estimator)
+        return [*self._first_entries(OLD), *self.behaviour.start(now_us)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
         effects: list[Effect] = []

@@ -61,6 +61,8 @@ class JournalCondition:
 
 #: Nothing to tell.
 INTACT = JournalCondition()
+#: Found by others to be an old copy of itself.
+OLD = JournalCondition(JournalState.SHORT, None, 0, "others know that this journal is old")
 
 
 def reason_of(condition: JournalCondition) -> Reason:

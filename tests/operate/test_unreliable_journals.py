@@ -128,3 +128,19 @@ def test_who_was_told_that_its_journal_is_old_vouches_for_nothing_any_more() -> 
     said = {type(one) for one in said_by(scene, node, at_us / 1e6)}
     assert SyncDone in said, "who asks is answered, and has not to wait"
     assert said <= {Heartbeat, Halted, BusTime, SyncRequest, SyncDone, TokenSeen, Diagnostic}
+
+
+@pytest.mark.parametrize(
+    ("name", "at_s", "body", "entries", "again"),
+    [("IOC1", 190, "", 10, False), ("IOC1", 190, "", 40, True), ("MR1", 50, ",body=p(1;5)", 10, True)],
+)
+def test_an_old_journal_is_forgotten_before_its_rights_are_made_anew(
+    name: str, at_s: int, body: str, entries: int, again: bool
+) -> None:
+    """What it said of tasks and cars was gone on with, and nobody was served any more."""
+    faults = [f"crash:target={name},at_s={at_s},restart_s=5,journal=rolled_back,entries={entries}"]
+    faults += [f"crash:target={name},at_s={at_s + 15},restart_s=5"] if again else []
+    scene = played(*faults, f"operate:do=regenerate,at_s={at_s + 30},target={name}{body}")
+    assert_safe(scene)
+    assert scene.first(Halted, lambda one: one.sender == one.machine)[1].reason is Reason.JOURNAL_SHORT
+    assert served(scene) == 3 and f"{name} is in epoch 1" in told(scene)

@@ -27,7 +27,7 @@ from onboard.core.negotiation.events import (
     Released,
 )
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy, RestartStep
-from onboard.core.negotiation.negotiation import Negotiation
+from onboard.core.negotiation.negotiation import Negotiation, negotiation_of
 from onboard.core.negotiation.participant import Participant
 
 __all__ = [
@@ -57,5 +57,6 @@ __all__ = [
     "cut_off_us",
     "delay_us",
     "last_bid_us",
+    "negotiation_of",
     "slot_of",
 ]

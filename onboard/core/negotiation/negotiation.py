@@ -7,7 +7,7 @@ from functools import partial
 from onboard.core.codes import NOBODY, KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, LeftOut, Message, Reference, TaskReport
-from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us
+from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us, slot_of
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import Awarded, CallKey, CallTerms, Estimator, NegotiationEvent, PreAssigned
 from onboard.core.negotiation.initiator import Initiator, RestartPolicy, is_any_sound, nobody_is
@@ -16,7 +16,7 @@ from onboard.core.negotiation.participant import Participant
 from onboard.core.negotiation.sub_calls import SubCalls
 from onboard.core.negotiation.trust import Trust
 from onboard.core.serial import from_bus_ms, is_newer, successor
-from onboard.core.site import Timing
+from onboard.core.site import Machine, Site, Timing
 
 #: A participation that is over, or in which this machine never bid, is forgotten this long after its deadline: frames
 #: that wait in a queue longer than that are too late by the call's own deadline.
@@ -313,3 +313,13 @@ def _is_for_same_task(one: CallForProposals, other: CallForProposals) -> bool:
 
 def _thing(call: CallForProposals) -> tuple[object, ...]:
     return call.sender, call.task, call.operation, call.depth, call.part, call.parent.origin
+
+
+def negotiation_of(
+    site: Site, machine: Machine, estimator: Estimator, boot: int, is_obstacle: Callable[[int], bool]
+) -> Negotiation:
+    """That of a machine of a site, in its slot."""
+    slot = slot_of(site, machine.node_id)
+    return Negotiation(
+        machine.node_id, machine.kind, site.timing, estimator, boot=boot, slot=slot, is_obstacle=is_obstacle
+    )
