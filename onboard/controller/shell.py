@@ -6,8 +6,9 @@ effects are carried out one after the other, so nothing is said before what must
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
+from typing import ParamSpec
 
 from onboard.controller.rest import Rest
 from onboard.core.codes import MachineState, Reason
@@ -20,6 +21,8 @@ from onboard.ports.telemetry import Telemetry
 from onboard.ports.watchdog import Watchdog
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
+
+_Given = ParamSpec("_Given")
 
 #: Most frames that wait for one machine; beyond that the oldest bus in the world is too fast for it.
 INBOX_LIMIT = 4096
@@ -125,7 +128,7 @@ class Controller:
 
     def _post(self, handle: Callable[[Frame, int], list[Effect]], frame: Frame, time_us: int) -> None:
         if self._writing is None and not self._inbox:
-            self._guarded(lambda: self._outbox.extend(handle(frame, time_us)))
+            self._guarded(handle, frame, time_us)
             # Where nothing is to be said and nothing can have fallen due, all is as it was when this was done last.
             if self._outbox or not self.holon.is_due_known:
                 self._carry_out()
@@ -152,7 +155,7 @@ class Controller:
         self.holon.is_acknowledged = self._is_acknowledged()
         now_us = self._now_us()
         self.rest.woke(now_us)
-        self._guarded(lambda: self._outbox.extend(self.holon.wake(now_us)))
+        self._guarded(self.holon.wake, now_us)
         if not self.rest.is_in_doubt:
             self.ports.watchdog.alive()
         self._carry_out()
@@ -168,17 +171,18 @@ class Controller:
 
     # --- effects out -------------------------------------------------------------------------------------------
 
-    def _guarded(self, action: Callable[[], object]) -> None:
-        """A decision that raises has broken an invariant of ours: the machine stops and says why."""
+    def _guarded(self, decide: Callable[_Given, Iterable[Effect]], *given: _Given.args, **named: _Given.kwargs) -> None:
+        """A decision waits to be carried out; one that raises broke an invariant: the machine stops and says why."""
         try:
-            action()
+            self._outbox.extend(decide(*given, **named))
         except Exception as error:  # noqa: BLE001  # whatever it is, going on with a broken belief would be worse
             self._outbox.clear()
             self._halt(f"{type(error).__name__}: {error}", Reason.INVARIANT_BROKEN)
 
     def _carry_out(self) -> None:
         """Carry out effects and waiting events in order, as far as no journal write stands in between."""
-        self._guarded(self._work_off)
+        if self._outbox or self._inbox:
+            self._guarded(self._work_off)
         if self._writing is None and self._may_compact():
             self._writing = self._loop.create_task(self._compact())
         if self._writing is None:
@@ -190,7 +194,8 @@ class Controller:
             return False
         return self.holon.halted is None and self.holon.behaviour.state is MachineState.IDLE
 
-    def _work_off(self) -> None:
+    def _work_off(self) -> tuple[()]:
+        """Until a journal write begins or nothing is left; whatever is decided on the way is carried out as well."""
         while self._writing is None:
             if self._outbox:
                 self._perform(self._outbox.popleft())
@@ -199,6 +204,7 @@ class Controller:
                 self._outbox.extend(handle(frame, time_us))
             else:
                 break
+        return ()
 
     def _perform(self, effect: Effect) -> None:
         match effect:

@@ -50,7 +50,7 @@ from onboard.core.rights import Rights
 from onboard.core.site import Machine, Site
 from onboard.core.taking_part import TakingPart
 from onboard.core.timekeeper import Heard, Timekeeper
-from onboard.core.witness import Witness
+from onboard.core.witness import Doubt, Witness
 
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
@@ -433,7 +433,8 @@ class Holon:
 
     def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
         """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
-        effects = effects + self._doubts()
+        if self.witness.doubt is not None:
+            effects = effects + self._doubts(self.witness.doubt)
         if self.halted is not None:
             return [effect for effect in effects if isinstance(effect, Report | Halt)]
         for _ in range(MAX_ROUNDS if self.part.begins else 0):
@@ -447,10 +448,9 @@ class Holon:
         self.holds.own.note(effects)
         return effects
 
-    def _doubts(self) -> list[Effect]:
+    def _doubts(self, doubt: Doubt) -> list[Effect]:
         """Somebody knows that the journal is old: nothing of it is used any more."""
-        doubt = self.witness.doubt
-        if doubt is None or self.holding.why.reason in RIGHTS_LOST:
+        if self.holding.why.reason in RIGHTS_LOST:
             return []
         self.fleet.has_no_rights = True
         return [Report(doubt.text), *self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), 0)]

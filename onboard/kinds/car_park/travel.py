@@ -70,7 +70,7 @@ class Carriage:
     @property
     def axis(self) -> TrackAxis:
         """The alley that the carrier is on, or the spur that it is in, turns into or comes out of."""
-        return self._axis_of(self.track)
+        return self._axes.get(self.track) or self._axis_of(self.track)
 
     def _axis_of(self, track: int) -> TrackAxis:
         axis = self._axes.get(track)
