@@ -76,9 +76,7 @@ class Holon:
         self.site = site
         #: How the journal was found; its ``entries`` are all that there ever were only where it is reliable.
         self.journal = journal
-        self.machine = machine
-        self.node_id = machine.node_id
-        self.boot = boot
+        self.machine, self.node_id, self.boot = machine, machine.node_id, boot
         self.halted: str | None = None
         #: Input dropped here, and below by the shell's decoders and queues, by reason; they are asked for when told.
         self.drops: Counter[Reason] = Counter()
@@ -128,11 +126,7 @@ class Holon:
         self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
             **self.rights.handlers(),
             **self.regeneration.handlers(),
-            CallForProposals: self._negotiate,
-            Bid: self._negotiate,
-            Award: self._negotiate,
-            TaskReport: self._negotiate,
-            LeftOut: self._negotiate,
+            **dict.fromkeys((CallForProposals, Bid, Award, TaskReport, LeftOut), self._negotiate),
             Itinerary: self._on_itinerary,
             Progress: self._on_progress,
             CarAt: self._on_car,
@@ -141,8 +135,7 @@ class Holon:
             EmergencyStop: self.holds.on_stop,
             Go: self.holds.on_go,
             Halted: self.holds.on_halted,
-            Blocked: self.blocked_words.hear,
-            Clear: self.blocked_words.hear,
+            **dict.fromkeys((Blocked, Clear), self.blocked_words.hear),
         }
 
     # --- events in ---------------------------------------------------------------------------------------------
@@ -331,21 +324,13 @@ class Holon:
     # --- handlers ----------------------------------------------------------------------------------------------
 
     def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
-        if isinstance(message, CallForProposals) and (why := self._may_not_bid(now_us)) is not Reason.NONE:
+        if (
+            isinstance(message, CallForProposals)
+            and (why := self.part.why_no_bid(self.behaviour.state, now_us)) is not Reason.NONE
+        ):
             self.drops[why] += 1
             return []
         return self._carry_out(self.negotiation.receive(message, now_us), now_us)
-
-    def _may_not_bid(self, now_us: int) -> Reason:
-        if self.clock.is_lost(self.clock.local_us(now_us)):
-            return Reason.BUS_TIME_LOST
-        if not self.part.begins or self.behaviour.state in (
-            MachineState.OBSTACLE,
-            MachineState.STOPPED,
-            MachineState.STARTING,
-        ):
-            return Reason.POSITION_UNKNOWN
-        return Reason.NONE
 
     def _on_itinerary(self, itinerary: Itinerary, now_us: int) -> list[Effect]:
         self.mirror.on_itinerary(itinerary, now_us)
@@ -456,7 +441,8 @@ class Holon:
         """What the behaviour took up from an old journal may be long over: it begins anew, and so does the journal."""
         self.fleet.entries = still_counting(OLD, self.fleet.entries)
         self.negotiation.estimator = estimator = self._factory.estimator(self.site, self.machine, self.mirror)
-        self.behaviour = self._factory.behaviour(self.fleet, estimator)
+        self.behaviour = behaviour = self._factory.behaviour(self.fleet, estimator)
+        self._attentive = behaviour if isinstance(behaviour, Attentive) else None
         return [*self._first_entries(OLD), *self.behaviour.start(now_us)]
 
     def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:

@@ -2,13 +2,16 @@
 
 from dataclasses import dataclass
 
-from onboard.core.codes import Reason
+from onboard.core.codes import MachineState, Reason
 from onboard.core.holding import Holding
 from onboard.core.messages import Heartbeat
 from onboard.core.presence import Presence
 from onboard.core.regeneration import Regenerating
 from onboard.core.timekeeper import Timekeeper
 from onboard.core.witness import Witness
+
+#: States of machines that do not bid.
+_NO_BIDDERS = (MachineState.OBSTACLE, MachineState.STOPPED, MachineState.STARTING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +38,12 @@ class TakingPart:
     def begins(self) -> bool:
         """Whether this machine may begin anything: whoever was started again waits until all have answered."""
         return not (self.is_still or self.witness.is_waiting)
+
+    def why_no_bid(self, state: MachineState, now_us: int) -> Reason:
+        """Why this machine, whose behaviour is in ``state``, does not answer a call; NONE where it does."""
+        if self.time.clock.is_lost(self.time.clock.local_us(now_us)):
+            return Reason.BUS_TIME_LOST
+        return Reason.NONE if self.begins and state not in _NO_BIDDERS else Reason.POSITION_UNKNOWN
 
     def lives_on(self, beat: Heartbeat, now_us: int) -> bool:
         """Take up a heartbeat that says nothing new to any part of this machine: it falls due as it did before.
