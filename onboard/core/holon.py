@@ -324,10 +324,8 @@ class Holon:
     # --- handlers ----------------------------------------------------------------------------------------------
 
     def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
-        if (
-            isinstance(message, CallForProposals)
-            and (why := self.part.why_no_bid(self.behaviour.state, now_us)) is not Reason.NONE
-        ):
+        why = self.part.why_no_bid(self.behaviour.state, now_us)
+        if why is not Reason.NONE and isinstance(message, CallForProposals):
             self.drops[why] += 1
             return []
         return self._carry_out(self.negotiation.receive(message, now_us), now_us)
