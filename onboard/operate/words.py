@@ -1,7 +1,7 @@
 """States and reasons in words for a person, with what to do where something is to be done."""
 
 from onboard.core.codes import MachineState, Reason
-from onboard.core.holding import RIGHTS_LOST
+from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Site
 from onboard.kinds.car_park.site import CarPark
