@@ -23,10 +23,6 @@ QUIET_BEATS = 3
 TWIN_BEATS = 600
 #: Without a frame of anybody for so many heartbeat periods I hear nothing, and silence proves nothing. Ours.
 DEAF_BEATS = 2
-
-
-#: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
-RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
 #: Holds for a person in which nothing is taken in: it could not be written down, or somebody else says it as well.
 _APART = (Reason.DUPLICATE_NODE_ID, Reason.JOURNAL_FOREIGN)
 

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from onboard.core.codes import Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.holding import RIGHTS_LOST, Hold, Holding, Outcome
+from onboard.core.holding import Hold, Holding, Outcome
+from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.messages import (
     Award,
     Bid,

@@ -17,9 +17,9 @@ from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
-from onboard.core.holding import RIGHTS_LOST, Hold, Holding
+from onboard.core.holding import Hold, Holding
 from onboard.core.holds import Holds, without_rights
-from onboard.core.journal_state import INTACT, OLD, JournalCondition, reason_of, still_counting
+from onboard.core.journal_state import INTACT, OLD, RIGHTS_LOST, JournalCondition, reason_of, still_counting
 from onboard.core.messages import (
     Award,
     Bid,

@@ -6,6 +6,8 @@ from enum import Enum
 
 from onboard.core.codes import Reason
 
+#: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
+RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
 #: Of a short journal these records still mean something: which lives there were, and what a person has decided. What
 #: it says of rights, tasks and places may be long over: nobody knows how much is missing.
 _STILL_COUNTS = frozenset({"boot", "epoch", "manual", "blocked", "clear"})

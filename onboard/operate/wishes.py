@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason
-from onboard.core.holding import RIGHTS_LOST
+from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.remedies import START_ANEW, remedy
 from onboard.core.site import Machine, Site
 from onboard.operate.assignment import Body

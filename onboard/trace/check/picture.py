@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from onboard.core.codes import STILL, KindCode, MachineState, ManualMode
-from onboard.core.holding import RIGHTS_LOST
+from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.messages import BusTime, Heartbeat, ManualState, Message, Progress, TokenGrant, TokenHeld
 from onboard.core.recovery_messages import Halted, Regeneration, TokenAssigned
 from onboard.core.serial import from_bus_ms
