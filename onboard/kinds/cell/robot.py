@@ -337,6 +337,7 @@ class ArmRobot:
                 # The controller stopped between putting the part down and saying so.
                 effects += self._achieve(one)
             if one.stage is not Stage.PUT or not one.successor:
+                self._ask_at_us.pop(task, None)
                 continue
             due_us = self._ask_at_us.setdefault(task, now_us + ASK_AGAIN_US)
             if due_us <= now_us:
