@@ -1,5 +1,7 @@
 """A machine that bids and does nothing starves nobody, on any system that calls: served, or told why."""
 
+from pathlib import Path
+
 import pytest
 
 from bus_sim.campaign.strangers import StrangerPlan, play_pair
@@ -9,6 +11,7 @@ from bus_sim.faults.scenario import Arrivals
 from bus_sim.sites import find_site
 from bus_sim.stranger import Stranger
 from bus_sim.systems.orders import Orders
+from tests.mapd.sites import site_text
 
 ORDERS = {"graph": Orders(3, 20.0), "terminal": Orders(2, 30.0), "cell": Orders(3, 20.0), "turning": Orders(2, 30.0)}
 
@@ -23,6 +26,8 @@ def test_orders_are_served_or_told_why_beside_a_stranger(name: str, how: Strange
     assert pair.strange.served, "not all of them refused"
 
 
-def test_a_site_without_calls_says_so(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["campaign", "mapd", "--stranger", "stands", "--seeds", "1-1"]) == 2
+def test_a_site_without_calls_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "made.toml"
+    path.write_text(site_text(2, [(0, "1,2", "3,5")]), encoding="utf-8")
+    assert main(["campaign", str(path), "--stranger", "stands", "--seeds", "1-1"]) == 2
     assert "use a car park or one of graph, terminal, cell, turning" in capsys.readouterr().err

@@ -48,6 +48,7 @@ class Winners:
     #: The newest sign of work of each machine and since when it is so.
     _signs: dict[int, tuple[Hashable, int]] = field(default_factory=dict)
     _kept: set[Reference] = field(default_factory=set)
+    _blamed: dict[int, int] = field(default_factory=dict)
 
     def takes(
         self,
@@ -105,7 +106,22 @@ class Winners:
     def stuck(self, now_us: int) -> list[int]:
         """Machines that keep a task, live and stand, until something of them changes."""
         self._kept = {task for task in self._kept if self.lost(task, now_us) is Reason.FALSE_STATEMENT}
-        return sorted({self._tasks[task].winner for task in self._kept if task in self._tasks})
+        self._blamed = {
+            node: since_us for node, since_us in self._blamed.items() if self._worked_us(node, since_us) <= since_us
+        }
+        live = self._blamed.keys() - self.obstacles.keys()
+        return sorted({self._tasks[task].winner for task in self._kept if task in self._tasks} | live)
+
+    def blame(self, task: Reference, now_us: int) -> None:
+        """Whoever lost a task that others have begun for it leaves them with it: told until it shows a sign of work."""
+        known = self._tasks.get(task)
+        node = known.winner if known is not None else self.negotiation.unheard(task, now_us)
+        if node:
+            self.blame_node(node, now_us)
+
+    def blame_node(self, node: int, now_us: int) -> None:
+        """All wait for it, and it shows no sign of work."""
+        self._blamed[node] = now_us
 
     def take_back(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
         """Nobody has a task any more, and who had it is left out of its next calls; it may be called for anew."""
@@ -135,5 +151,7 @@ class Winners:
         return Send(Award(self.node_id, call, NOBODY, task, 1, CallResult.REJECTED, reason))
 
     def _stands_at_us(self, known: _Task) -> int:
-        worked_us = self._signs.get(known.winner, (None, known.since_us))[1]
-        return max(worked_us, known.since_us) + known.stands_us
+        return max(self._worked_us(known.winner, known.since_us), known.since_us) + known.stands_us
+
+    def _worked_us(self, node: int, otherwise_us: int) -> int:
+        return self._signs.get(node, (None, otherwise_us))[1]

@@ -12,7 +12,7 @@ from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import Message, Reference, TaskReport
+from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.serial import to_bus_ms
@@ -73,6 +73,9 @@ class GoalManager(Counter[Order]):
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Offers, and main contractors' reports."""
         self.hearsay.hear(message)
+        if isinstance(message, CallForProposals):
+            # Who looks for somebody for the rest of a goal does all that it can.
+            self.fleet.winners.works(message.sender, message.call, now_us)
         if isinstance(message, ArmProgress):
             self.fleet.winners.works(message.sender, (message.x_mm, message.y_mm, message.arm_phase), now_us)
         return super().hear(message, now_us)

@@ -337,6 +337,7 @@ class ArmRobot:
                 # The controller stopped between putting the part down and saying so.
                 effects += self._achieve(one)
             if one.stage is not Stage.PUT or not one.successor:
+                self._ask_at_us.pop(task, None)
                 continue
             due_us = self._ask_at_us.setdefault(task, now_us + ASK_AGAIN_US)
             if due_us <= now_us:
@@ -346,14 +347,16 @@ class ArmRobot:
 
     def _take_back(self, one: Undertaking, now_us: int) -> list[Effect]:
         """A sub-contractor that is lost while its part is in my custody: the rest is called for anew, without it."""
-        if one.sub_goal is None or not one.successor or not self.fleet.tokens.holds(car_token(*one.sub_goal.part)):
+        if one.sub_goal is None or not self.fleet.tokens.holds(car_token(*one.sub_goal.part)):
             return []
         reason = self.fleet.winners.lost(one.sub_goal.task, now_us)
         # Before the part lies where it is to be taken it has nothing to do but to wait.
         if reason is Reason.NONE or (reason is Reason.FALSE_STATEMENT and one.stage is not Stage.PUT):
             return []
         one.successor, one.was_heard = 0, False
-        self._call_at_us[one.task] = now_us
+        self._call_at_us[one.task] = now_us + CALL_AGAIN_US
+        if one.stage is not Stage.WON:
+            self.fleet.winners.blame(one.sub_goal.task, now_us)
         return [*self.fleet.winners.take_back(one.sub_goal.task, reason, now_us), stage_record(one)]
 
     # --- custody -----------------------------------------------------------------------------------------------

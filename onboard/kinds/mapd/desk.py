@@ -12,6 +12,7 @@ from onboard.core.behaviour import Plain
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.messages import Message, SyncRequest
+from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.kinds.mapd.auction import Task
 from onboard.kinds.mapd.bidding import Tally
 from onboard.kinds.mapd.knowledge import Knowledge
@@ -55,6 +56,8 @@ class OrderDesk(Plain):
     _due_us: int = 0
     _changed: bool = True
     _told_us: int | None = None
+    #: Since when robots are missed at the step to which all have to come.
+    _missed_us: int | None = None
     _close_us: int | None = None
 
     def __post_init__(self) -> None:
@@ -73,10 +76,14 @@ class OrderDesk(Plain):
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Where robots are and what they carry, what they bid, and their paths: a right is given by those."""
         match message:
+            case TransportBid() if not self.knowledge.is_possible(message):
+                # Nobody is nearer than where it is.
+                self.fleet.drops[Reason.FALSE_STATEMENT] += 1
             case TransportBid() if message.sender in self.site.homes:
                 if self.tally is not None:
                     self.tally.hear(message)
             case StepState():
+                self.fleet.winners.works(message.sender, message.step, now_us)
                 return self._on_state(message)
             case PathHead():
                 self.knowledge.on_head(message)
@@ -102,9 +109,15 @@ class OrderDesk(Plain):
             return []
         missing = self.knowledge.behind(self.step)
         if missing:
+            self._missed_us = now_us if self._missed_us is None else self._missed_us
+            if now_us - self._missed_us >= STANDS_AFTER_US:
+                # All go in step: who comes to none stops the whole floor, and only a person can help.
+                for node in missing:
+                    self.fleet.winners.blame_node(node, now_us)
             self._due_us = now_us + ASK_US
             asked = dict.fromkeys([*self.knowledge.pathless(), *missing])
             return [Send(SyncRequest(self.fleet.node_id, node)) for node in list(asked)[:ASK_AT_ONCE]]
+        self._missed_us = None
         return self._open(now_us)
 
     def next_wake(self) -> int | None:

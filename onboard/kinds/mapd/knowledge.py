@@ -6,11 +6,14 @@ Made of frames alone, so that all have the same once all have heard all frames o
 from dataclasses import dataclass, field
 
 from onboard.core.serial import is_newer
-from onboard.kinds.mapd.auction import Task
+from onboard.kinds.mapd.auction import Rule, Task
 from onboard.kinds.mapd.floor import Floor
-from onboard.kinds.mapd.messages import NO_TASK, PathHead, PathMoves, StepState, TransportCall
+from onboard.kinds.mapd.messages import NO_TASK, PathHead, PathMoves, StepState, TransportBid, TransportCall
 from onboard.kinds.mapd.moves import Assembly
 from onboard.kinds.mapd.paths import Path, Paths
+
+#: The weights that all robots bid by, unless they are told others.
+PLAIN = Rule()
 
 
 @dataclass
@@ -59,6 +62,14 @@ class Knowledge:
         elif state.loaded:
             self.loads[state.sender] = state.task
         return True
+
+    def is_possible(self, bid: TransportBid, rule: Rule = PLAIN) -> bool:
+        """Whether a bid is no lower than the way from where its robot is; of what is not known yet any is."""
+        state, task = self.states.get(bid.sender), self.tasks.get(bid.task)
+        if state is None or task is None:
+            return True
+        empty, loaded = self.floor.steps_to(task.pickup)[state.cell], self.floor.steps_to(task.delivery)[task.pickup]
+        return bid.cost >= min(rule.wait, rule.empty) * empty + rule.loaded * loaded
 
     def task_of(self, robot: int) -> int:
         """The task that a robot has by its last word, ``NO_TASK`` for none."""

@@ -130,6 +130,8 @@ class UnitRobot(Plain):
             self.fleet.drops[Reason.NOT_AUTHORISED] += 1
             return []
         match message:
+            case TransportBid() if not self.knowledge.is_possible(message, self.rule):
+                self.fleet.drops[Reason.FALSE_STATEMENT] += 1
             case TransportBid() if message.sender in self.site.homes:
                 self._heard_bids.append(message)
                 if self._bids is not None:

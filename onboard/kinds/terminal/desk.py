@@ -387,12 +387,14 @@ class Desk:
         return []
 
     def _take_back(self, task: Reference, transport: Transport, now_us: int) -> list[Effect]:
-        """A task whose winner is lost goes to another, while its box is in my books and in nobody's plan."""
+        """A task whose winner is lost goes to another, while its box stands and is in nobody's plan.
+
+        Nobody gets the right to a box but who plans to carry it; who plans it later than another gives it back.
+        """
         reason = self.fleet.winners.lost(task, now_us)
-        is_mine = self.fleet.tokens.holds(car_token(*self.site.box(transport.box)))
         if reason is Reason.NONE:
             return []
-        if not is_mine or self.mirror.in_plans(transport.box) is not None:
+        if not self.mirror.station_of(transport.box) or self.mirror.in_plans(transport.box) is not None:
             self.fleet.winners.keeps(task)
             return []
         self._won_at_us.pop(task, None)
