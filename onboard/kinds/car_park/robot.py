@@ -392,9 +392,10 @@ class Robot:
         elif step.action is LegAction.RIDE:
             told = self.carriage.statement(self.program.version, self.program.current)
             return [ride_record(step), *told, *self.riding.begin(step.track, step.to_index)]
-        elif step.work is not None:
-            return self.shuttle.begin(step.work) + self._announce_start(step.work)
-        return []
+        else:
+            # A way that was given up while its rights were awaited is not gone when they come.
+            self.carriage.go(step.destination)
+        return [] if step.work is None else self.shuttle.begin(step.work) + self._announce_start(step.work)
 
     def _announce_start(self, work: Work) -> list[Effect]:
         if work.handling is Handling.LEAVE:

@@ -49,6 +49,8 @@ class Carriage:
     refresh_at_us: int | None = None
     blocked: Segment | None = None
     stopped: bool = False
+    #: Where the drive was sent, by the order's sequence, since the one that it goes by: whatever the goal is by now.
+    _sent: dict[int, Segment] = field(default_factory=dict)
     _reported: Segment | None = None
     _axes: dict[int, TrackAxis] = field(default_factory=dict)
     #: What ``advance`` looked at when it last found nothing to do.
@@ -130,6 +132,7 @@ class Carriage:
     def ride_to(self, floor: int) -> None:
         """The platform under the carrier has come to another floor: the same position on another alley."""
         self.track = floor
+        self._sent.clear()
         self.goal = None
         self.target = None
         self._reported = None
@@ -416,6 +419,7 @@ class Carriage:
 
     def _order(self, now_us: int) -> Effect:
         assert self.target is not None
+        self._sent[self.sequence] = self.target
         self.stall.ordered(now_us)
         self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
         site = self.fleet.site
@@ -432,7 +436,7 @@ class Carriage:
         here = self.occupied()
         tracks = self.fleet.site.tracks
         gates = [gate(slot.track) for slot in here if tracks[slot.track].kind is TrackKind.LIFT]
-        needed = {*here, *gates, *self.whole.slots}
+        needed = {*here, *gates, *self.whole.slots, *self._may_come_to()}
         if self.goal is not None and not self.arrived:
             needed.update(slot for slots in self.axis.rights(self._ahead()) for slot in slots)
         effects: list[Effect] = []
@@ -447,6 +451,24 @@ class Carriage:
                 effects += tokens.give(key, steward, now_us)
                 self.fleet.mirror.order.on_return(self.fleet.node_id, segment)
         return effects
+
+    def _may_come_to(self) -> set[Segment]:
+        """Slots up to where the drive may still be on its way, and those in which it brakes; none where it stands."""
+        state = self.sensed
+        if state is None or (state.mode is DriveMode.STANDING and state.sequence == self.sequence):
+            self._sent.clear()
+            return set()
+        while state.sequence in self._sent and next(iter(self._sent)) != state.sequence:
+            del self._sent[next(iter(self._sent))]
+        speed_mm_s, limits = state.speed_mm_s, self.fleet.site.carrier
+        braking_mm = speed_mm_s * abs(speed_mm_s) // (2 * limits.acceleration_mm_s2)
+        here, ends = self.axis.index_at(state.position_mm), [self.axis.index_at(state.position_mm + braking_mm)]
+        ends += [sent.index for sent in self._sent.values() if sent.track == self.track]
+        slots: set[Segment] = set()
+        for end in ends:
+            step = 1 if end >= here else -1
+            slots.update(*self.axis.rights(list(range(here, end + step, step))))
+        return slots
 
     def _held_segments(self) -> list[TokenKey]:
         tokens = self.fleet.tokens
