@@ -68,6 +68,8 @@ class Knowledge:
         state, task = self.states.get(bid.sender), self.tasks.get(bid.task)
         if state is None or task is None:
             return True
+        if state.cell >= self.floor.size:
+            return False
         empty, loaded = self.floor.steps_to(task.pickup)[state.cell], self.floor.steps_to(task.delivery)[task.pickup]
         return bid.cost >= min(rule.wait, rule.empty) * empty + rule.loaded * loaded
 
