@@ -3,9 +3,11 @@
 import hashlib
 import json
 import re
-from dataclasses import asdict, replace
+from collections.abc import Collection, Mapping
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 from onboard.config.constants import read_constants, read_timing
 from onboard.config.files import read_text, root_table
@@ -89,9 +91,28 @@ def _read_car_park(root: Table, common: Common, *, crowded: bool) -> Site:
 
 
 def site_digest(site: Site) -> int:
-    """1 to 65535, over everything in a site but the digest itself; docs/site-file.md says how to compute it."""
-    text = json.dumps(asdict(replace(site, digest=0)), sort_keys=True, separators=(",", ":"), default=_plain)
+    """1 to 65535, over what a site is and not what comes to it; docs/site-file.md says how to compute it."""
+    text = json.dumps(_meaning(site, {"digest", *site.demand}), sort_keys=True, separators=(",", ":"), default=_plain)
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:2], "big") or 1
+
+
+def _meaning(value: object, left_out: Collection[str] = ()) -> object:
+    """A value for JSON; dataclasses as dictionaries without the fields that have their defaults.
+
+    So a field that a later version adds does not make strangers of the sites that do not use it.
+    """
+    if is_dataclass(value):
+        own = ((one, getattr(value, one.name)) for one in fields(value) if one.name not in left_out)
+        return {one.name: _meaning(content) for one, content in own if content != _default(one)}
+    if isinstance(value, Mapping):
+        return {key: _meaning(content) for key, content in value.items()}
+    if isinstance(value, list | tuple):
+        return [_meaning(content) for content in value]
+    return value
+
+
+def _default(one: Field[Any]) -> object:
+    return one.default if one.default_factory is MISSING else one.default_factory()
 
 
 def _plain(value: object) -> object:

@@ -125,14 +125,18 @@ class Site:
     """Everything a machine knows beforehand, of any system. Built and checked by ``onboard.config``; frozen thereafter.
 
     ``stewards`` maps each track number to the node-ID of the fixed machine that holds its segments', places' and stored
-    cars' tokens at first. ``digest`` is 16 bits over the canonical content: two files that mean the same have the same.
-    A system whose machines do not move along tracks has none, nor what follows; it adds its own in a class of its own.
+    cars' tokens at first. ``digest`` is 16 bits over what the site is (docs/site-file.md): two files that mean the same
+    have the same. A system whose machines do not move along tracks has none, nor what follows; it adds its own in a
+    class of its own.
     """
 
     #: Which system this is, as the site file says it; it chooses the kinds' behaviours.
     system: ClassVar[str] = ""
     #: Whether rights can be made anew one by one: only where it is known whose each right is, and what stands where.
     has_regeneration: ClassVar[bool] = False
+    #: Names of the fields that say what comes to the site in a run of the simulator. No machine knows them, so they are
+    #: not in the digest.
+    demand: ClassVar[frozenset[str]] = frozenset()
 
     name: str
     digest: int

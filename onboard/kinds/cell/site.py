@@ -30,6 +30,7 @@ class Cell(Site):
     """A cell: its robots' areas and the known obstacles (row C01). ``wishes`` are what a run of it asks for."""
 
     system: ClassVar[str] = "cell"
+    demand: ClassVar[frozenset[str]] = frozenset({"wishes"})
 
     arms: dict[int, Arm]
     obstacles: tuple[Area, ...] = ()

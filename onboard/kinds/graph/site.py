@@ -37,6 +37,7 @@ class FactoryGraph(Site):
     """
 
     system: ClassVar[str] = "graph"
+    demand: ClassVar[frozenset[str]] = frozenset({"orders"})
 
     edges: tuple[tuple[int, int, int], ...]
     rules: Rules

@@ -33,6 +33,7 @@ class Mapd(Site):
     """
 
     system: ClassVar[str] = "mapd"
+    demand: ClassVar[frozenset[str]] = frozenset({"tasks"})
 
     rows: tuple[str, ...] = ()
     points: tuple[str, ...] = ()

@@ -109,6 +109,7 @@ class Terminal(Site):
     """
 
     system: ClassVar[str] = "terminal"
+    demand: ClassVar[frozenset[str]] = frozenset({"missions", "blockages", "presses"})
 
     entities: Mapping[int, Entity] = field(default_factory=dict)
     boxes: tuple[Box, ...] = ()

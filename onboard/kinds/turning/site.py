@@ -38,6 +38,7 @@ class Turning(Site):
     """A turning cell: its lathes, and the drawings and materials that orders name. A run asks for ``orders``."""
 
     system: ClassVar[str] = "turning"
+    demand: ClassVar[frozenset[str]] = frozenset({"orders"})
 
     lathes: dict[int, Lathe]
     drawings: dict[int, Drawing]
