@@ -54,8 +54,8 @@ class Controller:
         self.halted_for: Reason | None = None
         self._codecs = (fleet, device)
         holon.listen(fleet.speakers)
-        holon.wire_drops = self.wire_drops
         self._decoders = (Decoder(fleet), Decoder(device))
+        holon.wire_drops = (*(one.drops for one in self._decoders), self._queue_drops)
         self._inbox: deque[tuple[Callable[[Frame, int], list[Effect]], Frame, int]] = deque()
         self._outbox: deque[Effect] = deque()
         self._writing: asyncio.Task[None] | None = None
@@ -105,7 +105,7 @@ class Controller:
 
     def wire_drops(self) -> Counter[Reason]:
         """Frames of both buses that came to nothing below the holon, by reason."""
-        return self._decoders[0].drops + self._decoders[1].drops + self._queue_drops
+        return sum(self.holon.wire_drops, Counter())
 
     def note(self, reason: Reason) -> None:
         """Count what befell this controller outside its decisions; it is told with the drops."""

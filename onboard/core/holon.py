@@ -78,9 +78,9 @@ class Holon:
         self.journal = journal
         self.machine, self.node_id, self.boot = machine, machine.node_id, boot
         self.halted: str | None = None
-        #: Input dropped here, and below by the shell's decoders and queues, by reason; they are asked for when told.
+        #: Input dropped here, by reason, and the counts of the shell's decoders and queues below; summed when told.
         self.drops: Counter[Reason] = Counter()
-        self.wire_drops: Callable[[], Counter[Reason]] = Counter
+        self.wire_drops: tuple[Counter[Reason], ...] = ()
         self._told = ToldDrops()
         self.admission = Admission(site)
         self.tokens = TokenBook(site, machine.node_id)
@@ -458,7 +458,7 @@ class Holon:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
             effects += self.holds.words() + self.fleet.forgotten()
-            effects += self._told.words(self.node_id, self.drops + self.wire_drops())
+            effects += self._told.words(self.node_id, sum(self.wire_drops, self.drops))
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
             effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
         if self.time.due_us is not None and self.time.due_us <= now_us:

@@ -13,7 +13,7 @@ from onboard.core.compaction import Entry, Rules, compact
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.kinds.car_park.compartment_factory import CompartmentFactory
-from onboard.kinds.car_park.lift import LiftFactory
+from onboard.kinds.car_park.lift_factory import LiftFactory
 from onboard.kinds.car_park.records import RECORDS as CAR_PARK_RECORDS
 from onboard.kinds.car_park.robot import RobotFactory
 from onboard.kinds.car_park.site import CarPark

@@ -86,7 +86,7 @@ def test_the_table_counts_a_run_under_every_kind_that_it_had() -> None:
     results = [Result(1, good), Result(2, bad, scenario, ("x.toml",))]
     text = lines(results)
     row = next(line for line in text if line.startswith("burst")).split()
-    assert row == ["burst", "4", "1", *["."] * 9, "1"]
+    assert row == ["burst", "4", "1", *["."] * 10, "1"]
     assert any(line.startswith("2 runs, ") for line in text)
     assert "seed 2: VIOLATION: 5 s: two cars are in one place" in text
     assert to_json(Plan("small", "bus"), results)["verdicts"] == {"served": 1, "VIOLATION": 1}

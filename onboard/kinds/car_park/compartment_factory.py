@@ -1,5 +1,7 @@
 """What makes a compartment: its task-generation function, and its steps."""
 
+from dataclasses import dataclass
+
 from onboard.core.behaviour import Fleet
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
@@ -8,6 +10,7 @@ from onboard.kinds.car_park.bay_generation import BayGeneration
 from onboard.kinds.car_park.compartment import Compartment
 
 
+@dataclass(frozen=True)
 class CompartmentFactory:
     """Makes compartments."""
 

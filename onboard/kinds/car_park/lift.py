@@ -25,11 +25,9 @@ from onboard.core.messages import (
     Progress,
     TaskReport,
 )
-from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import MotionState, authorised
-from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
-from onboard.core.site import Machine, Site
 from onboard.core.stall import Stall
 from onboard.kinds.car_park.bay_memory import BayMemory
 from onboard.kinds.car_park.lift_generation import LiftGeneration
@@ -57,20 +55,6 @@ class Ride:
     board: int
     leave: int
     begin_us: int
-
-
-class LiftFactory:
-    """Makes lifts."""
-
-    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LiftGeneration:
-        """The lift's task-generation function."""
-        return LiftGeneration(site, machine, mirror)
-
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Lift":
-        """The lift's steps; ``estimator`` is the one made above."""
-        if not isinstance(estimator, LiftGeneration):
-            raise TypeError("a lift needs its own task-generation function")
-        return Lift(fleet, estimator)
 
 
 @dataclass

@@ -56,6 +56,7 @@ REPLAN_TOLERANCE_US = 500_000
 OVERDUE_US = 2_000_000
 
 
+@dataclass(frozen=True)
 class RobotFactory:
     """Makes mobile robots."""
 

@@ -33,6 +33,7 @@ class Order(CounterOrder):
     cost: float = field(default=0.0, kw_only=True)
 
 
+@dataclass(frozen=True)
 class DeskFactory:
     """Makes goal managers."""
 

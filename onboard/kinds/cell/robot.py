@@ -46,6 +46,7 @@ ASK_AGAIN_US = 20_000_000
 MAX_OVER = 32
 
 
+@dataclass(frozen=True)
 class ArmFactory:
     """Makes robots of a cell."""
 

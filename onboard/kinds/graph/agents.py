@@ -34,6 +34,7 @@ PROMISE_US = 3_000_000
 WAITING_US = 6_000_000
 
 
+@dataclass(frozen=True)
 class HostFactory:
     """Makes hosts of node agents."""
 

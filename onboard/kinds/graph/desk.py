@@ -96,6 +96,7 @@ class DeskOrder:
         return Record(entry | {"stage": self.stage.name})
 
 
+@dataclass(frozen=True)
 class DeskFactory:
     """Makes order desks."""
 

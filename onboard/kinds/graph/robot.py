@@ -47,6 +47,7 @@ REDEEM_US = 3_000_000
 TOLD_US = 2_000_000
 
 
+@dataclass(frozen=True)
 class RobotFactory:
     """Makes robots of a factory graph."""
 

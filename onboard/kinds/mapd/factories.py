@@ -1,5 +1,7 @@
 """What the machines of a pick-up and delivery site are made of."""
 
+from dataclasses import dataclass
+
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
@@ -9,6 +11,7 @@ from onboard.kinds.mapd.robot import UnitRobot
 from onboard.kinds.mapd.site import Mapd
 
 
+@dataclass(frozen=True)
 class _Factory:
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         """Nothing: tasks are auctioned all together, step by step; a call for one by itself finds nobody."""
@@ -17,6 +20,7 @@ class _Factory:
         return NoEstimator()
 
 
+@dataclass(frozen=True)
 class UnitRobotFactory(_Factory):
     """Makes robots."""
 
@@ -25,6 +29,7 @@ class UnitRobotFactory(_Factory):
         return UnitRobot(fleet)
 
 
+@dataclass(frozen=True)
 class OrderDeskFactory(_Factory):
     """Makes the desk."""
 

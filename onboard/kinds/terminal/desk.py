@@ -71,6 +71,7 @@ class DeskGeneration(NoEstimator):
         self.mirror = mirror
 
 
+@dataclass(frozen=True)
 class DeskFactory:
     """Makes desks."""
 

@@ -48,6 +48,7 @@ def terminal(site: Site) -> Terminal:
     return site
 
 
+@dataclass(frozen=True)
 class VehicleFactory:
     """Makes vehicles."""
 

@@ -34,6 +34,7 @@ class Order(CounterOrder):
     total_ct: int = field(default=0, kw_only=True)
 
 
+@dataclass(frozen=True)
 class DeskFactory:
     """Makes order desks."""
 

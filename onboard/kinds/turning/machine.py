@@ -54,6 +54,7 @@ class Undertaking:
     process: Process | None = None
 
 
+@dataclass(frozen=True)
 class LatheFactory:
     """Makes lathes."""
 

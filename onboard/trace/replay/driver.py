@@ -133,7 +133,7 @@ class Driver:
         holon.listen(codecs.fleet.speakers)
         self._codecs = codecs
         self._decoders = (Decoder(codecs.fleet), Decoder(codecs.device))
-        holon.wire_drops = lambda: self._decoders[0].drops + self._decoders[1].drops
+        holon.wire_drops = tuple(one.drops for one in self._decoders)
         self._origin_us = origin_us
         self._journal_us = journal_us
         self._inbox: deque[tuple[int, bool, Frame]] = deque()
