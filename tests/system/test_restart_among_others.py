@@ -59,3 +59,38 @@ def test_a_way_given_up_while_its_rights_were_awaited_is_not_gone_when_they_come
         ]
     places = {(one.track, one.index) for one in said if isinstance(one, Progress) and one.sender == MR2}
     assert places == {(3, 2)}
+
+
+#: Of `bus-sim campaign standard --seeds 1-2000 --faults two-crashes --cars 8 --apart 15`, seed 9.
+CUSTODIAN_WAS_OFF = """
+[scenario]
+site = "standard"
+seed = 9
+limit_s = 1200
+[demand]
+cars = 8
+mean_s = 15
+sigma_s = 7.5
+min_stay_s = 200
+[[fault]]
+kind = "crash"
+at_s = 271.378157
+target = "MR1"
+restart_s = 14.459
+write = 5
+durable = "yes"
+[[fault]]
+kind = "crash"
+at_s = 395.171374
+target = "IOC1"
+restart_s = 8.794
+write = 3
+durable = "yes"
+"""
+
+
+def test_who_keeps_a_car_and_was_off_when_another_called_for_it_learns_who_fetches_it(tmp_path: Path) -> None:
+    """It refused the car to the winner for ever: it knew neither the call nor the award."""
+    scenario = tmp_path / "custodian.toml"
+    scenario.write_text(CUSTODIAN_WAS_OFF, encoding="utf-8")
+    assert bus_sim(["run", "--scenario", str(scenario), "--trace", str(tmp_path / "run.log")]) == 0

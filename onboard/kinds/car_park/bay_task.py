@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.core.authority import TokenKey, car_token
 from onboard.core.codes import (
     CallResult,
     Criterion,
@@ -17,7 +18,7 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, BayState, CallForProposals, Reference, TaskReport
+from onboard.core.messages import Award, BayState, CallForProposals, Reference, TaskReport, TokenRefusal
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms
 from onboard.kinds.car_park.site import CarLimits
@@ -81,6 +82,13 @@ class BayTask:
             task_version=self.version,
             floor=floor,
         )
+
+    def is_unknown_to(self, refusal: TokenRefusal, mirror: Mirror) -> bool:
+        """Whether the car's custodian refuses it to the task's winner: it was off when the task was called, or won."""
+        record, wanted = mirror.cars.get(self.car), TokenKey(refusal.token_kind, refusal.token)
+        is_its_word = record is not None and record.custodian == refusal.sender and wanted == car_token(*self.car)
+        knows_not = refusal.requester == self.winner and refusal.reason is Reason.TOKEN_NOT_GRANTABLE_YET
+        return is_its_word and knows_not and self.call != 0
 
     def award(self, sender: int) -> Award:
         """The newest award, to be said again."""

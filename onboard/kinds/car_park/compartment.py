@@ -40,6 +40,7 @@ from onboard.core.messages import (
     OperatorOrder,
     Reference,
     TaskReport,
+    TokenRefusal,
     TokenRequest,
 )
 from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
@@ -143,9 +144,14 @@ class Compartment:
             return self._at_desk(DESK_INPUT[message.action], message.car, urgent=urgent)
         if isinstance(message, TaskReport):
             return self.stewardship.hear(message, now_us) + self._on_report(message, now_us)
-        if isinstance(message, TokenRequest) and self.job is not None:
+        job = self.job
+        if isinstance(message, TokenRequest) and job is not None:
             wanted = TokenKey(message.token_kind, message.token)
-            return self._remind(self.job, message.sender) if wanted == car_token(*self.job.car) else []
+            return self._remind(job, message.sender) if wanted == car_token(*job.car) else []
+        if isinstance(message, TokenRefusal) and job is not None and job.is_unknown_to(message, self.fleet.mirror):
+            job.reminders += 1
+            # Whoever has not heard the call does not know by the award which car it is about.
+            return [Send(job.award(self.fleet.node_id))] if job.reminders < REMINDERS else self._call_again(job, now_us)
         return self.stewardship.hear(message, now_us)
 
     def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
