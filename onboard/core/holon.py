@@ -458,7 +458,7 @@ class Holon:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
             effects += self.holds.words() + self.fleet.forgotten()
-            effects += self._told.words(self.node_id, sum(self.wire_drops, self.drops))
+            effects += self._told.words(self.node_id, sum(self.wire_drops, Counter(self.drops)))
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
             effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
         if self.time.due_us is not None and self.time.due_us <= now_us:

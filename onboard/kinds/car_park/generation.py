@@ -21,7 +21,7 @@ from onboard.core.reservations import FOREVER, Reservations
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Machine, Segment, Site, Station
-from onboard.kinds.car_park.program import MAX_STEPS, Handling, Program, Step, Work, to_itinerary
+from onboard.kinds.car_park.program import MAX_STEPS, STAMP_AHEAD_US, Handling, Program, Step, Work, to_itinerary
 from onboard.kinds.car_park.site import car_park
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens. Ours, measured in tests.
@@ -379,7 +379,9 @@ class CarParkGeneration:
         return _steps_of(route, works)
 
     def _deadline_us(self, call: CallForProposals, now_us: int) -> int:
-        return from_bus_ms(call.deadline_ms, now_us)
+        """When a call closes, or closed; now where that is read in a time that was not its caller's: work in hand."""
+        deadline_us = from_bus_ms(call.deadline_ms, now_us)
+        return deadline_us if deadline_us <= now_us + STAMP_AHEAD_US else now_us
 
 
 def _one_a_segment(places: list[Station]) -> list[Station]:
