@@ -233,6 +233,7 @@ class Holon:
         if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
+            self.fleet.winners.begin_anew(now_us)
             self._heartbeat_due_us = now_us
         if not self._bus_time_lost and self.part.begins:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)

@@ -43,6 +43,11 @@ def test_bids_of_machines_that_have_no_plans_to_tell_count_again_after_a_stop() 
     assert play("stop", replace(PLANS["graph"], orders=Orders(12, 17.0), limit_s=900.0), seed=11) == []
 
 
+def test_arms_that_were_held_in_the_middle_of_a_goal_go_on_with_it() -> None:
+    """The first that was let go took the rest of its goal from one still held, which kept its own successor waiting."""
+    assert play("stop", replace(PLANS["cell"], orders=Orders(6, 20.0)), seed=4) == []
+
+
 def test_a_floor_of_robots_in_step_gets_over_it(tmp_path: Path) -> None:
     site = tmp_path / "made.toml"
     site.write_text(site_text(4, drawn(6, seed=1)))

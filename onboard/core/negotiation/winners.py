@@ -72,6 +72,11 @@ class Winners:
         if known is None or known[0] != sign:
             self._signs[node] = sign, now_us
 
+    def begin_anew(self, now_us: int) -> None:
+        """I was held, or asleep: what others did not do meanwhile is no sign that they are lost."""
+        for known in self._tasks.values():
+            known.since_us = now_us
+
     def over(self, task: Reference) -> None:
         """Done, given back, or nobody's any more."""
         self._tasks.pop(task, None)
@@ -133,6 +138,11 @@ class Winners:
         said = self.negotiation.abandon(task, reason, now_us)
         effects: list[Effect] = [item for item in said if not isinstance(item, NegotiationEvent)]
         return effects if known is None or effects else [self._rejects(task, known.call, reason)]
+
+    def let_go(self, task: Reference) -> list[Effect]:
+        """Nobody needs a task any more: who has it hears so, and is none the worse for it."""
+        known = self._tasks.pop(task, None)
+        return [self._rejects(task, 0 if known is None else known.call, Reason.CANCELLED)]
 
     def remind(self, task: Reference, node: int) -> list[Effect]:
         """Who believes that it has a task which is another's hears the award again, or that nobody has it."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
@@ -245,7 +245,7 @@ class ArmRobot:
         self.fleet.tokens.forget(car_token(*one.contract.goal.part))
         effects: list[Effect] = [lost_record(one)]
         if one.sub_goal is not None and one.successor:
-            effects += self.fleet.winners.remind(one.sub_goal.task, NOBODY)
+            effects += self.fleet.winners.let_go(one.sub_goal.task)
         self._drop(one)
         return effects
 

@@ -91,3 +91,22 @@ def test_a_winner_that_keeps_a_task_and_stands_needs_a_person_until_it_moves() -
     assert desk.winners.stuck(STANDS_AFTER_US) == [ALICE]
     desk.winners.works(ALICE, "there", STANDS_AFTER_US)
     assert desk.winners.stuck(STANDS_AFTER_US + SECOND) == []
+
+
+def test_who_was_held_itself_counts_nobody_as_lost_by_that_time() -> None:
+    desk = Desk()
+    desk.winners.takes(TASK, ALICE, 0)
+    desk.obstacles[ALICE] = Obstacle(frozenset(), SECOND, Reason.EMERGENCY_STOP)
+    desk.winners.begin_anew(40 * SECOND)
+    assert desk.winners.lost(TASK, 40 * SECOND + LOST_AFTER_US - 1) is Reason.NONE
+    assert desk.winners.lost(TASK, 40 * SECOND + LOST_AFTER_US) is Reason.EMERGENCY_STOP
+
+
+def test_who_has_a_task_that_nobody_needs_any_more_hears_so_and_is_not_left_out() -> None:
+    desk = Desk()
+    call = desk.award(ALICE)
+    desk.winners.takes(TASK, ALICE, SECOND, call)
+    (word,) = said(desk.winners.let_go(TASK))
+    assert isinstance(word, Award)
+    assert (word.task, word.call, word.winner, word.result) == (TASK, call, NOBODY, CallResult.REJECTED)
+    assert not desk.negotiation.trust.left_out(TASK, SECOND, last_attempt=False)
