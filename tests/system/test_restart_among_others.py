@@ -94,3 +94,33 @@ def test_who_keeps_a_car_and_was_off_when_another_called_for_it_learns_who_fetch
     scenario = tmp_path / "custodian.toml"
     scenario.write_text(CUSTODIAN_WAS_OFF, encoding="utf-8")
     assert bus_sim(["run", "--scenario", str(scenario), "--trace", str(tmp_path / "run.log")]) == 0
+
+
+#: Of `bus-sim campaign small --exhaustive journal --scene overlap`, point 34,379.
+CALLED_BEFORE_ITS_TOKEN_CAME = """
+[scenario]
+site = "small"
+seed = 1
+limit_s = 1200
+[demand]
+cars = 3
+mean_s = 30
+sigma_s = 10
+min_stay_s = 60
+[[fault]]
+kind = "crash"
+target = "MR1"
+at_s = 0.0
+restart_s = 5.0
+write = 204
+durable = "yes"
+journal = "cut"
+entries = 39
+"""
+
+
+def test_who_has_won_a_car_before_its_keeper_has_it_may_fetch_it(tmp_path: Path) -> None:
+    """Its place was told at a restart, before it was handed over; its keeper forgot then who was to fetch it."""
+    scenario = tmp_path / "called.toml"
+    scenario.write_text(CALLED_BEFORE_ITS_TOKEN_CAME, encoding="utf-8")
+    assert bus_sim(["run", "--scenario", str(scenario), "--trace", str(tmp_path / "run.log")]) == 0

@@ -190,11 +190,20 @@ class Stewardship:
         ]
 
     def _before_taking(self, grant: TokenGrant) -> list[Effect] | None:
-        """A car's place goes to the journal before its token; whoever was to fetch it until now has done so."""
+        """A car's place goes to the journal before its token; who brings it has done what it had won.
+
+        Another may have won already to fetch it from there: where the car stands may be known before its token comes.
+        """
         effects = custody.before_taking(self.fleet, grant)
-        if effects and grant.token_kind is TokenKind.CAR:
-            self.winners.pop(custody.car_of(grant), None)
-            self.tasks.pop(custody.car_of(grant), None)
+        if not effects or grant.token_kind is not TokenKind.CAR:
+            return effects
+        car = custody.car_of(grant)
+        winner = self.winners.get(car, grant.sender)
+        if winner != grant.sender and car in self.tasks:
+            # In the journal a new place stands for a new custody: who may fetch it then is noted behind it.
+            return [*effects, winner_record(car, winner, *self.tasks[car])]
+        self.winners.pop(car, None)
+        self.tasks.pop(car, None)
         return effects
 
     def _forget(self, car: Reference) -> None:
