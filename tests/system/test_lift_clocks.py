@@ -1,15 +1,16 @@
 """A lift's clock may show anything: nobody is sent over a sill while the platform is elsewhere."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
-from bus_sim.cli import main
+from bus_sim.campaign.report import Verdict
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
+from bus_sim.faults.scenario import Arrivals
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from tests.system.scenarios import played
 from tests.system.scene import play, stays
 
 
@@ -31,27 +32,11 @@ def test_a_lift_whose_clock_is_far_ahead_takes_no_ride_for_made(ppm: int, come_s
     assert scene.simulation.plant.street.summary().parked == 1
 
 
-#: Of `bus-sim campaign small --faults clocks`, seed 59: by nearly half the round of bus time.
-JUMP = """
-[scenario]
-site = "small"
-seed = 59
-limit_s = 1500
-[demand]
-cars = 6
-mean_s = 120
-sigma_s = 60
-min_stay_s = 200
-[[fault]]
-kind = "clock_jump"
-at_s = 251.214793
-target = "ER1|IOC1|MR1"
-by_ms = 136391240210
-"""
+def test_work_in_hand_goes_on_when_bus_time_jumps_by_years() -> None:
+    """The deadline of its call, read in the new time, lay twelve days ahead, and the robot waited for it.
 
-
-def test_work_in_hand_goes_on_when_bus_time_jumps_by_years(tmp_path: Path) -> None:
-    """The deadline of its call, read in the new time, lay twelve days ahead, and the robot waited for it."""
-    scenario = tmp_path / "jump.toml"
-    scenario.write_text(JUMP, encoding="utf-8")
-    assert main(["run", "--scenario", str(scenario), "--trace", str(tmp_path / "run.log")]) == 0
+    Clocks on `small`, seed 59: a jump by nearly half the round of bus time.
+    """
+    jump = "clock_jump:at_s=251.214793,target=ER1|IOC1|MR1,by_ms=136391240210"
+    report = played("small", 59, Arrivals(6, 120, 60, 200), jump)
+    assert report.verdict is Verdict.SERVED, report.why()

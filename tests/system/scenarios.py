@@ -1,0 +1,17 @@
+"""Seeds of campaigns that once found something, played again by their faults."""
+
+from pathlib import Path
+
+from bus_sim.campaign.report import Report
+from bus_sim.campaign.trial import play
+from bus_sim.faults.injection import parse_injection
+from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.sites import find_site
+
+
+def played(
+    site: str, seed: int, arrivals: Arrivals, *faults: str, limit_s: float = 1_650, trace: Path | None = None
+) -> Report:
+    """What came of a shipped site's seed; ``faults`` as `bus-sim run --fault` takes them."""
+    scenario = Scenario(site, seed, limit_s, arrivals, tuple(parse_injection(fault) for fault in faults))
+    return play(find_site(site), scenario, trace=trace)
