@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from bus_sim.campaign.car_park import CarPark
+from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.campaign.trial import STEP_US
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.run import RunOptions, run_until
@@ -25,7 +25,7 @@ from onboard.core.holon import Holon
 from onboard.core.site import Site, journal_owner
 from onboard.io.journal import GROWTH, LEAST_BYTES, FileJournal
 from onboard.io.sealed import begin
-from onboard.kinds.registry import compaction_for, factory_for
+from onboard.systems.registry import compaction_for, factory_for
 from onboard.ports.journal import Entry
 
 #: Arrivals and stays of the run that is repeated, s.

@@ -26,7 +26,7 @@ from onboard.config.site import parse_site
 from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
 from onboard.core.effects import Effect, Send
 from onboard.core.frame import Frame
-from onboard.core.kinematics import run_duration_us
+from onboard.ways.kinematics import run_duration_us
 from onboard.core.messages import Bid, CallForProposals, Itinerary, Leg, Message, Reference, Stamp
 from onboard.core.negotiation import (
     Awarded,

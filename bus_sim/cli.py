@@ -11,7 +11,7 @@ from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.certify.command import add_certify, run_certify
 from bus_sim.compare.command import add_compare, run_compare
-from bus_sim.day import DayOptions, run_day
+from bus_sim.systems.car_park.day import DayOptions, run_day
 from bus_sim.demand import DemandError
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.importers.command import add_import, run_import

@@ -12,7 +12,7 @@ from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon
 from onboard.core.serial import next_boot
 from onboard.core.site import Machine
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 from onboard.ports.bus import BusHealth
 
 

@@ -24,7 +24,7 @@ from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
 from onboard.io.signals import terminated_as_interrupted
-from onboard.kinds.registry import compaction_for, factory_for, system_of
+from onboard.systems.registry import compaction_for, factory_for, system_of
 from onboard.life import Life
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry

@@ -10,7 +10,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Final
 
-from bus_sim.campaign.car_park import ORIGIN_US, is_over
+from bus_sim.systems.car_park.stage import ORIGIN_US, is_over
 from bus_sim.campaign.journal_points import journal_faults
 from bus_sim.campaign.trial import STEP_US
 from bus_sim.can.faults import Fault, FaultKind

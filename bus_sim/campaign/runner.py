@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from bus_sim.campaign.car_park import ORIGIN_US
+from bus_sim.systems.car_park.stage import ORIGIN_US
 from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.points import SCENE_LIMIT_S, Scene, reference
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults

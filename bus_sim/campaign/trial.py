@@ -3,7 +3,7 @@
 from collections import Counter
 from pathlib import Path
 
-from bus_sim.campaign.car_park import CarPark
+from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s

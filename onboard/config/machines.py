@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, field
 
-from onboard.config.layout import FIRST_LIFT, SIDES, Layout
+from onboard.systems.car_park.layout import FIRST_LIFT, SIDES, Layout
 from onboard.config.reader import Table
 from onboard.config.toml_lines import path_text
 from onboard.core.codes import MAX_NODE_ID, KindCode

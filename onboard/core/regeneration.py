@@ -14,7 +14,7 @@ from onboard.core.authority import TokenBook, TokenKey, car_token, may_exist, se
 from onboard.core.belief import Belief
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, OUTSIDE, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.lifts import GATE_INDEX, PLATFORM_INDEX
+from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX
 from onboard.core.messages import CarAt, Heartbeat, Message, Reference, TokenHeld
 from onboard.core.mirror import CarRecord
 from onboard.core.recovery_messages import (

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from onboard.core.authority import TokenKey, genesis_holder, may_exist
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE, TokenKind
-from onboard.core.lifts import gate, lift_at, platform
+from onboard.ways.lifts import gate, lift_at, platform
 from onboard.core.messages import CarAt
 from onboard.core.recovery_messages import TokenAssigned
 from onboard.core.regeneration import tokens_of

@@ -11,7 +11,7 @@ from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.operate.asking import Asker
 from onboard.operate.names import OperateError, tool_of
 from onboard.operate.order import MISTAKE

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from onboard.core.lifts import lift_index_of, lift_tracks
+from onboard.ways.lifts import lift_index_of, lift_tracks
 from onboard.core.site import Site
 
 

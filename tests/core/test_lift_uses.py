@@ -1,7 +1,7 @@
 import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.lift_uses import (
+from onboard.ways.lift_uses import (
     GATE_US,
     Gap,
     are_compatible,
@@ -11,10 +11,10 @@ from onboard.core.lift_uses import (
     run_up_us,
     standing_after,
 )
-from onboard.core.lifts import platform
+from onboard.ways.lifts import platform
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.occupancy import final_position, itinerary_windows, lift_uses
-from onboard.core.reservations import FOREVER, Interval, Reservations, Use, Window
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
+from onboard.ways.reservations import FOREVER, Interval, Reservations, Use, Window
 from onboard.core.site import Axis, Segment, Site
 from tests.core.buildings import LEFT, RIGHT, building
 

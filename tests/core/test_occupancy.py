@@ -3,10 +3,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.kinematics import run_duration_us
+from onboard.ways.kinematics import run_duration_us
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.occupancy import itinerary_windows, leg_sweeps, standing_segments, travel_windows
-from onboard.core.reservations import FOREVER, Window
+from onboard.ways.occupancy import itinerary_windows, leg_sweeps, standing_segments, travel_windows
+from onboard.ways.reservations import FOREVER, Window
 from onboard.core.site import Axis, Segment, Site
 from tests.core.lines import ALLEY, SPUR, line_site
 

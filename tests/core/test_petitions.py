@@ -1,6 +1,6 @@
 """Open requests: remembered by the holder, oldest first, all tokens or none where no order is agreed."""
 
-from onboard.core.all_or_none import PATIENCE_REPEATS, AllOrNone
+from onboard.ways.all_or_none import PATIENCE_REPEATS, AllOrNone
 from onboard.core.authority import REFUSED_REPEATS, Claim, TokenBook, TokenKey, segment_token
 from onboard.core.codes import Reason, TokenKind
 from onboard.core.effects import Effect, Send

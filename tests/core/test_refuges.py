@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from onboard.core.codes import KindCode, Side
-from onboard.core.refuges import open_refuges, refuges
+from onboard.ways.refuges import open_refuges, refuges
 from onboard.core.site import Axis, Machine, Segment, Site, Station, Track, TrackKind
 from tests.core.buildings import LEFT, RIGHT, building
 from tests.core.lines import SPUR

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.core.reservations import FOREVER, Interval, Reservations, Window
+from onboard.ways.reservations import FOREVER, Interval, Reservations, Window
 from onboard.core.site import Segment
 
 HERE = Segment(1, 4)

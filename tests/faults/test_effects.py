@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from bus_sim.plant.customer import Outcome, State
+from bus_sim.systems.car_park.plant.customer import Outcome, State
 from bus_sim.run import Simulation
 from onboard.core.codes import DeskInput, DoorName, DoorPosition, MachineState, Reason
 from onboard.core.frame import Frame

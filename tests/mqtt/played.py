@@ -13,7 +13,7 @@ from onboard.core.journal_state import INTACT
 from onboard.gateway.gateway import Gateway
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewaySettings
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.ports.journal import Compaction, Entry
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import codecs

@@ -19,7 +19,7 @@ from onboard.core.codes import MachineState, Reason
 from onboard.core.messages import Award, Bid, CallForProposals, Heartbeat, Message, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.recovery_messages import Halted, TokenGiven
 from onboard.core.site import Site
-from onboard.kinds.graph.messages import NodeAnswer
+from onboard.systems.graph.messages import NodeAnswer
 from onboard.operate.names import OperateError
 from onboard.operate.park import Park
 from onboard.operate.status import Status

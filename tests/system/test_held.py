@@ -11,7 +11,7 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
 from onboard.core.codes import MachineState, ManualMode, Reason, ShuttleMode, TaskPhase
-from onboard.core.lifts import lift_at
+from onboard.ways.lifts import lift_at
 from onboard.core.messages import (
     Bid,
     Heartbeat,

@@ -11,7 +11,7 @@ import pytest
 
 from bus_sim.cli import build_parser
 from bus_sim.cli import main as bus_sim
-from bus_sim.day import DayOptions, run_day
+from bus_sim.systems.car_park.day import DayOptions, run_day
 from bus_sim.sites import find_site
 from onboard.core.codes import CallResult, Operation, TaskPhase
 from onboard.core.messages import Award, Bid, CallForProposals, Progress, TaskReport

@@ -43,7 +43,7 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.io.open_bus import BusSettings, open_bus
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 from onboard.ports.bus import Bus
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.decoder import Decoder

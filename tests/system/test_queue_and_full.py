@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from bus_sim.plant.customer import Outcome, State
+from bus_sim.systems.car_park.plant.customer import Outcome, State
 from bus_sim.run import Simulation
 from onboard.config.site import parse_site
 from onboard.core.codes import DeskText, Operation, TaskPhase

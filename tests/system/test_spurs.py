@@ -9,7 +9,7 @@ import pytest
 
 from bus_sim.demand import Demand
 from bus_sim.run import Simulation
-from bus_sim.show import draw_floor
+from bus_sim.systems.car_park.show import draw_floor
 from bus_sim.sites import find_site
 from onboard.config.site import parse_site
 from onboard.core.authority import segment_token
