@@ -8,8 +8,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bus_sim.systems.car_park.day import DayOptions, run_day
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.day import DayOptions, run_day
 from bus_sim.systems.car_park.summary import RunSummary
 
 

@@ -12,10 +12,10 @@ from bus_sim.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import DRIVER_S
 from bus_sim.systems.car_park.plant.customer import REACTION_US, WALK_S
 from bus_sim.systems.car_park.plant.door import BOLT_US
-from onboard.ways.kinematics import run_duration_us
-from onboard.ways.roads import roads_of
 from onboard.core.site import Site
 from onboard.systems.car_park.site import car_park
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.roads import roads_of
 
 
 class Acts(NamedTuple):

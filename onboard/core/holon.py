@@ -13,7 +13,7 @@ from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory, Fleet
 from onboard.core.blocked_words import BlockedWords
 from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.systems.car_park.car_words import CarWords
+from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send

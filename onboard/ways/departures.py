@@ -12,13 +12,13 @@ more, free in the gaps between the others' uses: for the rides.
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping
 
+from onboard.core.site import Segment
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.lift_uses import HOME_INDEX, Gap, floor_intervals, lift_gaps
 from onboard.ways.lifts import PLATFORM_INDEX, platform
 from onboard.ways.occupancy import junction_segments, leg_sweeps
 from onboard.ways.reservations import FOREVER, Interval, Reservations
 from onboard.ways.roads import Move, Roads
-from onboard.core.site import Segment
 
 #: End of a reservation without end: no window that is swept, however late, comes after it.
 _ALL_TIME = 2 * FOREVER

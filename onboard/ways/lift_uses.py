@@ -9,9 +9,9 @@ gap begins where the lift stands.
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from onboard.core.site import Site
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.reservations import FOREVER, Interval, Use
-from onboard.core.site import Site
 
 #: The gate's token goes to the lift before it moves and back to the robot behind: four frames and four journal writes,
 #: counted as part of a ride. Ours.

@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from onboard.core.authority import segment_token
 from onboard.core.codes import MOBILE_KINDS, Reason
-from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX, lift_at, platform
 from onboard.core.messages import Blocked, Clear, Progress
+from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX, lift_at, platform
 from onboard.ways.occupancy import standing_segments
 from onboard.ways.reservations import FOREVER, Reservations, Use, Window
-from onboard.core.site import Machine, Segment, Site, TrackKind
 
 #: Owner of the windows of segments that are blocked by a word on the bus: no node carries it.
 BLOCKED = 256

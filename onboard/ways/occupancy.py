@@ -13,12 +13,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from onboard.core.codes import LegAction
-from onboard.ways.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
-from onboard.ways.lifts import PLATFORM_INDEX, lift_at, lift_index_of, platform, platform_on
 from onboard.core.messages import Itinerary, Leg
-from onboard.ways.reservations import FOREVER, Use, Window
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Axis, Segment, Site, TrackKind
+from onboard.ways.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
+from onboard.ways.lifts import PLATFORM_INDEX, lift_at, lift_index_of, platform, platform_on
+from onboard.ways.reservations import FOREVER, Use, Window
 
 
 class Sweep(NamedTuple):

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from onboard.core.messages import Itinerary, Leg
-from onboard.ways.occupancy import leg_begins_us
 from onboard.core.serial import from_bus_ms
+from onboard.ways.occupancy import leg_begins_us
 
 #: Windows told in whole milliseconds may overlap by their rounding; so much is no conflict, us. Ours.
 TOLERANCE_US = 10_000

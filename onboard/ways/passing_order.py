@@ -16,10 +16,10 @@ from typing import NamedTuple
 
 from onboard.core.codes import NOBODY, LegAction, Reason
 from onboard.core.messages import Itinerary, Leg, Progress
-from onboard.ways.occupancy import body_mm, leg_windows
-from onboard.ways.passing import TOLERANCE_US, Plan
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site
+from onboard.ways.occupancy import body_mm, leg_windows
+from onboard.ways.passing import TOLERANCE_US, Plan
 
 
 class Turn(NamedTuple):

@@ -6,8 +6,8 @@ that stands at a segment lets nobody past (rows P30, P38).
 
 from collections.abc import Collection
 
-from onboard.ways.lifts import lift_tracks
 from onboard.core.site import Segment, Site, Station, TrackKind
+from onboard.ways.lifts import lift_tracks
 
 #: Sites whose passages are kept in one process: one in a machine, some in a test run.
 _MAX_KEPT = 16

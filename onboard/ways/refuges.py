@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from functools import lru_cache
 
 from onboard.core.codes import KindCode
-from onboard.ways.reach import passages
 from onboard.core.site import Segment, Site, TrackKind
+from onboard.ways.reach import passages
 
 
 @lru_cache(maxsize=16)

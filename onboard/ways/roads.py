@@ -8,12 +8,12 @@ from collections.abc import Collection, Iterator
 from heapq import heappop, heappush
 from typing import NamedTuple
 
+from onboard.core.site import Segment, Site, TrackKind
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.lifts import lift_tracks, platform_on
 from onboard.ways.occupancy import Sweep, alley_segments, leg_sweeps, turn_in_us
 from onboard.ways.reservations import FOREVER
-from onboard.core.site import Segment, Site, TrackKind
 
 #: Sites whose tables are kept in one process: one in a machine, some in a test run.
 _MAX_KEPT = 16

@@ -18,11 +18,11 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 from onboard.core.codes import LegAction
+from onboard.core.site import Segment, Site
 from onboard.ways.departures import Departures
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.reservations import FOREVER, Interval, Reservations
 from onboard.ways.roads import Move, Roads, roads_of
-from onboard.core.site import Segment, Site
 from onboard.ways.stops import Stops
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, ManualMode
 from onboard.core.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
 from onboard.core.mirror import Mirror
-from onboard.ways.occupancy import final_position, turned_in
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
+from onboard.ways.occupancy import final_position, turned_in
 
 #: A machine that says nothing stands for so long after it should have been elsewhere, us: a door or a drive's retries
 #: take less. Ours.

@@ -8,11 +8,11 @@ every run goes the same way, so it passes what is held at the same times. (Up to
 milliseconds.)
 """
 
+from onboard.core.site import Segment
 from onboard.ways.departures import Departures
 from onboard.ways.occupancy import body_mm
 from onboard.ways.reservations import FOREVER
 from onboard.ways.roads import Move, Roads
-from onboard.core.site import Segment
 
 
 class Stops:

@@ -1,6 +1,8 @@
 import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
+from onboard.core.messages import Itinerary, Leg, Stamp
+from onboard.core.site import Axis, Segment, Site
 from onboard.ways.lift_uses import (
     GATE_US,
     Gap,
@@ -12,10 +14,8 @@ from onboard.ways.lift_uses import (
     standing_after,
 )
 from onboard.ways.lifts import platform
-from onboard.core.messages import Itinerary, Leg, Stamp
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER, Interval, Reservations, Use, Window
-from onboard.core.site import Axis, Segment, Site
 from tests.core.buildings import LEFT, RIGHT, building
 
 #: As in the tests of occupancy: 10 mm a segment and a floor; one step of either takes 20 ms, each more 10 ms.

@@ -14,6 +14,7 @@ from bus_sim.systems.session import Played, play
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, TokenKind
 from onboard.core.messages import Bid, CallForProposals, Message, TokenGrant
+from onboard.systems.graph.checks import RULES
 from onboard.systems.graph.messages import (
     BodyPlace,
     EdgeNotice,
@@ -31,7 +32,6 @@ from onboard.systems.graph.robot import GraphRobot
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.check.checks import Checks
-from onboard.systems.graph.checks import RULES
 from tests.graph.sites import busy_orders, hall, made
 
 M = TypeVar("M", bound=Message)

@@ -5,11 +5,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
+from bus_sim.devices.link import MessageHandler
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.lift import LiftDrive
-from bus_sim.devices.link import MessageHandler
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street

@@ -15,13 +15,13 @@ from bus_sim.systems.turning.show import board
 from onboard.core.codes import Criterion, KindCode, Operation
 from onboard.core.holon import Holon
 from onboard.core.messages import Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.systems.turning.checks import RULES
 from onboard.systems.turning.generation import LatheGeneration
 from onboard.systems.turning.lathe import Job, LatheState
 from onboard.systems.turning.machine import LatheMachine
 from onboard.systems.turning.messages import BillBar, BillCutting, JobResult, LathePhase, LatheProgress, TurningOrder
 from onboard.systems.turning.process import generate
 from onboard.systems.turning.site import Turning, Wanted
-from onboard.systems.turning.checks import RULES
 from tests.faults.systems import judged, withstands
 
 

@@ -12,9 +12,9 @@ from rich.panel import Panel
 from rich.text import Text
 
 from onboard.core.codes import KindCode, MachineState, Side
-from onboard.ways.lifts import lift_at, lift_tracks, sill
 from onboard.core.site import Segment, Site, Station, TrackKind
 from onboard.trace.view import SiteView
+from onboard.ways.lifts import lift_at, lift_tracks, sill
 
 #: Pictures a second at most; more only costs the simulation time.
 PICTURES_S = 15

@@ -7,16 +7,16 @@ that lift taken until then, and asks again for what has changed.
 
 from dataclasses import dataclass
 
-from onboard.ways.lift_uses import ride_us
-from onboard.ways.lifts import platform
 from onboard.core.messages import CallForProposals
 from onboard.core.negotiation import Answer, Needs, Proposal
-from onboard.ways.occupancy import itinerary_windows
-from onboard.ways.reservations import Use, Window
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
 from onboard.systems.car_park.program import Step
 from onboard.systems.car_park.ride_calls import answer_for, ride_terms, rides_of
+from onboard.ways.lift_uses import ride_us
+from onboard.ways.lifts import platform
+from onboard.ways.occupancy import itinerary_windows
+from onboard.ways.reservations import Use, Window
 
 #: A ride planned this much earlier than the lift has answered still counts as what it answered: the sub-call told its
 #: begin in steps of 100 ms, rounded up, and ends are whole milliseconds.

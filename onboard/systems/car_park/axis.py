@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
-from onboard.ways.lifts import gate, lift_at, platform
 from onboard.core.site import Segment, Site, Track, TrackKind
+from onboard.ways.lifts import gate, lift_at, platform
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ Independent of the others' plans (row P21), unlike the robot's: it knows only it
 from dataclasses import dataclass
 
 from onboard.core.codes import Criterion, Operation
-from onboard.ways.kinematics import run_duration_us
 from onboard.core.messages import CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park.site import car_park
+from onboard.ways.kinematics import run_duration_us
 
 #: A driver gets in and drives out within this, us: 10 to 30 s (constants of the SimPy study in the systems list).
 DRIVER_US = 20_000_000

@@ -11,18 +11,18 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.core.codes import ANY_STATION, Criterion, Grade, LegAction, Operation
-from onboard.ways.kinematics import run_duration_us
 from onboard.core.messages import CallForProposals, Stamp
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Needs, Proposal
-from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
-from onboard.ways.refuges import open_refuges
-from onboard.ways.reservations import FOREVER, Reservations
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Machine, Segment, Site, Station
 from onboard.systems.car_park.program import MAX_STEPS, STAMP_AHEAD_US, Handling, Program, Step, Work, to_itinerary
 from onboard.systems.car_park.site import car_park
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
+from onboard.ways.refuges import open_refuges
+from onboard.ways.reservations import FOREVER, Reservations
+from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 
 #: From the deadline to the first motion: award frame, journal writes and the first tokens. Ours, measured in tests.
 AWARD_LATENCY_US = 150_000

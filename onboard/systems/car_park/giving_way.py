@@ -15,12 +15,12 @@ from enum import Enum
 from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import LegAction
+from onboard.core.site import Site
+from onboard.systems.car_park.program import Program, Step
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.passing import TOLERANCE_US
 from onboard.ways.passing_order import Meeting
 from onboard.ways.reservations import FOREVER
-from onboard.core.site import Site
-from onboard.systems.car_park.program import Program, Step
 
 
 class Answer(Enum):

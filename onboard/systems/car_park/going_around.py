@@ -12,11 +12,7 @@ from onboard.core.authority import car_token, segment_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import NOBODY, Grade, LegAction, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
-from onboard.ways.lifts import gate, lift_at
 from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
-from onboard.ways.obstacles import holder_in
-from onboard.ways.occupancy import itinerary_windows
-from onboard.ways.reservations import FOREVER, Window
 from onboard.core.site import Segment
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
@@ -26,6 +22,10 @@ from onboard.systems.car_park.program import Handling, Program, Step, Work, to_i
 from onboard.systems.car_park.recovery import forfeited_record, sink_record
 from onboard.systems.car_park.standoff import Standoff
 from onboard.systems.car_park.travel import Carriage
+from onboard.ways.lifts import gate, lift_at
+from onboard.ways.obstacles import holder_in
+from onboard.ways.occupancy import itinerary_windows
+from onboard.ways.reservations import FOREVER, Window
 
 #: A plan that finds no way is tried again after this, us. Ours.
 RETRY_US = 3_000_000

@@ -14,11 +14,11 @@ from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
 from onboard.core.effects import Actuate, Effect, Record
 from onboard.core.messages import ShuttleOrder, ShuttleState
 from onboard.core.serial import successor
-from onboard.systems.car_park.stall import Stall
-from onboard.systems.car_park.unheard import Unheard
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.program import Handling, Work
+from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.travel import Carriage
+from onboard.systems.car_park.unheard import Unheard
 
 
 class Phase(Enum):

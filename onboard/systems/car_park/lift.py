@@ -13,7 +13,6 @@ from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
-from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
 from onboard.core.messages import (
     Award,
     DriveOrder,
@@ -28,10 +27,11 @@ from onboard.core.messages import (
 from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
-from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.bay_memory import BayMemory
 from onboard.systems.car_park.lift_generation import LiftGeneration
+from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.stewardship import Stewardship
+from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
 
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
 OFF_LIMIT_MM = 20_000

@@ -8,16 +8,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from onboard.core.codes import Criterion, LegAction, Operation
-from onboard.ways.kinematics import run_duration_us
-from onboard.ways.lift_uses import lift_gaps, ride_us, run_up_us
-from onboard.ways.lifts import sill
 from onboard.core.messages import CallForProposals, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallKey, Proposal
-from onboard.ways.occupancy import leg_sweeps
-from onboard.ways.reservations import Use
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Site
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.lift_uses import lift_gaps, ride_us, run_up_us
+from onboard.ways.lifts import sill
+from onboard.ways.occupancy import leg_sweeps
+from onboard.ways.reservations import Use
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,10 @@ from enum import Enum
 from typing import NamedTuple
 
 from onboard.core.codes import Grade, LegAction, Side
-from onboard.ways.lifts import lift_at, platform_on, sill
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Site, Station
+from onboard.ways.lifts import lift_at, platform_on, sill
 
 #: Most steps that fit in an itinerary: the leg number has 5 bits.
 MAX_STEPS = 31

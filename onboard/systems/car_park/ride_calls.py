@@ -6,11 +6,11 @@ from dataclasses import replace
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import Criterion, KindCode, LegAction, Operation
 from onboard.core.effects import Effect
-from onboard.ways.lifts import sill
 from onboard.core.messages import CallForProposals, Reference
 from onboard.core.negotiation import Answer, CallTerms
 from onboard.core.site import Site
 from onboard.systems.car_park.program import Step
+from onboard.ways.lifts import sill
 
 
 def rides_of(steps: Iterable[Step]) -> list[Step]:

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect
-from onboard.ways.lifts import gate, platform
 from onboard.systems.car_park.sill import SillProof
+from onboard.ways.lifts import gate, platform
 
 
 @dataclass

@@ -17,7 +17,6 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.effects import Effect, Halt, Report, Send
-from onboard.ways.lifts import sill
 from onboard.core.messages import (
     Award,
     CallForProposals,
@@ -49,6 +48,7 @@ from onboard.systems.car_park.site import RideCalls, car_park
 from onboard.systems.car_park.starting import Body, Stage, Starting
 from onboard.systems.car_park.travel import Carriage
 from onboard.systems.car_park.way import way_to_refuge
+from onboard.ways.lifts import sill
 
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
 REPLAN_TOLERANCE_US = 500_000

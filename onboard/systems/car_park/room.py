@@ -7,12 +7,12 @@ is the only way to another; every other alley and every spur takes one carrier.
 
 from itertools import groupby
 
-from onboard.config.machines import Fleet
+from onboard.config.fleet import Fleet
 from onboard.config.reader import Table
 from onboard.core.codes import KindCode
+from onboard.core.site import Segment, Site, TrackKind
 from onboard.ways.reach import passages
 from onboard.ways.refuges import open_refuges
-from onboard.core.site import Segment, Site, TrackKind
 
 
 def robots_of(site: Site) -> int:

@@ -11,9 +11,9 @@ from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
-from onboard.ways.lifts import GATE_INDEX, gate, lift_index_of, platform, says_standing
 from onboard.core.messages import Progress, SyncRequest
 from onboard.core.site import Segment
+from onboard.ways.lifts import GATE_INDEX, gate, lift_index_of, platform, says_standing
 
 #: Who holds a gate and has not heard where its lift stands asks for it after so long, and again, us. Ours.
 ASK_AGAIN_US = 1_000_000

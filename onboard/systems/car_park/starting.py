@@ -14,7 +14,6 @@ from typing import Final, NamedTuple
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, LegAction, ShuttleMode
 from onboard.core.effects import Effect, Report, Send
-from onboard.ways.lift_uses import ride_us
 from onboard.core.messages import CallForProposals, Stamp
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
@@ -24,6 +23,7 @@ from onboard.systems.car_park.program import Step, ends_at, standing_itinerary
 from onboard.systems.car_park.recovery import Recovery, floor_record
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.travel import Carriage
+from onboard.ways.lift_uses import ride_us
 
 #: From the first known position after a restart until plans are made: the others say meanwhile what they plan. Ours.
 SETTLING_US = 2_000_000

@@ -11,20 +11,20 @@ until it is turned back its axis is the spur's, with the mouth at index 0; there
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-from onboard.ways.all_or_none import AllOrNone
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.motion_authority import MotionState, authorised, needs_no_proof
-from onboard.ways.refuges import refuges
 from onboard.core.serial import successor
 from onboard.core.site import Segment, TrackKind
-from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.axis import TrackAxis
 from onboard.systems.car_park.sill import SillProof
+from onboard.systems.car_park.stall import Stall
+from onboard.ways.all_or_none import AllOrNone
+from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
+from onboard.ways.refuges import refuges
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
 #: journal writes and frames. Ours.

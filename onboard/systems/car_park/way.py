@@ -3,10 +3,10 @@
 from collections.abc import Iterable
 
 from onboard.core.codes import LegAction
-from onboard.ways.lifts import lift_at, platform
-from onboard.ways.refuges import refuges
 from onboard.core.site import Segment, Site
 from onboard.systems.car_park.program import Step
+from onboard.ways.lifts import lift_at, platform
+from onboard.ways.refuges import refuges
 
 
 def way_to_refuge(site: Site, steps: Iterable[Step]) -> list[Segment]:

@@ -10,7 +10,6 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.work.manual import Manual
 from onboard.core.messages import Award, CallForProposals, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import MotionState, authorised
@@ -38,6 +37,7 @@ from onboard.systems.graph.planning import Position, RobotPlanning, told_way
 from onboard.systems.graph.rights import edge_segment, edge_token, keeper, slot_token
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
+from onboard.work.manual import Manual
 
 #: A signal is said again after this while no answer is heard, and after that while the answer is STOP, us. Ours.
 SIGNAL_US, SIGNAL_AGAIN_US = 500_000, 2_000_000

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from onboard.core.codes import ANY_STATION, TokenKind
 from onboard.core.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
 from onboard.core.serial import is_newer
+from onboard.systems.terminal.chart import BAY, MARGIN, chart_of
 from onboard.systems.terminal.messages import (
     Action,
     LaneState,
@@ -22,7 +23,6 @@ from onboard.systems.terminal.messages import (
 )
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.scene.scene import NEARLY, BusClock, Json, Spot, along, part, shape, spot_on, still
-from onboard.systems.terminal.chart import BAY, MARGIN, chart_of
 from onboard.trace.view import SiteView
 
 _DRIVING = Action.GOTO
@@ -293,3 +293,6 @@ class TerminalScene:
             (x0, _), (x1, y1) = self._corners[entity]
             return (x0 + x1) / 2, y1
         return self._bay(node, entity)
+
+
+SCENE = TerminalScene

@@ -13,7 +13,6 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.site import Machine, Site
-from onboard.work.counter import Counter, CounterOrder, OrderState
 from onboard.systems.turning.generation import call_terms, least_cents, longest_us, turning
 from onboard.systems.turning.lathe import Job
 from onboard.systems.turning.messages import (
@@ -24,6 +23,7 @@ from onboard.systems.turning.messages import (
     LathePhase,
     LatheProgress,
 )
+from onboard.work.counter import Counter, CounterOrder, OrderState
 
 
 @dataclass

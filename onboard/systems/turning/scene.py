@@ -4,7 +4,15 @@ from collections import OrderedDict
 
 from onboard.core.codes import ANY_STATION
 from onboard.core.messages import Message, Reference
-from onboard.systems.turning.messages import BillBar, LathePhase, LatheProgress, NcMode, NcState, ToolState, TurningOrder
+from onboard.systems.turning.messages import (
+    BillBar,
+    LathePhase,
+    LatheProgress,
+    NcMode,
+    NcState,
+    ToolState,
+    TurningOrder,
+)
 from onboard.systems.turning.site import Turning
 from onboard.trace.scene.scene import Json, shape, still
 from onboard.trace.view import SiteView
@@ -129,3 +137,6 @@ class TurningScene:
     def task_end(self, reference: Reference, station: int) -> str:
         """As in the port."""
         return f"has made {self.thing(reference)}"
+
+
+SCENE = TurningScene

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 
 from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.motion import Motion, braking, driving, standing
 from bus_sim.systems.car_park.plant.rules import Rule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
-from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.world import Change, RobotBody, World
 from onboard.core.codes import DriveMode
 from onboard.core.messages import DriveOrder, DriveState, Message

@@ -6,10 +6,10 @@ the output door only while the light curtain sees nobody (row P60).
 
 from collections.abc import Callable
 
-from bus_sim.systems.car_park.plant.bodies import CarBody
-from bus_sim.systems.car_park.plant.door import Door
 from bus_sim.devices.link import DeviceLink
 from bus_sim.devices.timers import Timers
+from bus_sim.systems.car_park.plant.bodies import CarBody
+from bus_sim.systems.car_park.plant.door import Door
 from bus_sim.systems.car_park.plant.world import BayBody, Change, World
 from onboard.core.codes import DeskInput, DeskText, DoorName, DoorPosition, LightColour
 from onboard.core.messages import (

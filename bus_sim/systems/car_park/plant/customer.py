@@ -11,11 +11,11 @@ from enum import Enum
 from typing import ClassVar
 
 from bus_sim.demand import Stay
+from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.bodies import DRIVER_S
 from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.rules import Rule
-from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.world import World
 from onboard.core.messages import Reference
 

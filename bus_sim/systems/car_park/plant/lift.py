@@ -1,10 +1,10 @@
 """A lift: the drive of its platform, which obeys orders as a carrier's does, and the platform's sensors."""
 
-from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.timers import Timer, Timers
+from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.motion import Motion
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
-from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.world import Change, World, is_at_mark
 from onboard.core.messages import DriveOrder, PlatformState
 from onboard.core.site import Axis, Site

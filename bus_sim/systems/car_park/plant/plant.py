@@ -3,14 +3,14 @@
 import asyncio
 from collections.abc import Mapping
 
+from bus_sim.devices.link import BusDeviceLink
+from bus_sim.devices.timers import LoopTimers
 from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.lift import LiftDrive
-from bus_sim.devices.link import BusDeviceLink
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
-from bus_sim.devices.timers import LoopTimers
 from bus_sim.systems.car_park.plant.world import World
 from onboard.core.codes import KindCode
 from onboard.core.site import Site

@@ -1,8 +1,8 @@
 """The telescopic shuttle: goes under a car, grips it by its wheels, takes it aboard or leaves it (rows P32, P33)."""
 
 from bus_sim.devices.link import DeviceLink
-from bus_sim.systems.car_park.plant.motion import driving
 from bus_sim.devices.timers import Timer, Timers
+from bus_sim.systems.car_park.plant.motion import driving
 from bus_sim.systems.car_park.plant.world import RobotBody, World
 from onboard.core.codes import ShuttleAction, ShuttleMode, Side
 from onboard.core.messages import Message, ShuttleOrder, ShuttleState

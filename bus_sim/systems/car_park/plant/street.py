@@ -4,10 +4,10 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from bus_sim.demand import Demand, Stay
+from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, Event, Outcome, State
 from bus_sim.systems.car_park.plant.oracle import Oracle
-from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.world import World
 from onboard.core.codes import DeskText
 from onboard.core.messages import Reference

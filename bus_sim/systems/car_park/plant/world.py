@@ -9,11 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.bodies import Aboard, CarBody, Location
 from bus_sim.systems.car_park.plant.motion import Motion, standing
 from bus_sim.systems.car_park.plant.rules import Rule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody, Sill, sills_of
-from bus_sim.devices.timers import Timers
 from onboard.core.codes import DoorName, DoorPosition, KindCode, Side
 from onboard.core.site import Segment, Site, Station, TrackKind
 
