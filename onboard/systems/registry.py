@@ -64,15 +64,20 @@ def _package(system: str) -> str | None:
     return next((entry.value for entry in metadata.entry_points(group=GROUP, name=system)), None)
 
 
-def system_of(site: Site) -> System:
-    """The system of a site. Raises ``KeyError`` for one that this image does not know."""
-    if site.system in _ADDED:
-        return _ADDED[site.system]
-    module = part(site.system, "system")
+def find_system(name: str) -> System:
+    """The system of this name. Raises ``KeyError`` for one that this image does not know."""
+    if name in _ADDED:
+        return _ADDED[name]
+    module = part(name, "system")
     if module is None:
-        raise KeyError(site.system)
+        raise KeyError(name)
     found: System = module.SYSTEM
     return found
+
+
+def system_of(site: Site) -> System:
+    """The system of a site. Raises ``KeyError``, as ``find_system``."""
+    return find_system(site.system)
 
 
 def factory_for(site: Site, kind: KindCode) -> BehaviourFactory:
