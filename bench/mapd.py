@@ -12,9 +12,9 @@ import time
 from importlib.resources import as_file, files
 from itertools import pairwise
 
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.run import play_day

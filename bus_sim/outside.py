@@ -2,9 +2,10 @@
 
 from rich.console import Console
 
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET
 from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
 from bus_sim.serve.socketcand import ServeError, SocketcandServer
+from bus_sim.systems.car_park.simulation import Simulation
 
 
 class Outside:

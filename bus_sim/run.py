@@ -14,7 +14,6 @@ from bus_sim.can.medium import Medium, Tap
 from bus_sim.can.node import SimulatedBus
 from bus_sim.devices.timers import Timers
 from bus_sim.journal import SimulatedJournal
-from bus_sim.systems.car_park.plant.plant import Plant
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.controller.shell import Controller, Ports
 from onboard.core.behaviour import BehaviourFactory
@@ -28,7 +27,6 @@ from onboard.ports.bus import Bus
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import compaction_for, factory_for
 from onboard.trace.candump import CandumpWriter
-from onboard.trace.view import SiteView
 from onboard.wire.decoder import Decoder
 
 #: The fleet bus in a log and on the served socket.
@@ -219,30 +217,10 @@ class BusRun:
         return on_device
 
 
-@dataclass
-class Simulation(BusRun):
-    """A car park that can be run. Build it on its own loop with ``build``; then ``run_until``."""
-
-    plant: Plant
-    view: SiteView = field(init=False)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.view = SiteView(self.site)
-        self.observers.append(self.view.feed)
-
-
 def buses_of(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> tuple[Medium, dict[int, Medium]]:
     """The fleet bus, and each machine's device bus by its node-ID."""
     fleet = Medium(loop, bit_rate=site.bitrate, faults=options.faults)
     return fleet, {node_id: Medium(loop, bit_rate=site.bitrate) for node_id in site.machines}
-
-
-def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
-    """All parts of a run of a car park, connected but not switched on."""
-    fleet, devices = buses_of(site, options, loop)
-    plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()}, options.seed)
-    return Simulation(site, options, loop, fleet, devices, plant)
 
 
 async def run_until(

@@ -8,8 +8,8 @@ from asyncio.subprocess import DEVNULL, PIPE
 from pathlib import Path
 from typing import Any
 
-from bus_sim.run import Simulation
 from bus_sim.serve.bridge import Bridge, open_bridge
+from bus_sim.systems.car_park.simulation import Simulation
 from hil.bench import Capability, Command, Resources
 from hil.device import BenchError
 from onboard.config.machine_text import machine_text

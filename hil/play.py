@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.journal import WRITE_US
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.run import RunOptions
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.bench import Bench, Capability, Target, TargetKind
 from hil.board_device import BoardDevice

@@ -8,8 +8,9 @@ from pathlib import Path
 from bus_sim.processes.fleet import GRACE_S
 from bus_sim.processes.plan import machine_file
 from bus_sim.processes.spawn import log_of, start_machine
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET
 from bus_sim.serve.socketcand import SocketcandServer
+from bus_sim.systems.car_park.simulation import Simulation
 from hil.cable import Cable
 from hil.short_circuit import ShortCircuit
 from onboard.core.site import Machine

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 from bus_sim.can.node import SimulatedBus
 from bus_sim.journal import SimulatedJournal
-from bus_sim.run import NoWatchdog, Simulation
+from bus_sim.run import NoWatchdog
+from bus_sim.systems.car_park.simulation import Simulation
 from hil.cable import Cable
 from hil.short_circuit import ShortCircuit
 from onboard.config.site import parse_site

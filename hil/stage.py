@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from bus_sim.demand import Stay
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET
+from bus_sim.systems.car_park.demand import Stay
 from bus_sim.systems.car_park.plant.bodies import random_car
 from bus_sim.systems.car_park.plant.customer import Customer, Event, State
+from bus_sim.systems.car_park.simulation import Simulation
 from hil.device import Device
 from hil.notice import Notice
 from onboard.core.codes import MachineState

@@ -26,7 +26,7 @@ from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
 from bus_sim.faults.scenario import Arrivals, load_scenario
 from bus_sim.sites import find_site
-from bus_sim.stranger import Stranger
+from bus_sim.systems.car_park.stranger import Stranger
 from bus_sim.systems.orders import Orders
 from bus_sim.systems.stranger import WORKERS
 from onboard.core.site import Site

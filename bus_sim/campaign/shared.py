@@ -24,8 +24,9 @@ from bus_sim.faults.arm import ACTIONS, arm
 from bus_sim.faults.controllers import lose_power
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.scenario import Scenario
-from bus_sim.run import RunOptions, Simulation
+from bus_sim.run import RunOptions
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.frame import Frame

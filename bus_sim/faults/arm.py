@@ -6,11 +6,12 @@ from typing import Final
 
 from bus_sim.attacks.launch import attack
 from bus_sim.can.faults import Fault
-from bus_sim.faults import bus, controllers, devices, operators, people
+from bus_sim.faults import bus, controllers, devices, operators
 from bus_sim.faults.holon import FaultyHolon
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.table import KINDS
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park import people
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.problems import nearest
 from onboard.core.site import Site
 

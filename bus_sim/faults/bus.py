@@ -6,7 +6,8 @@ from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.can.node import SimulatedBus
 from bus_sim.faults.injection import Injection
 from bus_sim.journal import SimulatedJournal
-from bus_sim.run import NoWatchdog, Simulation
+from bus_sim.run import NoWatchdog
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.controller.shell import Controller, Ports
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon

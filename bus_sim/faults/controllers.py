@@ -8,7 +8,7 @@ from functools import partial
 from bus_sim.faults.holon import FROZEN_PPM, FaultyHolon
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.journals import hurt
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.frame import Frame
 from onboard.core.site import Machine
 

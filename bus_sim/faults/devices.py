@@ -6,7 +6,7 @@ from dataclasses import replace
 from bus_sim.devices.link import MessageFilter
 from bus_sim.faults.controllers import machine_named
 from bus_sim.faults.injection import Injection
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.messages import DeskEvent, DriveOrder, DriveState, Message
 
 

@@ -3,7 +3,7 @@
 from functools import partial
 
 from bus_sim.faults.injection import Injection
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import Reason
 from onboard.core.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment

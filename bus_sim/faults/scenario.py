@@ -28,10 +28,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from bus_sim.demand import Demand, DemandError
+from bus_sim.demand import DemandError
 from bus_sim.faults.arm import check_targets
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.sites import SiteNotFoundError, find_site
+from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.orders import Orders
 from bus_sim.systems.session import check_faults
 from onboard.config.problems import ConfigError, Problems, nearest, quoted

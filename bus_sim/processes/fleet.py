@@ -12,7 +12,7 @@ from rich.console import Console
 
 from bus_sim.processes.plan import ProcessPlan, Span, machine_file, spans_of
 from bus_sim.processes.spawn import log_of, start_machine
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 
 #: How long a process may take to end once it was told to, s: two closings of a connection and a journal write.
 GRACE_S = 5.0

@@ -18,9 +18,10 @@ from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import LoopTimers, Timers
 from bus_sim.faults.arm import arm, check_targets, frame_faults
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.run import BusRun, RunOptions, Simulation, buses_of, run_until
-from bus_sim.systems.watched import FOREVER_US, watched
+from bus_sim.run import BusRun, RunOptions, buses_of, run_until
+from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.watched import FOREVER_US, watched
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for

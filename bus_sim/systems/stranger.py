@@ -6,7 +6,7 @@ It takes the node-ID of a machine of the site and, but for a liar, stands where 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bus_sim.stranger import Stranger
+from bus_sim.systems.car_park.stranger import Stranger
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet, Plain
 from onboard.core.codes import KindCode, Reason, TaskPhase

@@ -10,9 +10,9 @@ from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.planted.registry import BUGS
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.planted.registry import BUGS
+from bus_sim.systems.car_park.simulation import Simulation
 
 
 def trial(*faults: str, cars: int = 1, limit_s: float = 1_200.0) -> Report:

@@ -9,7 +9,7 @@ from bus_sim.campaign.systems import patience_s, with_orders
 from bus_sim.cli import main
 from bus_sim.faults.scenario import Arrivals
 from bus_sim.sites import find_site
-from bus_sim.stranger import Stranger
+from bus_sim.systems.car_park.stranger import Stranger
 from bus_sim.systems.orders import Orders
 from tests.mapd.sites import site_text
 

@@ -13,10 +13,10 @@ from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Scenario, load_scenario
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
 from bus_sim.sites import find_site
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
 from bus_sim.systems.orders import Orders
 from bus_sim.systems.registry import RUNNERS
 from bus_sim.systems.session import FAULTS

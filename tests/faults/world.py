@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 
 from bus_sim.faults.arm import arm, frame_faults
 from bus_sim.faults.injection import parse_injection
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.run import RunOptions
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop, run
 from onboard.core.frame import Frame
 from onboard.core.messages import Message

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.certify.certificate import certify
-from bus_sim.certify.on_the_bus import Scene, play_scene
 from bus_sim.cli import main
+from bus_sim.systems.graph.certify.certificate import certify
+from bus_sim.systems.graph.certify.on_the_bus import Scene, play_scene
 from bus_sim.systems.registry import SystemOptions
 from onboard.systems.graph.network import Graph, grid, ring
 from onboard.systems.graph.rules import Rules

@@ -6,7 +6,8 @@ from collections.abc import Callable
 import pytest
 
 from bus_sim.can.node import SimulatedBus
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.run import RunOptions
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.commission.ears import Ears
 from hil.commission.person import PersonGoneError

@@ -8,11 +8,11 @@ from bus_sim.campaign.systems import usual_orders
 from bus_sim.campaign.trial import stage_maker
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Scenario
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
 from bus_sim.run import RunOptions, run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
 from bus_sim.systems.orders import Orders
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.codes import MachineState, Reason

@@ -209,7 +209,7 @@ EXCLUSIVE: dict[str, str] = {
     "can": "onboard/io/pycan.py",
     "cantools": "onboard/wire/dbc_file.py",
     "distributed": "bus_sim/campaign/engine.py",
-    "ortools": "bus_sim/compare/optimum.py",
+    "ortools": "bus_sim/systems/car_park/compare/optimum.py",
 }
 
 

@@ -99,7 +99,7 @@ def test_p55_any_log_of_the_fleet_bus_gives_the_same_figures(tmp_path: Path) -> 
 
 def summary_first_us(site: object) -> int:
     """The first arrival of the run above, us after its time zero."""
-    from bus_sim.demand import Demand
+    from bus_sim.systems.car_park.demand import Demand
 
     return Demand.by_mean(120.0, 30.0, 1, count=3).stays[0].arrival_us
 

@@ -10,20 +10,22 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bus_sim.by_hand import ByHand
-from bus_sim.demand import LEVEL1_DAY, WHOLE_DAY, Demand, DemandError
+from bus_sim.demand import DemandError
 from bus_sim.faults.arm import arm, check_targets, frame_faults
 from bus_sim.faults.injection import AnyFault
 from bus_sim.outside import Outside
-from bus_sim.planted.bug import PlantedBug
 from bus_sim.processes.fleet import ProcessFleet
 from bus_sim.processes.plan import ProcessPlan
 from bus_sim.publish import Publishing
-from bus_sim.run import RunOptions, Simulation, build, run_until
+from bus_sim.run import RunOptions, run_until
+from bus_sim.systems.car_park.by_hand import ByHand
+from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand
+from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.show import Clock, TerminalShow
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
+from bus_sim.systems.car_park.window import BURST_US, Window, choose_window, densest
 from bus_sim.virtual_time import VirtualTimeLoop
-from bus_sim.window import BURST_US, Window, choose_window, densest
 from onboard.core.site import Site
 from onboard.io.signals import ended_by
 from onboard.trace.durations import Durations

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import AnyFault
 from bus_sim.faults.scenario import Scenario
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.run import RunOptions
 from bus_sim.systems.car_park.plant.customer import Customer, Outcome, State
 from bus_sim.systems.car_park.plant.street import Street
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.systems.orders import Tally
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site

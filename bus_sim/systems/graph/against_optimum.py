@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from statistics import fmean
 from typing import cast
 
-from bus_sim.certify.optimum import least_steps, some_tasks
-from bus_sim.certify.search import Tasks
+from bus_sim.systems.graph.certify.optimum import least_steps, some_tasks
+from bus_sim.systems.graph.certify.search import Tasks
 from bus_sim.systems.graph.plant import GraphPlant, make_plant
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play

@@ -4,8 +4,8 @@ import sys
 from statistics import fmean
 from typing import TYPE_CHECKING, cast
 
-from bus_sim.certify.certificate import certify
 from bus_sim.run import BusRun
+from bus_sim.systems.graph.certify.certificate import certify
 from bus_sim.systems.graph.plant import GraphPlant, make_plant
 from bus_sim.systems.graph.show import picture
 from bus_sim.systems.session import Played, SystemPlant, conclude, play

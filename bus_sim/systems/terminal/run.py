@@ -9,8 +9,8 @@ from bus_sim.run import BusRun, RunOptions, buses_of, run_until
 from bus_sim.systems.session import links_of
 from bus_sim.systems.terminal.deliveries import Delivery, deliveries, ordered
 from bus_sim.systems.terminal.plant import NOISE, TerminalPlant
-from bus_sim.systems.watched import watched
 from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.watched import watched
 from onboard.core.messages import CarAt, Message
 from onboard.core.mirror import Mirror
 from onboard.systems.terminal.desk import Desk

@@ -16,7 +16,7 @@ from bus_sim.run import RunOptions
 from bus_sim.systems.session import arm_all, check_faults
 from bus_sim.systems.terminal.run import LIMIT_US, Outcome, TerminalRun, play
 from bus_sim.systems.terminal.table import picture, plan_table
-from bus_sim.systems.watched import FOREVER_US
+from bus_sim.watched import FOREVER_US
 from onboard.core.site import Site
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.vehicle import terminal
