@@ -12,7 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bus_sim.run import RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.baselines import session_lock
 from bus_sim.systems.car_park.demand import Demand

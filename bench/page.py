@@ -24,7 +24,7 @@ from pathlib import Path
 
 from websockets.sync.client import connect
 
-from bus_sim.run import RunOptions
+from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.page import CarParkSource

@@ -1,11 +1,12 @@
 """What joins a simulated site from outside: clients of the served buses, and interfaces of python-can."""
 
+from typing import Any
+
 from rich.console import Console
 
-from bus_sim.run import FLEET
+from bus_sim.run import FLEET, BusRun
 from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
 from bus_sim.serve.socketcand import ServeError, SocketcandServer
-from bus_sim.systems.car_park.simulation import Simulation
 
 
 class Outside:
@@ -15,7 +16,7 @@ class Outside:
     raises ``ServeError`` and ``BusOpenError`` for a person's mistakes.
     """
 
-    def __init__(self, simulation: Simulation, serve: str | None, buses: tuple[str, ...], console: Console) -> None:
+    def __init__(self, simulation: BusRun[Any], serve: str | None, buses: tuple[str, ...], console: Console) -> None:
         self._simulation = simulation
         self._address = serve
         self._buses = buses

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.journal import WRITE_US
-from bus_sim.run import RunOptions
+from bus_sim.options import RunOptions
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.bench import Bench, Capability, Target, TargetKind
@@ -90,7 +90,7 @@ async def _play(
     options = RunOptions(
         epoch_us=0 if target.kind is TargetKind.SIMULATED else round(time.time() * 1e6),
         trace=directory / "trace.log",
-        trace_devices=True,
+        devices=True,
         faults=(waiting_fault(target.machine.node_id),),
         without=scenario.without(bench.site, target.machine),
     )

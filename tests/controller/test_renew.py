@@ -3,7 +3,8 @@
 import pytest
 
 from bus_sim.faults.journals import hurt
-from bus_sim.run import RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import build
 from bus_sim.virtual_time import VirtualTimeLoop, run_on

@@ -4,7 +4,8 @@ import pytest
 
 from bus_sim.campaign.profiles import PROFILES, draw_at_rate, draw_faults
 from bus_sim.can.faults import Fault
-from bus_sim.faults.arm import ACTIONS, check_targets, frame_faults
+from bus_sim.faults.arm import ACTIONS, check_targets
+from bus_sim.faults.bus import frame_faults
 from bus_sim.faults.injection import Injection, parse_injection
 from bus_sim.faults.table import KINDS, Value
 from bus_sim.sites import find_site

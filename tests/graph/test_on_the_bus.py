@@ -1,16 +1,17 @@
 """Rows of Gnatowski's graph on the bus: robots, node agents and the order desk over CAN, and the plant beneath."""
 
 from collections.abc import Iterator
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
 from bus_sim.cli import main
+from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
+from bus_sim.session import play
 from bus_sim.sites import find_site
-from bus_sim.systems.graph.plant import GraphPlant, make_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.systems.graph.plant import GraphPlant
+from bus_sim.systems.stage import Stage
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, TokenKind
 from onboard.core.messages import Bid, CallForProposals, Message, TokenGrant
@@ -42,7 +43,7 @@ class Scene:
 
     def __init__(self, site: FactoryGraph, limit_s: float = 600, seed: int = 1) -> None:
         self.site = site
-        self.played: Played = play(site, SystemOptions(seed=seed, limit_s=limit_s), make_plant)
+        self.played: Stage[Any] = play(site, RunOptions(seed=seed, limit_s=limit_s))
         assert isinstance(self.played.plant, GraphPlant)
         self.plant: GraphPlant = self.played.plant
 
@@ -268,10 +269,10 @@ def test_g27_a_robot_with_another_map_does_not_drive() -> None:
             assert isinstance(holon.behaviour, GraphRobot)
             holon.site = holon.behaviour.fleet.site = stale
 
-    def prepare(run: BusRun) -> None:
+    def prepare(run: BusRun[Any]) -> None:
         run.before_start.append(swap)
 
-    played = play(site, SystemOptions(limit_s=120), make_plant, prepare=prepare)
+    played = play(site, RunOptions(limit_s=120), prepare=prepare)
     assert played.plant.violations == []
     assert isinstance(played.plant, GraphPlant)
     assert [entry.robot for entry in played.plant.entries[:2]] == [22, 22]

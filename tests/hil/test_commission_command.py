@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from bus_sim.options import RunOptions
 from bus_sim.processes.plan import machine_file
-from bus_sim.run import RunOptions
 from bus_sim.serve.socketcand import SocketcandServer
 from bus_sim.systems.car_park.simulation import build
 from bus_sim.virtual_time import VirtualTimeLoop

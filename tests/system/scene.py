@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from bus_sim.can.faults import Fault
-from bus_sim.run import FLEET, RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import FLEET, run_until
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.simulation import Simulation, build

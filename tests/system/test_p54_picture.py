@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from bus_sim.run import FLEET, RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import FLEET, run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.plant.bodies import Aboard
 from bus_sim.systems.car_park.show import Clock, draw

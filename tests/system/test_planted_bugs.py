@@ -8,7 +8,8 @@ from functools import cache
 
 import pytest
 
-from bus_sim.run import FLEET, RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import FLEET, run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.planted.registry import BUGS
 from bus_sim.systems.car_park.simulation import Simulation, build

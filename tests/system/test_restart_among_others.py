@@ -5,7 +5,7 @@ from pathlib import Path
 from bus_sim import sites
 from bus_sim.campaign.report import Verdict
 from bus_sim.cli import main as bus_sim
-from bus_sim.faults.scenario import Arrivals
+from bus_sim.systems.car_park.demand import Arrivals
 from onboard.cli import main as onboard
 from onboard.core.messages import Progress
 from onboard.trace.candump_reader import CandumpReader

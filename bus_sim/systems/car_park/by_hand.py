@@ -15,8 +15,6 @@ from bus_sim.systems.car_park.plant.bodies import random_car
 from bus_sim.systems.car_park.plant.customer import State
 from bus_sim.systems.car_park.plant.street import Street
 
-#: How fast a site runs for a person who presses keys, simulated seconds a second, unless told otherwise.
-HAND_SPEED = 10.0
 KEYS = "keys: i a car comes in, o the car that came first is wanted out, q ends the run"
 #: What a person has done already: their car was asked for, or is on its way.
 _ASKED = frozenset({State.AT_DESK, State.AWAITING_DOOR, State.DRIVING_OUT, State.GONE})

@@ -130,6 +130,35 @@ class Demand:
         return cls((Stay(0, departure_us, car or random_car("car 1", seed)),))
 
 
+@dataclass(frozen=True)
+class Arrivals:
+    """Cars at normal intervals, in s, fetched at such intervals ``min_stay_s`` after their coming at the earliest."""
+
+    cars: int = 6
+    mean_s: float = 120.0
+    sigma_s: float = 60.0
+    min_stay_s: float = 200.0
+
+    @property
+    def apart_s(self) -> float:
+        """Mean time between two."""
+        return self.mean_s
+
+    def demand(self, seed: int) -> Demand:
+        """The stays of one seed. Raises ``DemandError`` for a law that is none."""
+        return Demand.by_mean(self.mean_s, self.sigma_s, seed, count=self.cars, min_stay_s=self.min_stay_s)
+
+    def to_toml(self) -> list[str]:
+        """A scenario's section."""
+        return [
+            "[demand]",
+            f"cars = {self.cars}",
+            f"mean_s = {self.mean_s:.15g}",
+            f"sigma_s = {self.sigma_s:.15g}",
+            f"min_stay_s = {self.min_stay_s:.15g}",
+        ]
+
+
 class Session(NamedTuple):
     """One row of a session file; both times carry their UTC offset."""
 

@@ -5,7 +5,8 @@ import dataclasses
 from collections import deque
 from dataclasses import dataclass, field
 
-from bus_sim.run import RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop, run_on

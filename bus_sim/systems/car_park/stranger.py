@@ -5,8 +5,8 @@ It stands where a robot of the site stands and takes its node-ID. ``Stranger`` s
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from enum import Enum
 
+from bus_sim.systems.stranger import Stranger
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet, Plain
 from onboard.core.codes import Grade, KindCode, LegAction, MachineState, Operation, Reason, Side, TaskPhase
@@ -23,14 +23,6 @@ from onboard.systems.registry import factory_for
 
 #: What it says that its first run takes, ms.
 RUN_MS = 10_000
-
-
-class Stranger(Enum):
-    """How it fails."""
-
-    STANDS = "stands"
-    SILENT = "silent"
-    LIAR = "liar"
 
 
 class _LeastBid(CarParkGeneration):

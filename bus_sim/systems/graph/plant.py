@@ -11,7 +11,6 @@ from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.graph.body import Body
 from onboard.core.messages import Message
-from onboard.core.site import Site
 from onboard.systems.graph.messages import BodyPlace, VisitAnswer, VisitKey, VisitResult, five
 from onboard.systems.graph.site import FactoryGraph, Order, Rules, edge
 
@@ -148,7 +147,6 @@ class GraphPlant:
             self.note(f"order {entry.number} was for node-ID {entry.order.robot}, and {entry.robot} did it")
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> GraphPlant:
+def make_plant(site: FactoryGraph, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> GraphPlant:
     """The plant of a graph; nothing in it is drawn by chance."""
-    assert isinstance(site, FactoryGraph)
     return GraphPlant(site, timers, links)

@@ -10,7 +10,7 @@ from functools import partial
 from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
 from onboard.core.messages import Message
-from onboard.core.site import Machine, Site
+from onboard.core.site import Machine
 from onboard.systems.mapd.messages import (
     NO_TASK,
     CartAction,
@@ -213,7 +213,6 @@ class UnitPlant:
         return [tuple(row.values()) for row in rows]
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> UnitPlant:
+def make_plant(site: Mapd, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> UnitPlant:
     """The plant of a pick-up and delivery site; nothing in it is drawn by chance."""
-    assert isinstance(site, Mapd)
     return UnitPlant(site, timers, links)

@@ -9,7 +9,6 @@ from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.turning.nc import ProgramError, Run, contour_error_mm, run_program
 from onboard.core.messages import Message
-from onboard.core.site import Site
 from onboard.systems.turning.messages import (
     CHUNK,
     JobAnswer,
@@ -300,7 +299,6 @@ class TurningPlant:
                 self.note(f"{made} parts of drawing {drawing} were made, {wanted.get(drawing, 0)} ordered")
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> TurningPlant:
+def make_plant(site: Turning, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> TurningPlant:
     """The plant of a turning cell; nothing in it is drawn by chance."""
-    assert isinstance(site, Turning)
     return TurningPlant(site, timers, links)

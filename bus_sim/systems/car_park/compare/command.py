@@ -12,7 +12,7 @@ from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
 from bus_sim.systems.car_park.compare.plays import POLICIES, Play, play
 from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
 from bus_sim.systems.car_park.compare.table import Table, tabulate
-from bus_sim.systems.car_park.day import DayOptions, choose_demand
+from bus_sim.systems.car_park.day import Day, choose_demand
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.window import Window, choose_window
 from onboard.core.site import Site
@@ -110,7 +110,7 @@ def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float,
 
 def compare_day(site: Site, args: argparse.Namespace) -> Table:
     """All policies on a window of a real day: what comes before is played too, and not counted."""
-    demand = choose_demand(DayOptions(sessions=args.sessions, day=args.day), site)
+    demand = choose_demand(Day(sessions=args.sessions, day=args.day), site)
     window = choose_window(demand, args.window)
     seed = 1
     before = Demand(tuple(stay for stay in demand.stays if stay.arrival_us < window.end_us), demand.zero)

@@ -4,7 +4,8 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from bus_sim.run import RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.systems.car_park.compare import obedience
 from bus_sim.systems.car_park.compare.dispatcher import Dispatcher
 from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst, Policy

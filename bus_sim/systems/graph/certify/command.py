@@ -6,13 +6,13 @@ import sys
 import time
 from pathlib import Path
 
+from bus_sim.options import RunOptions
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.graph.against_optimum import compare
 from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, told
 from bus_sim.systems.graph.certify.counterexample import play_file, play_on_bus, write_counterexample
 from bus_sim.systems.graph.certify.model import Model
 from bus_sim.systems.graph.certify.throughput import Pace, measure
-from bus_sim.systems.registry import SystemOptions
 from onboard.systems.graph.network import Graph, complete, grid, ring
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
@@ -73,7 +73,7 @@ def run_certify(args: argparse.Namespace) -> int:
         return _optimum(args.optimum)
     if args.play is not None and args.bus:
         rules = Rules(args.rules) if args.rules is not None else None
-        return play_on_bus(args.play, rules, SystemOptions(trace=args.trace, limit_s=3_600))
+        return play_on_bus(args.play, rules, RunOptions(trace=args.trace, limit_s=3_600))
     if args.play is not None:
         return play_file(args.play)
     if args.site is None:

@@ -3,11 +3,11 @@
 import json
 from pathlib import Path
 
+from bus_sim.options import RunOptions
 from bus_sim.sites import SiteNotFoundError
 from bus_sim.systems.graph.certify.model import Model, Move, State
 from bus_sim.systems.graph.certify.on_the_bus import STILL_US, Scene, play_scene
 from bus_sim.systems.graph.certify.search import Stuck
-from bus_sim.systems.registry import SystemOptions
 from onboard.systems.graph.network import Graph, edge
 from onboard.systems.graph.rules import Rules
 
@@ -65,7 +65,7 @@ def play_file(file: Path) -> int:
     return 0
 
 
-def play_on_bus(file: Path, rules: Rules | None, options: SystemOptions) -> int:
+def play_on_bus(file: Path, rules: Rules | None, options: RunOptions) -> int:
     """Play a file on the virtual bus, under its own rules or others: 1 where robots stick, 0 where all arrive.
 
     Under ``edge-and-node`` every node has a slot for each robot. Raises ``SiteNotFoundError`` as ``play_file``, and

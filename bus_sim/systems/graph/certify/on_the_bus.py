@@ -10,13 +10,14 @@ from dataclasses import dataclass, field, replace
 
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
+from bus_sim.options import RunOptions
+from bus_sim.session import play
 from bus_sim.systems.graph.body import Body
 from bus_sim.systems.graph.certify.model import Move
 from bus_sim.systems.graph.plant import GraphPlant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.systems.graph.simulated import SIMULATED
+from bus_sim.systems.stage import Stage
 from onboard.config.site import parse_site
-from onboard.core.site import Site
 from onboard.systems.graph.messages import BodyPlace
 from onboard.systems.graph.network import Graph
 from onboard.systems.graph.rules import Rules
@@ -69,16 +70,6 @@ class Scene:
         site = parse_site(text, "counterexample")
         assert isinstance(site, FactoryGraph)
         return site
-
-
-@dataclass(frozen=True)
-class Ending:
-    """How it ended: ``played_moves`` of the timing came about; ``where`` is each robot's place in words, by name."""
-
-    played: Played
-    played_moves: int
-    is_stuck: bool
-    where: dict[str, str] = field(default_factory=dict)
 
 
 class TimedPlant(GraphPlant):
@@ -171,16 +162,24 @@ class TimedPlant(GraphPlant):
         self.timers.call_at(now_us + 1_000_000, self._look)
 
 
-def play_scene(scene: Scene, options: SystemOptions) -> Ending:
+@dataclass(frozen=True)
+class Ending:
+    """How it ended: ``played_moves`` of the timing came about; ``where`` is each robot's place in words, by name."""
+
+    played: Stage[TimedPlant]
+    played_moves: int
+    is_stuck: bool
+    where: dict[str, str] = field(default_factory=dict)
+
+
+def play_scene(scene: Scene, options: RunOptions) -> Ending:
     """Play it on the virtual bus until it is over. Raises ``ConfigError`` for a graph that no site can have."""
 
-    def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], _: int) -> TimedPlant:
-        assert isinstance(site, FactoryGraph)
+    def make_plant(site: FactoryGraph, timers: Timers, links: dict[int, BusDeviceLink], _: int) -> TimedPlant:
         return TimedPlant(site, timers, links, scene.moves)
 
-    played = play(scene.site(), options, make_plant)
+    played: Stage[TimedPlant] = play(scene.site(), options, system=replace(SIMULATED, plant=make_plant))
     plant = played.plant
-    assert isinstance(plant, TimedPlant)
     where = {body.machine.name: _place(body) for body in plant.bodies.values()}
     return Ending(played, plant.played_moves, plant.is_stuck, where)
 
