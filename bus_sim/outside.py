@@ -40,7 +40,7 @@ class Outside:
             bridge, _ = await open_bridge(node, settings)
             self._bridges.append(bridge)
             which = "the fleet bus" if machine is None else f"the device bus of {machine}"
-            self._console.print(f"{which} is on {settings}", highlight=False)
+            self._console.print(f"{which} is on {settings}", highlight=False, soft_wrap=True)
 
     async def __aexit__(self, *_: object) -> None:
         for bridge in self._bridges:
@@ -61,5 +61,7 @@ class Outside:
         self.served = (host or "127.0.0.1", bound)
         channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
         self._console.print(
-            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False
+            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}",
+            highlight=False,
+            soft_wrap=True,
         )
