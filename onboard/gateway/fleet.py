@@ -110,7 +110,7 @@ class FleetTopics:
             return str(number)
         if isinstance(self.site, Terminal):
             return self.site.entities[number].name if number in self.site.entities else None
-        return self._words.station(number)
+        return self._words.system.place(number)
 
     def operation_of(self, reference: Reference) -> Operation | None:
         """What a task asks for, where its call was heard."""

@@ -38,9 +38,6 @@ class LivePicture:
         self.scene = scene_of(site, self.view)
         #: Whether cars are parked and fetched here: the indicators of robots and lifts are of such a site.
         self.is_car_park = bool(site.tracks)
-        self.view.thing = self.scene.thing
-        if not self.is_car_park:
-            self.view.task_end = self.scene.task_end
         self.indicators = Indicators(site)
         self._heard: dict[int, int] = {}
         self._waits: dict[int, tuple[int, Waiting]] = {}
@@ -103,7 +100,7 @@ class LivePicture:
             "site": site.name,
             "system": site.system,
             "bitrate": site.bitrate,
-            "noun": self.scene.noun,
+            "noun": self.view.words.noun,
             **self.scene.layout(),
             "series": ["bus load", "open tasks", *(["parked", "fetched"] if self.is_car_park else ["done"])],
             "machines": [
@@ -149,7 +146,7 @@ class LivePicture:
             told["wait"] = {
                 "at": [wait[1].track, wait[1].index],
                 "for": view.name(wait[1].blocker) if wait[1].blocker else None,
-                "why": wait[1].reason.name.lower().replace("_", " "),
+                "why": view.words.reason(wait[1].reason),
                 "since_us": wait[0],
             }
         return told
@@ -167,12 +164,12 @@ class LivePicture:
         return {
             "id": f"{call.sender}.{call.call}",
             "by": view.name(call.sender),
-            "what": call.operation.name.lower().replace("_", " "),
+            "what": view.words.operation(call.operation),
             "task": f"{call.task.origin}.{call.task.number}",
             "car": f"{call.car.origin}.{call.car.number}" if call.car.number else None,
-            "thing": self.scene.thing(call.car) if call.car.number else None,
-            "from": self.scene.place(call.from_station),
-            "to": self.scene.place(call.to_station),
+            "thing": view.words.thing(call.car) if call.car.number else None,
+            "from": view.words.place(call.from_station),
+            "to": view.words.place(call.to_station),
             "opened_us": record.opened_us,
             "deadline_us": self._clock.log_us(call.deadline_ms, view.now_us),
             "attempt": call.attempt,
@@ -183,7 +180,7 @@ class LivePicture:
             "winner": view.name(record.winner) if record.winner else None,
             "result": record.result.name.lower() if record.result is not None else None,
             "won": record.result is CallResult.AWARDED,
-            **({"reason": record.reason.name.lower().replace("_", " ")} if record.reason is not Reason.NONE else {}),
+            **({"reason": view.words.reason(record.reason)} if record.reason is not Reason.NONE else {}),
         }
 
     def _cost(self, criterion: Criterion, cost: int) -> dict[str, Any]:
@@ -200,7 +197,7 @@ class LivePicture:
             {
                 "task": f"{reference.origin}.{reference.number}",
                 "at": view.name(reference.origin),
-                "what": task.operation.name.lower(),
+                "what": view.words.operation(task.operation),
                 "phase": task.phase.name.lower(),
                 "owner": view.name(task.owner) if task.owner else None,
                 "since_us": task.phase_us.get(TaskPhase.OPEN, view.now_us),

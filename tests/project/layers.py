@@ -29,7 +29,7 @@ SYSTEMS = tuple(sorted(folder.name for folder in FOLDER.iterdir() if (folder / "
 SYSTEM_TYPES = tuple(f"onboard.systems.{system}.{noun}" for system in SYSTEMS for noun in ("messages", "site"))
 
 #: How the parts of a site's own system are found.
-REGISTRY = ("onboard.systems.contract", "onboard.systems.registry")
+REGISTRY = ("onboard.systems.contract", "onboard.systems.registry", "onboard.systems.words")
 
 #: Standard modules without I/O, clock, chance or tasks: all that decisions may use.
 PURE_STDLIB = frozenset(
@@ -90,7 +90,9 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
         (*CORE_TYPES, own, "onboard.trace", "onboard.ways", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
     )
+    words = Layer((*CORE_TYPES, own, "onboard.systems.words"), only_stdlib=PURE_STDLIB, pure=True)
     parts = {
+        "words": words,
         **dict.fromkeys(("constants", "layout", "machines", "missions_reader", "reader", "room"), config),
         **dict.fromkeys(("chart", "checks", "scene"), history),
     }
