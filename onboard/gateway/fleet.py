@@ -143,8 +143,13 @@ class FleetTopics:
             yield "task", self.task(report.task, now_us) | extra | _coded(report.reason)
 
     def _call(self, record: CallRecord) -> Json:
-        where = {"from": self.place(record.call.from_station), "to": self.place(record.call.to_station)}
-        return self.picture.call(record) | where
+        call = record.call
+        return self.picture.call(record) | {
+            "task": reference_text(call.task),
+            "car": reference_text(call.car) if call.car.number else None,
+            "from": self.place(call.from_station),
+            "to": self.place(call.to_station),
+        }
 
     def _phase(self, message: Message) -> TaskPhase | None:
         record = self.picture.view.tasks.get(message.task) if isinstance(message, TaskReport) else None

@@ -165,8 +165,8 @@ class LivePicture:
             "id": f"{call.sender}.{call.call}",
             "by": view.name(call.sender),
             "what": view.words.operation(call.operation),
-            "task": f"{call.task.origin}.{call.task.number}",
-            "car": f"{call.car.origin}.{call.car.number}" if call.car.number else None,
+            "task": view.words.reference(call.task),
+            "car": view.words.load(call.car) if call.car.number else None,
             "thing": view.words.thing(call.car) if call.car.number else None,
             "from": view.words.place(call.from_station),
             "to": view.words.place(call.to_station),
@@ -195,7 +195,7 @@ class LivePicture:
         view = self.view
         return [
             {
-                "task": f"{reference.origin}.{reference.number}",
+                "task": view.words.reference(reference),
                 "at": view.name(reference.origin),
                 "what": view.words.operation(task.operation),
                 "phase": task.phase.name.lower(),
