@@ -36,8 +36,8 @@ class LivePicture:
         self.site = site
         self.view = SiteView(site)
         self.scene = scene_of(site, self.view)
-        #: Whether cars are parked and fetched here: the indicators of robots and lifts are of such a site.
-        self.is_car_park = bool(site.tracks)
+        #: Whether machines move along tracks here: the indicators of robots and lifts are of such a site.
+        self.has_tracks = bool(site.tracks)
         self.indicators = Indicators(site)
         self._heard: dict[int, int] = {}
         self._waits: dict[int, tuple[int, Waiting]] = {}
@@ -87,7 +87,7 @@ class LivePicture:
         view, passed_s = self.view, (time_us - self._sampled_us) / 1e6
         load = (self._bits - self._bits_sampled) / self.site.bitrate / passed_s
         waiting = sum(task.is_waiting for task in view.tasks.values())
-        ends = [view.parked, view.fetched] if self.is_car_park else [view.done]
+        ends = [view.parked, view.fetched] if self.has_tracks else [view.done]
         self._samples.append([time_us / 1e6, round(load, 5), waiting, *ends])
         self._sampled_us, self._bits_sampled = time_us, self._bits
 
@@ -102,7 +102,7 @@ class LivePicture:
             "bitrate": site.bitrate,
             "noun": self.view.words.noun,
             **self.scene.layout(),
-            "series": ["bus load", "open tasks", *(["parked", "fetched"] if self.is_car_park else ["done"])],
+            "series": ["bus load", "open tasks", *(["parked", "fetched"] if self.has_tracks else ["done"])],
             "machines": [
                 {
                     "node": machine.node_id,
@@ -118,7 +118,7 @@ class LivePicture:
     def snapshot(self) -> dict[str, Any]:
         """Everything that changes, as it is now."""
         view = self.view
-        ends = {"parked": view.parked, "fetched": view.fetched} if self.is_car_park else {"done": view.done}
+        ends = {"parked": view.parked, "fetched": view.fetched} if self.has_tracks else {"done": view.done}
         return {
             "now_us": view.now_us,
             "machines": {node: self._machine(node) for node in self.site.machines},
@@ -133,7 +133,7 @@ class LivePicture:
     def figures(self) -> dict[str, Any]:
         """The indicators up to now; dearer than a snapshot. Of other systems: mean times and messages a task."""
         view = self.view
-        if self.is_car_park:
+        if self.has_tracks:
             return self.indicators.figures(view.now_us).to_json()
         mean_s = view.done_us / view.done / 1e6 if view.done else None
         return {"mean_time_s": mean_s, "messages_per_task": self._frames / view.done if view.done else None}
