@@ -87,3 +87,14 @@ def test_a_car_that_nobody_came_to_park_is_called_for_again_where_its_driver_has
     monkeypatch.delitem(TABLE, (State.PARKED, Event.FULL))
     report = played("level1", 1, Arrivals(2, 20, 10, 300), "crash:target=MR1,at_s=8,restart_s=120")
     assert report.verdict is Verdict.SERVED, report.why()
+
+
+def test_who_was_off_while_its_task_was_called_anew_does_not_begin_it() -> None:
+    """Nobody had it at that moment, so it was not told that it had lost it, and went for the car.
+
+    Two crashes a seed on `small`, seed 2169.
+    """
+    first = "crash:at_s=333.410943,target=MR1,restart_s=15.574,write=1,durable=yes"
+    second = "crash:at_s=375.432383,target=MR2,restart_s=13.868,write=1,durable=no"
+    report = played("small", 2169, Arrivals(6, 20, 10, 200), first, second, limit_s=3_600)
+    assert report.verdict is Verdict.SERVED, report.why()

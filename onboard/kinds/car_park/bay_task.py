@@ -115,9 +115,16 @@ class BayTask:
         return Award(sender, self.call, self.winner, self.task, self.version, CallResult.AWARDED, Reason.NONE)
 
     def remind(self, sender: int, node: int) -> list[Effect]:
-        """Who was lost and comes back believing that the task is its own still hears whose it is."""
-        is_clear = self.winner in (0, node) or not self.call or self.version == 1
-        return [] if is_clear else [Send(self.award(sender))]
+        """Who was lost and comes back believing that the task is its own hears whose it is, or that nobody has it.
+
+        While it is called for, or awarded, what is said of that tells it by its version.
+        """
+        if self.winner == node or not self.call or self.version == 1:
+            return []
+        if self.winner:
+            return [Send(self.award(sender))]
+        lost = Award(sender, self.call, 0, self.task, self.version, CallResult.REJECTED, Reason.NODE_SILENT)
+        return [] if self.retry_at_us is None else [Send(lost)]
 
 
 def queue_ticket(tickets: deque[Reference], car: Reference, *, urgent: bool) -> bool:

@@ -163,7 +163,7 @@ class Compartment:
             return []
         if job is None or report.task != job.task:
             return withdrawal(self.fleet.node_id, report)
-        if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None:
+        if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None and not job.call:
             # I was restarted and asked all: its winner says that the task is in hand.
             return self._won_by(report.sender, job.call)
         return job.remind(self.fleet.node_id, report.sender)
@@ -207,6 +207,8 @@ class Compartment:
         job = self.job
         assert job is not None
         job.winner, job.call, job.retry_at_us, job.reminders, job.refusals = winner, call, None, 0, 0
+        if self.phase is BayPhase.HANDOVER:
+            self._go(BayPhase.LOCKING)
         return self.stewardship.won(job.car, winner, job.task, job.version)
 
     def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
