@@ -13,7 +13,7 @@ from onboard.core.mirror import Mirror
 from onboard.kinds.terminal.generation import VehicleGeneration
 from onboard.kinds.terminal.messages import Action, MissionKey, Verb
 from onboard.kinds.terminal.mirror import TerminalMirror
-from onboard.kinds.terminal.missions import Orders
+from onboard.kinds.terminal.missions import Orders, types_of
 from onboard.kinds.terminal.plan import Plan, PlanReader, Step, to_frames
 from onboard.kinds.terminal.search import Job, Search
 from onboard.kinds.terminal.site import StationKind
@@ -125,6 +125,43 @@ def test_m23_only_a_box_with_nothing_above_it_is_called_for() -> None:
     plan(picture, 14, "B4", "S1")
     second = orders.next(picture, {first.box})
     assert second is not None and second.box == box("B3"), "B4 is in a plan"
+
+
+def stack_list(picture: TerminalMirror, name: str) -> list[int]:
+    return [visit.owner for visit in picture.traffic.lists[BY_NAME[name]]]
+
+
+def test_a_plan_does_not_fetch_what_it_buries_itself() -> None:
+    """B4 is put on B7, which this vehicle was to fetch next and waited for for ever (stranger, seed 1)."""
+    picture = mirror(14)
+    plan(picture, 14, "B4", "S3")
+    generation = VehicleGeneration(SITE, SITE.machines[14], picture)
+    assert generation.plan(Job(box("B7"), Reference(1, 9), BY_NAME["S3"], BY_NAME["S1"]), 0, version=2) is None
+
+
+@pytest.mark.parametrize("first", ["fetches", "puts"])
+def test_a_box_is_put_on_a_stack_after_all_that_are_fetched_from_it(first: str) -> None:
+    """Whoever plans first: who fetches is far away, and who puts comes from next door."""
+    picture = mirror()
+    wanted = [(11, "B7", "S1"), (14, "B4", "S3")]
+    for owner, name, target in wanted if first == "fetches" else reversed(wanted):
+        plan(picture, owner, name, target)
+    assert stack_list(picture, "S3") == [11, 14]
+
+
+def test_a_mission_by_type_leaves_boxes_that_are_wanted_by_name() -> None:
+    """A box given back is wanted by name; another mission took it elsewhere, and its stack grew on it."""
+    picture, orders = mirror(1), Orders(SITE, 1)
+    area = SITE.entities[BY_NAME["S3"]].area
+    kind = SITE.boxes[box("B7") - 1].type
+    assert orders.key(MissionKey(1, 1, Verb.LOAD, types_of(SITE).index(kind), 1, area, BY_NAME["S10"], 0, urgent=False))
+    taken = {box("B1"), box("B2"), box("B3"), box("B4")}
+    by_type = orders.next(picture, taken)
+    assert by_type is not None and by_type.box == box("B7")
+    orders.give_back(by_type.task)
+    assert orders.key(MissionKey(1, 2, Verb.LOAD, types_of(SITE).index(kind), 1, area, BY_NAME["S1"], 0, urgent=True))
+    again = orders.next(picture, taken)
+    assert again is not None and (again.box, again.target) == (box("B7"), BY_NAME["S10"])
 
 
 def _typed(verb: Verb, what: int, count: int = 0, to: str = "S1", source: str = "") -> MissionKey:

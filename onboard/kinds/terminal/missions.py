@@ -128,16 +128,20 @@ class Orders:
         return None
 
     def _available(self, order: Order, mirror: TerminalMirror, taken: set[int]) -> int | None:
-        """A box with nothing above but what robots already plan to take away."""
+        """A box with nothing above but what robots already plan to take away; by its type none that is wanted by name.
+
+        A mission of which one box was given back wants that box by name.
+        """
         if order.named:
             boxes = list(order.named)
         else:
             stations = self.site.stations_in(order.source)
+            named = {box for other in self.missions.values() for box in other.named}
             boxes = [
                 box
                 for station in stations
                 for box in reversed(mirror.standing.get(station, ()))
-                if self.site.boxes[box - 1].type == order.type and station != order.target
+                if self.site.boxes[box - 1].type == order.type and station != order.target and box not in named
             ]
         for box in boxes:
             station = mirror.station_of(box)
