@@ -13,6 +13,7 @@ from onboard.core.codes import (
     DriveMode,
     LightColour,
     Operation,
+    Reason,
     ShuttleMode,
     Side,
     TaskPhase,
@@ -28,6 +29,7 @@ from onboard.core.messages import (
     DeskOrder,
     DoorState,
     DriveState,
+    EmergencyStop,
     Message,
     Reference,
     ShuttleState,
@@ -36,7 +38,10 @@ from onboard.core.messages import (
     TokenGrant,
     TokenHeld,
 )
+from onboard.core.negotiation.winners import LOST_AFTER_US
+from onboard.core.recovery_messages import Go
 from onboard.core.site import Station
+from onboard.kinds.car_park.bay_memory import winner_record
 from onboard.kinds.registry import factory_for
 from tests.sites import one_floor
 
@@ -192,3 +197,20 @@ def journalled_place(node: int, station: int, version: int) -> Entry:
     assert Station.from_number(station) in (*SITE.places, *SITE.compartments.values()), node
     place = {"station": station, "version": version, "wheelbase_mm": WHEELBASE_MM}
     return {"record": "car_at", "car_origin": CAR.origin, "car": CAR.number, **place}
+
+
+def test_a_steward_that_was_held_counts_no_winner_as_lost_by_that_time() -> None:
+    """All were held by the same stop: whoever is let go first took the others' tasks from them."""
+    winner = dict(winner_record(CAR, ROBOT, TASK, 1).entry)
+    entries = [token_entry("token_held", 3, BAY), journalled_place(BAY, PLACE, 3), winner]
+    steward, let_go_us, given_back_us = machine(BAY, entries), 40_000_000, list[int]()
+    for now_us in range(100_000, 60_000_000, 100_000):
+        if now_us < let_go_us and not now_us % 1_000_000:
+            steward.receive(EmergencyStop(251, Reason.OPERATOR), now_us)
+        if now_us == let_go_us:
+            steward.receive(Go(251, 0), now_us)
+        words = said(steward.wake(now_us))
+        given_back_us += [
+            now_us for word in words if isinstance(word, TaskReport) and word.phase is TaskPhase.FORFEITED
+        ]
+    assert given_back_us and given_back_us[0] >= let_go_us + LOST_AFTER_US
