@@ -41,8 +41,8 @@ from onboard.core.messages import (
 from onboard.core.negotiation.winners import LOST_AFTER_US
 from onboard.core.recovery_messages import Go
 from onboard.core.site import Station
-from onboard.kinds.car_park.bay_memory import winner_record
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.bay_memory import winner_record
+from onboard.systems.registry import factory_for
 from tests.sites import one_floor
 
 SITE = one_floor()
