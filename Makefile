@@ -19,7 +19,7 @@ help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
 	@echo 'make run ARGS="..." hands options to bus-sim run; make PYTHON=/path/to/python ... chooses the interpreter'
 
-run: $(VENV)/.run ## set up, then show the busiest hour of a real day on the standard site in about a minute
+run: $(VENV)/.run ## set up, then show an hour of a real day on the standard site in about a minute
 	@$(BIN)/bus-sim run $(ARGS)
 
 test: lint ## set up, lint, then all tests on all processors; REQUIRE=all makes a skipped test a failure
