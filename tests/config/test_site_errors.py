@@ -87,7 +87,7 @@ ONE_MISTAKE = {
     "number of floors with decimals, and a floor of its own": (
         "count = 2",
         "count = 2.0\n2.positions = 9",
-        "s.toml:4: floors.count = 2.0: is a decimal number; write a whole number from 1 to 127",
+        "s.toml:5: floors.count = 2.0: is a decimal number; write a whole number from 1 to 127",
     ),
     "no place": (
         "positions = 8",
