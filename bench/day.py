@@ -8,9 +8,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from bus_sim.day import DayOptions, run_day
 from bus_sim.sites import find_site
-from bus_sim.summary import RunSummary
+from bus_sim.systems.car_park.day import DayOptions, run_day
+from bus_sim.systems.car_park.summary import RunSummary
 
 
 def row(name: str, site: str, options: DayOptions) -> RunSummary:

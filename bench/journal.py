@@ -13,11 +13,11 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
-from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.trial import STEP_US
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.run import RunOptions, run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.authority import car_token
 from onboard.core.codes import TokenKind
@@ -25,8 +25,8 @@ from onboard.core.holon import Holon
 from onboard.core.site import Site, journal_owner
 from onboard.io.journal import GROWTH, LEAST_BYTES, FileJournal
 from onboard.io.sealed import begin
-from onboard.kinds.registry import compaction_for, factory_for
 from onboard.ports.journal import Entry
+from onboard.systems.registry import compaction_for, factory_for
 
 #: Arrivals and stays of the run that is repeated, s.
 MEAN_S, SIGMA_S, STAY_S = 110.0, 30.0, 150.0

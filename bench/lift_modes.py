@@ -21,8 +21,8 @@ from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import CallResult, KindCode
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.site import Site
-from onboard.kinds.car_park.site import RideCalls
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.site import RideCalls
+from onboard.systems.registry import factory_for
 from onboard.wire.codec import fleet_codec
 
 #: Customers come this long after power-up, us.

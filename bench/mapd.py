@@ -21,8 +21,8 @@ from bus_sim.systems.mapd.run import play_day
 from bus_sim.systems.mapd.steps import Day
 from bus_sim.systems.registry import SystemOptions
 from onboard.config.site import parse_site
-from onboard.kinds.mapd.messages import StepRound
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems.mapd.messages import StepRound
+from onboard.systems.mapd.site import Mapd
 
 
 def site_of(robots: int, rate: str) -> Mapd:

@@ -33,7 +33,7 @@ from onboard.gateway.settings import GatewaySettings
 from onboard.io.broker_address import BrokerAddress
 from onboard.io.journal import FileJournal
 from onboard.io.mqtt import MqttBroker
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.wire.codec import codecs
 from tests.mqtt.logs import VERSIONS, content, published, validator
 from tests.mqtt.mosquitto import Mosquitto

@@ -26,7 +26,6 @@ from onboard.config.site import parse_site
 from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
 from onboard.core.effects import Effect, Send
 from onboard.core.frame import Frame
-from onboard.core.kinematics import run_duration_us
 from onboard.core.messages import Bid, CallForProposals, Itinerary, Leg, Message, Reference, Stamp
 from onboard.core.negotiation import (
     Awarded,
@@ -42,6 +41,7 @@ from onboard.core.negotiation import (
 from onboard.core.negotiation import delay_us as better_bids_sooner
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Segment, Site, Timing
+from onboard.ways.kinematics import run_duration_us
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 

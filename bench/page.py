@@ -27,9 +27,9 @@ from websockets.sync.client import connect
 from bus_sim.demand import Demand
 from bus_sim.run import RunOptions, Simulation, build
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.page import CarParkSource
 from bus_sim.virtual_time import VirtualTimeLoop
-from bus_sim.web.car_park import CarParkSource
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.trace.readers.open_log import Log
 from onboard.web.film import Film
 from onboard.wire.codec import codecs

@@ -17,13 +17,13 @@ import time
 from bus_sim.sites import find_site
 from onboard.config.site import parse_site
 from onboard.core.codes import Grade, KindCode, LegAction, Side
-from onboard.core.kinematics import run_duration_us
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, travel_windows
-from onboard.core.refuges import open_refuges, refuges
-from onboard.core.reservations import Reservations, Window
-from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Segment, Site
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, travel_windows
+from onboard.ways.refuges import open_refuges, refuges
+from onboard.ways.reservations import Reservations, Window
+from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 
 SECOND = 1_000_000
 #: Floors, positions on each, compartments, robots with a plan beside the one that asks.

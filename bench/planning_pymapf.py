@@ -25,11 +25,11 @@ from typing import Any, NamedTuple
 
 from planning import MAX_EXPANSIONS, Fleet, park
 
-from onboard.core.departures import Departures
-from onboard.core.reservations import Interval
-from onboard.core.roads import Roads, roads_of
-from onboard.core.sipp import Route, Visit, plan_route
 from onboard.core.site import Axis, Segment, Site, TrackKind
+from onboard.ways.departures import Departures
+from onboard.ways.reservations import Interval
+from onboard.ways.roads import Roads, roads_of
+from onboard.ways.sipp import Route, Visit, plan_route
 
 TICK_US = 400_000
 #: So long that rounding to mm, and a body shorter than a place by a trifle, are less than a millisecond in a tick.

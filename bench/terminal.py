@@ -11,8 +11,8 @@ from bus_sim.run import RunOptions
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.central import play_auction, play_central
 from bus_sim.systems.terminal.run import Outcome
-from onboard.kinds.terminal.site import Blockage, Mission, Terminal
-from onboard.kinds.terminal.vehicle import terminal
+from onboard.systems.terminal.site import Blockage, Mission, Terminal
+from onboard.systems.terminal.vehicle import terminal
 
 SEEDS = range(1, 6)
 LIMIT_US = 3_600_000_000

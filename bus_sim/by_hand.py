@@ -11,9 +11,9 @@ from typing import Any, Self
 from rich.console import Console
 
 from bus_sim.demand import Stay
-from bus_sim.plant.bodies import random_car
-from bus_sim.plant.customer import State
-from bus_sim.plant.street import Street
+from bus_sim.systems.car_park.plant.bodies import random_car
+from bus_sim.systems.car_park.plant.customer import State
+from bus_sim.systems.car_park.plant.street import Street
 
 #: How fast a site runs for a person who presses keys, simulated seconds a second, unless told otherwise.
 HAND_SPEED = 10.0

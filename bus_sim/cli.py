@@ -11,7 +11,6 @@ from bus_sim.by_hand import HAND_SPEED
 from bus_sim.campaign.command import add_campaign, run_campaign_command, run_scenario
 from bus_sim.certify.command import add_certify, run_certify
 from bus_sim.compare.command import add_compare, run_compare
-from bus_sim.day import DayOptions, run_day
 from bus_sim.demand import DemandError
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.importers.command import add_import, run_import
@@ -23,6 +22,7 @@ from bus_sim.publish import PublishError, check_mqtt
 from bus_sim.serve.bridge import parse_bus_specs
 from bus_sim.serve.socketcand import ServeError
 from bus_sim.sites import SiteNotFoundError, find_site, site_names, site_text
+from bus_sim.systems.car_park.day import DayOptions, run_day
 from bus_sim.systems.registry import RUNNERS, SystemOptions
 from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__

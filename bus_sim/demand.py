@@ -13,7 +13,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from bus_sim.plant.bodies import CarBody, random_car
+from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
 
 #: Columns of a session file that are read; others may be there.
 COLUMNS = ("arrival", "departure", "station_id", "session_id")

@@ -12,9 +12,9 @@ from typing import Protocol
 from bus_sim.can.faults import Fault
 from bus_sim.can.medium import Medium, Tap
 from bus_sim.can.node import SimulatedBus
+from bus_sim.devices.timers import Timers
 from bus_sim.journal import SimulatedJournal
-from bus_sim.plant.plant import Plant
-from bus_sim.plant.timers import Timers
+from bus_sim.systems.car_park.plant.plant import Plant
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.controller.shell import Controller, Ports
 from onboard.core.behaviour import BehaviourFactory
@@ -24,8 +24,8 @@ from onboard.core.holon import Holon
 from onboard.core.messages import Message
 from onboard.core.serial import next_boot
 from onboard.core.site import Machine, Site, journal_owner
-from onboard.kinds.registry import compaction_for, factory_for, system_of
 from onboard.ports.bus import Bus
+from onboard.systems.registry import compaction_for, factory_for, system_of
 from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
 from onboard.wire.codec import codecs

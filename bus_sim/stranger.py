@@ -16,10 +16,10 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Machine, Site
-from onboard.kinds.car_park.generation import Alternative, CarParkGeneration, Solution
-from onboard.kinds.car_park.program import Program
-from onboard.kinds.car_park.robot import RobotFactory
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
+from onboard.systems.car_park.program import Program
+from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.registry import factory_for
 
 #: What it says that its first run takes, ms.
 RUN_MS = 10_000

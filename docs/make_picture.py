@@ -11,10 +11,10 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bus_sim.day import LEAD_US, DayOptions, choose_demand
 from bus_sim.run import RunOptions, build
-from bus_sim.show import Clock, draw
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.day import LEAD_US, DayOptions, choose_demand
+from bus_sim.systems.car_park.show import Clock, draw
 from bus_sim.virtual_time import VirtualTimeLoop
 from bus_sim.window import two_way_hour, with_short_eve
 

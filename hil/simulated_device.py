@@ -12,8 +12,8 @@ from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon
 from onboard.core.serial import next_boot
 from onboard.core.site import Machine
-from onboard.kinds.registry import factory_for
 from onboard.ports.bus import BusHealth
+from onboard.systems.registry import factory_for
 
 
 class SimulatedDevice:

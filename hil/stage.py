@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from bus_sim.demand import Stay
-from bus_sim.plant.bodies import random_car
-from bus_sim.plant.customer import Customer, Event, State
 from bus_sim.run import FLEET, Simulation
+from bus_sim.systems.car_park.plant.bodies import random_car
+from bus_sim.systems.car_park.plant.customer import Customer, Event, State
 from hil.device import Device
 from hil.notice import Notice
 from onboard.core.codes import MachineState

@@ -24,10 +24,10 @@ from onboard.io.journal import FileJournal
 from onboard.io.networkd import write_network_files
 from onboard.io.open_bus import BusOpenError, BusSettings, OpenBus, add_bus_arguments, bus_settings
 from onboard.io.signals import terminated_as_interrupted
-from onboard.kinds.registry import compaction_for, factory_for, system_of
 from onboard.life import Life
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
+from onboard.systems.registry import compaction_for, factory_for, system_of
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.codec import Codec, codecs
 

@@ -18,10 +18,10 @@ from onboard.core.messages import (
     Reference,
     SyncRequest,
 )
-from onboard.kinds.graph.messages import NodeAnswer, NodeVerdict, TurnSignal, VisitList, five
-from onboard.kinds.graph.site import FactoryGraph
-from onboard.kinds.terminal.messages import BoxOrder
-from onboard.kinds.terminal.site import EntityKind, Terminal
+from onboard.systems.graph.messages import NodeAnswer, NodeVerdict, TurnSignal, VisitList, five
+from onboard.systems.graph.site import FactoryGraph
+from onboard.systems.terminal.messages import BoxOrder
+from onboard.systems.terminal.site import EntityKind, Terminal
 
 _SECOND_US = 1_000_000
 #: Machines of another site that one node makes up.

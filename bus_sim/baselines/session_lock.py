@@ -10,15 +10,15 @@ from collections.abc import Iterable
 
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode, LegAction
-from onboard.core.lifts import platform
 from onboard.core.messages import Itinerary
 from onboard.core.mirror import Mirror
-from onboard.core.reservations import Reservations, Use, Window
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Machine, Site
-from onboard.kinds.car_park.generation import CarParkGeneration
-from onboard.kinds.car_park.robot import RobotFactory
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.registry import factory_for
+from onboard.ways.lifts import platform
+from onboard.ways.reservations import Reservations, Use, Window
 
 
 class SessionLocks(Reservations):

@@ -26,8 +26,8 @@ from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.serial import next_boot
 from onboard.core.site import Machine, Site
-from onboard.kinds.registry import factory_for, system_of
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
+from onboard.systems.registry import factory_for, system_of
 from onboard.wire.codec import Codecs, codecs
 
 #: What a controller that fell over by a program error says; everything else that it halts for is a decision.

@@ -10,13 +10,13 @@ from enum import StrEnum
 from functools import partial
 from typing import Final
 
-from bus_sim.campaign.car_park import ORIGIN_US, is_over
 from bus_sim.campaign.journal_points import journal_faults
 from bus_sim.campaign.trial import STEP_US
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.run import RunOptions, build, run_until
+from bus_sim.systems.car_park.stage import ORIGIN_US, is_over
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.frame import Frame
 from onboard.core.site import Site

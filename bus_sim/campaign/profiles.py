@@ -11,7 +11,7 @@ from bus_sim.faults.table import TEN_YEARS_MS, Value
 from bus_sim.systems.session import FAULTS
 from onboard.core.codes import KindCode
 from onboard.core.site import Site
-from onboard.kinds.car_park.site import CarPark
+from onboard.systems.car_park.site import CarPark
 
 #: Faults begin in this span after power-up, s: all of it while customers come and go, and all end before it is over.
 SPAN_S = (20.0, 900.0)

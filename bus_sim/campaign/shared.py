@@ -17,7 +17,6 @@ from multiprocessing.connection import Connection, wait
 from types import FrameType
 from typing import NamedTuple, NoReturn
 
-from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.limits import WallLimitError, end_after, event_limit, wall_limit_s
 from bus_sim.campaign.report import Report, Verdict
 from bus_sim.campaign.trial import HANGS, hung, play_stage
@@ -27,6 +26,7 @@ from bus_sim.faults.injection import Injection
 from bus_sim.faults.scenario import Scenario
 from bus_sim.run import RunOptions, Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.frame import Frame
 

@@ -6,16 +6,16 @@ from functools import partial
 from statistics import fmean
 
 from bus_sim import stranger as car_park
-from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.trial import stage_maker
 from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.plant.customer import Customer
 from bus_sim.run import RunOptions, run_until
 from bus_sim.sites import find_site
 from bus_sim.stranger import Stranger
 from bus_sim.systems import stranger as systems
+from bus_sim.systems.car_park.plant.customer import Customer
+from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.systems.orders import Orders
 from bus_sim.systems.stranger import WORKERS
 from bus_sim.virtual_time import VirtualTimeLoop, run_on

@@ -3,7 +3,6 @@
 from collections import Counter
 from pathlib import Path
 
-from bus_sim.campaign.car_park import CarPark
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
@@ -14,6 +13,7 @@ from bus_sim.campaign.systems import SYSTEMS, SystemStage
 from bus_sim.faults.arm import frame_faults
 from bus_sim.faults.scenario import Scenario
 from bus_sim.run import BusRun, RunOptions, run_until
+from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import EventLimitError, StandstillError, VirtualTimeLoop, run_on
 from onboard.core.site import Site
 

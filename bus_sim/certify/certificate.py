@@ -6,8 +6,8 @@ from itertools import islice
 
 from bus_sim.certify.model import ARRIVED, Model, State
 from bus_sim.certify.search import Search, Stuck, Tasks, TooLargeError, task_sets
-from onboard.kinds.graph.network import Graph, complete, grid, ring
-from onboard.kinds.graph.rules import Rules
+from onboard.systems.graph.network import Graph, complete, grid, ring
+from onboard.systems.graph.rules import Rules
 
 #: States that a search may remember before it gives up: about half a gigabyte.
 LIMIT = 1_500_000

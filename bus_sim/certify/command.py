@@ -13,9 +13,9 @@ from bus_sim.certify.throughput import Pace, measure
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.graph.against_optimum import compare
 from bus_sim.systems.registry import SystemOptions
-from onboard.kinds.graph.network import Graph, complete, grid, ring
-from onboard.kinds.graph.rules import Rules
-from onboard.kinds.graph.site import FactoryGraph
+from onboard.systems.graph.network import Graph, complete, grid, ring
+from onboard.systems.graph.rules import Rules
+from onboard.systems.graph.site import FactoryGraph
 
 #: Cases that are compared with the optimum at most.
 MOST_CASES = 20

@@ -8,8 +8,8 @@ from bus_sim.certify.on_the_bus import STILL_US, Scene, play_scene
 from bus_sim.certify.search import Stuck
 from bus_sim.sites import SiteNotFoundError
 from bus_sim.systems.registry import SystemOptions
-from onboard.kinds.graph.network import Graph, edge
-from onboard.kinds.graph.rules import Rules
+from onboard.systems.graph.network import Graph, edge
+from onboard.systems.graph.rules import Rules
 
 
 def write_counterexample(file: Path, graph: Graph, rules: Rules, capacity: int, stuck: Stuck) -> None:

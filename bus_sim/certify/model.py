@@ -8,8 +8,8 @@ waits in a node, and a node has ``capacity`` slots, robots that have come to the
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from onboard.kinds.graph.network import NOWHERE, Edge, Graph, edge
-from onboard.kinds.graph.rules import Heading, Rules, are_head_on, may_enter, other_edges
+from onboard.systems.graph.network import NOWHERE, Edge, Graph, edge
+from onboard.systems.graph.rules import Heading, Rules, are_head_on, may_enter, other_edges
 
 #: Instead of the node behind: this robot has come to its goal.
 ARRIVED = -2

@@ -9,18 +9,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from bus_sim.certify.model import Move
-from bus_sim.plant.link import BusDeviceLink
-from bus_sim.plant.timers import Timers
+from bus_sim.devices.link import BusDeviceLink
+from bus_sim.devices.timers import Timers
 from bus_sim.systems.graph.body import Body
 from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import Played, play
 from onboard.config.site import parse_site
 from onboard.core.site import Site
-from onboard.kinds.graph.messages import BodyPlace
-from onboard.kinds.graph.network import Graph
-from onboard.kinds.graph.rules import Rules
-from onboard.kinds.graph.site import FactoryGraph
+from onboard.systems.graph.messages import BodyPlace
+from onboard.systems.graph.network import Graph
+from onboard.systems.graph.rules import Rules
+from onboard.systems.graph.site import FactoryGraph
 
 #: The shortest edge of the hall that is played, mm: a graph without measures is made so large.
 EDGE_MM = 6_000

@@ -10,7 +10,7 @@ from collections import deque
 from itertools import product
 
 from bus_sim.certify.search import Tasks
-from onboard.kinds.graph.network import NOWHERE, Graph, edge
+from onboard.systems.graph.network import NOWHERE, Graph, edge
 
 #: Where a robot is and whence it came.
 _Place = tuple[int, int]

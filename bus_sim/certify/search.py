@@ -7,7 +7,7 @@ from itertools import combinations, permutations
 from typing import NamedTuple
 
 from bus_sim.certify.model import Model, Move, State
-from onboard.kinds.graph.network import Graph
+from onboard.systems.graph.network import Graph
 
 
 class Tasks(NamedTuple):

@@ -8,7 +8,7 @@ import random
 from dataclasses import dataclass
 
 from bus_sim.certify.model import Model, Move, Robot, State
-from onboard.kinds.graph.network import NOWHERE
+from onboard.systems.graph.network import NOWHERE
 
 
 @dataclass(frozen=True)

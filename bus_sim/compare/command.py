@@ -10,12 +10,12 @@ from bus_sim.compare.optimum import OptimumError, is_available
 from bus_sim.compare.plays import POLICIES, Play, play
 from bus_sim.compare.small_table import SmallTable, solve_case
 from bus_sim.compare.table import Table, tabulate
-from bus_sim.day import DayOptions, choose_demand
 from bus_sim.demand import Demand, DemandError
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.day import DayOptions, choose_demand
 from bus_sim.window import Window, choose_window
 from onboard.core.site import Site
-from onboard.kinds.car_park.site import CarPark
+from onboard.systems.car_park.site import CarPark
 
 #: What the command can compare on.
 PARTS = ("random", "day", "small")

@@ -7,12 +7,12 @@ compartment, and pays nothing for any of that; only its word goes over the bus.
 from bus_sim.compare.obedience import DISPATCHER, TASKS, ObedientNegotiation
 from bus_sim.compare.policies import OpenTask, Order, Policy, Scene
 from bus_sim.compare.prospect import Prospect
-from bus_sim.plant.customer import State
 from bus_sim.run import Simulation
+from bus_sim.systems.car_park.plant.customer import State
 from onboard.core.codes import NOBODY, CallResult, Grade, MachineState, Reason, TaskPhase
 from onboard.core.messages import Award, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.negotiation import CallKey
-from onboard.kinds.car_park.robot import Robot
+from onboard.systems.car_park.robot import Robot
 from onboard.wire.codec import fleet_codec
 
 #: Everybody has read a frame so long after it was heard, us. Ours.

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bus_sim.demand import Demand, Stay
-from bus_sim.plant.bodies import DRIVER_S
-from bus_sim.plant.customer import REACTION_US, WALK_S
-from bus_sim.plant.door import BOLT_US
-from onboard.core.kinematics import run_duration_us
-from onboard.core.roads import roads_of
+from bus_sim.systems.car_park.plant.bodies import DRIVER_S
+from bus_sim.systems.car_park.plant.customer import REACTION_US, WALK_S
+from bus_sim.systems.car_park.plant.door import BOLT_US
 from onboard.core.site import Site
-from onboard.kinds.car_park.site import car_park
+from onboard.systems.car_park.site import car_park
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.roads import roads_of
 
 
 class Acts(NamedTuple):

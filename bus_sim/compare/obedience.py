@@ -25,9 +25,9 @@ from onboard.core.negotiation import (
 )
 from onboard.core.negotiation.initiator import Event
 from onboard.core.site import Machine, Segment, Site
-from onboard.kinds.car_park.generation import AWARD_LATENCY_US, CarParkGeneration
-from onboard.kinds.car_park.robot import RobotFactory
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.generation import AWARD_LATENCY_US, CarParkGeneration
+from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.registry import factory_for
 
 #: Node-ID under which the dispatcher speaks: one of those that no machine of a site has, and that may award.
 DISPATCHER = 251

@@ -8,8 +8,8 @@ from bus_sim.compare import obedience
 from bus_sim.compare.dispatcher import Dispatcher
 from bus_sim.compare.policies import AnyFirst, JointChoice, NearestFirst, Policy
 from bus_sim.demand import Demand
-from bus_sim.plant.customer import Customer, Outcome
 from bus_sim.run import RunOptions, Simulation, build, run_until
+from bus_sim.systems.car_park.plant.customer import Customer, Outcome
 from bus_sim.virtual_time import VirtualTimeLoop
 from bus_sim.window import Window
 from onboard.core.site import Site

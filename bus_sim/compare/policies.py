@@ -11,8 +11,8 @@ from typing import NamedTuple, Protocol
 
 from bus_sim.compare.prospect import Prospect, serves_customer_us
 from onboard.core.messages import CallForProposals
-from onboard.core.reservations import FOREVER
-from onboard.kinds.car_park.generation import Solution
+from onboard.systems.car_park.generation import Solution
+from onboard.ways.reservations import FOREVER
 
 #: What a task counts for which nobody waits: somebody may come. In customers; ours (1 decides alike).
 NOBODY_YET = 0.5

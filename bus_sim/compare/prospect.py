@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from onboard.core.codes import Grade, LegAction, Operation
 from onboard.core.messages import CallForProposals, Stamp
 from onboard.core.mirror import Mirror
-from onboard.core.occupancy import itinerary_windows, lift_uses
-from onboard.core.reservations import FOREVER
-from onboard.core.roads import roads_of
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Station
-from onboard.kinds.car_park.generation import CarParkGeneration, Solution
-from onboard.kinds.car_park.program import Program, to_itinerary
+from onboard.systems.car_park.generation import CarParkGeneration, Solution
+from onboard.systems.car_park.program import Program, to_itinerary
+from onboard.ways.occupancy import itinerary_windows, lift_uses
+from onboard.ways.reservations import FOREVER
+from onboard.ways.roads import roads_of
 
 
 @dataclass(frozen=True)

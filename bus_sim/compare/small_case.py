@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from bus_sim.compare.free_flow import Acts, FreeFlow
 from bus_sim.demand import Demand
-from bus_sim.plant.customer import REACTION_US
+from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.core.codes import KindCode
-from onboard.core.roads import roads_of
 from onboard.core.site import Segment, Site, Station
+from onboard.ways.roads import roads_of
 
 #: Places kept for each car, those nearest to the bay: on both sides of it more than the cars need, and all ways to and
 #: from a farther one on the same side are longer.

@@ -3,9 +3,9 @@
 import random
 from dataclasses import replace
 
+from bus_sim.devices.link import MessageFilter
 from bus_sim.faults.controllers import machine_named
 from bus_sim.faults.injection import Injection
-from bus_sim.plant.link import MessageFilter
 from bus_sim.run import Simulation
 from onboard.core.messages import DeskEvent, DriveOrder, DriveState, Message
 

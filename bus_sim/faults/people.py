@@ -5,9 +5,9 @@ from functools import partial
 
 from bus_sim.faults.controllers import machine_named
 from bus_sim.faults.injection import Injection
-from bus_sim.plant.customer import Customer, Event
-from bus_sim.plant.motion import standing
 from bus_sim.run import Simulation
+from bus_sim.systems.car_park.plant.customer import Customer, Event
+from bus_sim.systems.car_park.plant.motion import standing
 from onboard.core.codes import DoorName, DoorPosition
 
 #: Somebody who waits for the right moment looks again after this, us (ours).

@@ -36,7 +36,7 @@ from bus_sim.systems.orders import Orders
 from bus_sim.systems.session import check_faults
 from onboard.config.problems import ConfigError, Problems, nearest, quoted
 from onboard.core.site import Site
-from onboard.kinds.car_park.site import CarPark
+from onboard.systems.car_park.site import CarPark
 
 
 @dataclass(frozen=True)

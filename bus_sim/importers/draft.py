@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.config.problems import quoted
-from onboard.kinds.mapd.floor import Line
+from onboard.systems.mapd.floor import Line
 
 _UNFIT = re.compile(r"[^A-Za-z0-9]+")
 #: A machine's name goes into a DBC: 16 characters.

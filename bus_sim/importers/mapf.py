@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.importers.draft import Draft, Loss, TaskLine, draw_tasks
-from onboard.config.mapd import BLOCKED, MAX_RELEASE
 from onboard.config.problems import Problems
-from onboard.kinds.mapd.floor import FAR, FREE, Floor, grid_floor, lasting_rests
+from onboard.systems.mapd.floor import FAR, FREE, Floor, grid_floor, lasting_rests
+from onboard.systems.mapd.reader import BLOCKED, MAX_RELEASE
 
 #: Endpoints drawn on a map that marks none. Ours.
 ENDPOINTS = 20

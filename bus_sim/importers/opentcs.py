@@ -9,9 +9,9 @@ from pathlib import Path
 from bus_sim.importers.draft import Draft, Loss, draw_tasks, machine_name
 from bus_sim.importers.mapf import Wanted
 from bus_sim.importers.xml_tree import Element, parse_xml
-from onboard.config.mapd import MAX_STEPS
 from onboard.config.problems import Problems, nearest
-from onboard.kinds.mapd.floor import Line, lasting_rests, network_floor
+from onboard.systems.mapd.floor import Line, lasting_rests, network_floor
+from onboard.systems.mapd.reader import MAX_STEPS
 
 _LONGEST_MM = 10_000_000
 

@@ -11,9 +11,9 @@ from pathlib import Path
 from bus_sim.importers.draft import Draft, Loss, draw_tasks, machine_name
 from bus_sim.importers.mapf import Wanted
 from bus_sim.importers.yaml_tree import Value, parse_yaml
-from onboard.config.mapd import MAX_STEPS
 from onboard.config.problems import Problems
-from onboard.kinds.mapd.floor import Line, lasting_rests, network_floor
+from onboard.systems.mapd.floor import Line, lasting_rests, network_floor
+from onboard.systems.mapd.reader import MAX_STEPS
 
 #: A robot's step, mm, and how long it takes, ms: tinyRobot and deliveryRobot of the demos go at half a metre a second.
 STEP_MM, STEP_MS = 1_000, 2_000

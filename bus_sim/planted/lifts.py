@@ -10,8 +10,8 @@ from bus_sim.planted.bug import PlantedBug
 from bus_sim.planted.tools import hearing, in_behaviour, reaches_goal, replace
 from bus_sim.run import Simulation
 from onboard.core.codes import KindCode, Reason
-from onboard.core.lifts import gate
 from onboard.core.messages import Message, PlatformState
+from onboard.ways.lifts import gate
 
 
 def _gate_forgotten(simulation: Simulation) -> None:

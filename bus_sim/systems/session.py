@@ -14,16 +14,16 @@ from rich.text import Text
 
 from bus_sim.can.medium import Medium
 from bus_sim.demand import DemandError
+from bus_sim.devices.link import BusDeviceLink
+from bus_sim.devices.timers import LoopTimers, Timers
 from bus_sim.faults.arm import arm, check_targets, frame_faults
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.plant.link import BusDeviceLink
-from bus_sim.plant.timers import LoopTimers, Timers
 from bus_sim.run import BusRun, RunOptions, Simulation, buses_of, run_until
 from bus_sim.systems.watched import FOREVER_US, watched
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.wire.codec import codecs
 from onboard.wire.decoder import Decoder
 

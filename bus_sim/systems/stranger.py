@@ -15,7 +15,7 @@ from onboard.core.messages import CallForProposals, Message, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, Awarded, Estimator, Needs, NegotiationEvent, Proposal
 from onboard.core.site import Machine, Site
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 
 #: Machines that carry out orders, by system.
 WORKERS = {

@@ -10,7 +10,7 @@ from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.terminal.plant import TerminalPlant
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.web.run_source import Act, Arguments, RunSource
-from onboard.kinds.terminal.site import Blockage, EntityKind
+from onboard.systems.terminal.site import Blockage, EntityKind
 from onboard.web.app import CommandError
 
 

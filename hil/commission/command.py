@@ -14,7 +14,7 @@ from hil.commission.walk import walk
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.wire.codec import codecs
 
 HELP = """\

@@ -21,7 +21,7 @@ from hil.guest.mesh import Mesh, hand_out_boards, inside, join_pair, run
 from onboard.cli import main as onboard
 from onboard.config.site import parse_site
 from onboard.io.pycan import open_python_can
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.wire.codec import codecs
 
 #: Further nodes of the fleet bus: the simulated plant, which only listens there, and the tools of a person.

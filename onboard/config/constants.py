@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from onboard.config.reader import Table
 from onboard.core.negotiation.bidding import slot_length_us
 from onboard.core.site import Axis, Timing
-from onboard.kinds.car_park.site import CarLimits
+from onboard.systems.car_park.site import CarLimits
 
 #: Longest classic frame with 29-bit identifier and 8 data bytes, bits (Davis, Burns, Bril and Lukkien 2007).
 WORST_FRAME_BITS = 160

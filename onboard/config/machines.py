@@ -3,11 +3,11 @@
 import re
 from dataclasses import dataclass, field
 
-from onboard.config.layout import FIRST_LIFT, SIDES, Layout
 from onboard.config.reader import Table
 from onboard.config.toml_lines import path_text
 from onboard.core.codes import MAX_NODE_ID, KindCode
 from onboard.core.site import Machine, Segment, Station, Track
+from onboard.systems.car_park.layout import FIRST_LIFT, SIDES, Layout
 
 #: A C identifier, as a DBC names nodes and messages, short enough for ``<name>_<message>`` within its 32 characters.
 #: No underscore at the end: most words of the DBC language end so. The others are ``_DBC_WORDS``.

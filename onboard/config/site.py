@@ -11,16 +11,16 @@ from typing import Any
 
 from onboard.config.constants import read_constants, read_timing
 from onboard.config.files import root_table
-from onboard.config.layout import Layout, read_layout
 from onboard.config.machines import Fleet, read_fleet, read_stewards
 from onboard.config.problems import Problems
 from onboard.config.reader import Table
-from onboard.config.room import check_room
 from onboard.config.shipped import site_source
 from onboard.config.systems import READERS, Common
 from onboard.core.codes import KindCode
 from onboard.core.site import Site, TrackKind
-from onboard.kinds.car_park.site import CarPark, RideCalls
+from onboard.systems.car_park.layout import Layout, read_layout
+from onboard.systems.car_park.room import check_room
+from onboard.systems.car_park.site import CarPark, RideCalls
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 

@@ -1,9 +1,9 @@
 """What a site is, in lines for a person: size, machines, refuges, and what the loss of a lift strands."""
 
-from onboard.config.room import ranges_text, robots_of, robots_text, room_text
 from onboard.core.codes import KindCode
-from onboard.core.reach import hidden_by, reached, stranded_by
 from onboard.core.site import Machine, Segment, Site, Station, TrackKind
+from onboard.systems.car_park.room import ranges_text, robots_of, robots_text, room_text
+from onboard.ways.reach import hidden_by, reached, stranded_by
 
 _KINDS = (
     (KindCode.COMPARTMENT, "compartment"),

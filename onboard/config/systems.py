@@ -7,13 +7,13 @@ it made of the rest, with digest 0: the caller raises, refuses unknown keys and 
 from collections.abc import Callable
 from typing import NamedTuple
 
-from onboard.config.cell import read_cell
-from onboard.config.graph import read_graph
-from onboard.config.mapd import read_mapd
 from onboard.config.reader import Table
-from onboard.config.terminal import read_terminal
-from onboard.config.turning import read_turning
 from onboard.core.site import Site
+from onboard.systems.cell.reader import read_cell
+from onboard.systems.graph.reader import read_graph
+from onboard.systems.mapd.reader import read_mapd
+from onboard.systems.terminal.reader import read_terminal
+from onboard.systems.turning.reader import read_turning
 
 
 class Common(NamedTuple):

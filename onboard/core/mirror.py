@@ -7,16 +7,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, OUTSIDE, Grade, KindCode, MachineState, Reason
-from onboard.core.lift_uses import standing_after
-from onboard.core.lifts import lift_tracks
 from onboard.core.messages import Blocked, CarAt, Clear, Heartbeat, Itinerary, Progress, Reference
-from onboard.core.obstacles import Obstacles
-from onboard.core.occupancy import final_position, itinerary_windows, lift_uses, turned_in
-from onboard.core.passing import Plan, next_plan
-from onboard.core.passing_order import PassingOrder
-from onboard.core.reservations import Reservations
 from onboard.core.serial import is_newer, reread_us
 from onboard.core.site import Segment, Site, Station
+from onboard.ways.lift_uses import standing_after
+from onboard.ways.lifts import lift_tracks
+from onboard.ways.obstacles import Obstacles
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, turned_in
+from onboard.ways.passing import Plan, next_plan
+from onboard.ways.passing_order import PassingOrder
+from onboard.ways.reservations import Reservations
 
 #: Heartbeats missed before a node counts as silent.
 MISSED_HEARTBEATS = 3

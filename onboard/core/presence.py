@@ -13,10 +13,10 @@ from onboard.core.authority import TokenBook
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, STILL, MachineState, Reason
 from onboard.core.messages import Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
-from onboard.core.obstacles import holder_in
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
-from onboard.core.standing import Standing
+from onboard.ways.obstacles import holder_in
+from onboard.ways.standing import Standing
 
 #: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word. Ours.
 SLEPT_BEATS = 2

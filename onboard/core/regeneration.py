@@ -14,7 +14,6 @@ from onboard.core.authority import TokenBook, TokenKey, car_token, may_exist, se
 from onboard.core.belief import Belief
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, OUTSIDE, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.lifts import GATE_INDEX, PLATFORM_INDEX
 from onboard.core.messages import CarAt, Heartbeat, Message, Reference, TokenHeld
 from onboard.core.mirror import CarRecord
 from onboard.core.recovery_messages import (
@@ -26,6 +25,7 @@ from onboard.core.recovery_messages import (
 )
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, TrackKind
+from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX
 
 #: A freeze that its operator does not say again for so long is over, us: it says it each second. Ours.
 FORGOTTEN_US = 10_000_000

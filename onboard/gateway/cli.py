@@ -27,8 +27,8 @@ from onboard.io.open_bus import (
     parse_with_bus,
 )
 from onboard.io.signals import ended_by
-from onboard.kinds.registry import system_of
 from onboard.ports.broker import BrokerError
+from onboard.systems.registry import system_of
 from onboard.wire.codec import Codec, codecs
 
 EXAMPLES = """\

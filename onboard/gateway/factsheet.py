@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from onboard.core.site import Machine, Site
 from onboard.gateway.dialect import Dialect, Json
 from onboard.gateway.settings import GatewaySettings
-from onboard.kinds.car_park.site import CarPark
-from onboard.kinds.graph.site import FactoryGraph
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems.car_park.site import CarPark
+from onboard.systems.graph.site import FactoryGraph
+from onboard.systems.mapd.site import Mapd
 
 #: Largest payload taken, bytes; see onboard/gateway/inbox.
 MOST_BYTES = 65_536

@@ -15,8 +15,8 @@ from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.machines import TRAVELLERS
 from onboard.gateway.settings import GatewaySettings
 from onboard.gateway.state import reference_text
-from onboard.kinds.graph.site import FactoryGraph
-from onboard.kinds.terminal.site import Terminal
+from onboard.systems.graph.site import FactoryGraph
+from onboard.systems.terminal.site import Terminal
 from onboard.trace.view import CallRecord
 from onboard.trace.words import Words
 from onboard.web.picture import LivePicture

@@ -12,12 +12,12 @@ from typing import Protocol
 from onboard.core.codes import Grade, LegAction
 from onboard.core.messages import Itinerary, Message, Progress
 from onboard.core.site import Segment, Site, TrackKind
-from onboard.kinds.graph.messages import RobotAt
-from onboard.kinds.graph.site import FactoryGraph
-from onboard.kinds.terminal.messages import PlanHead, PlanStep, StepReport, StepResult
-from onboard.kinds.terminal.site import Terminal
+from onboard.systems.graph.messages import RobotAt
+from onboard.systems.graph.site import FactoryGraph
+from onboard.systems.terminal.messages import PlanHead, PlanStep, StepReport, StepResult
+from onboard.systems.terminal.site import Terminal
 
-#: A graph's robot that has nowhere to go says so with this (onboard/kinds/graph/messages.NO_NODE).
+#: A graph's robot that has nowhere to go says so with this (onboard/systems/graph/messages.NO_NODE).
 _NO_NODE = 255
 
 

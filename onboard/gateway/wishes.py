@@ -13,12 +13,12 @@ from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, Operation, Operat
 from onboard.core.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference, SyncRequest
 from onboard.core.site import Site
 from onboard.gateway.order import Life, Order, Wish
-from onboard.kinds.car_park.site import CarPark
-from onboard.kinds.graph.messages import VisitList, five
-from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph
-from onboard.kinds.mapd.site import Mapd
-from onboard.kinds.terminal.messages import BoxOrder
-from onboard.kinds.terminal.site import EntityKind, Terminal
+from onboard.systems.car_park.site import CarPark
+from onboard.systems.graph.messages import VisitList, five
+from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
+from onboard.systems.mapd.site import Mapd
+from onboard.systems.terminal.messages import BoxOrder
+from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
 
 #: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.

@@ -11,12 +11,12 @@ from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, bus_settings, open_bus, parse_with_bus
-from onboard.kinds.registry import system_of
 from onboard.operate.asking import Asker
 from onboard.operate.names import OperateError, tool_of
 from onboard.operate.order import MISTAKE
 from onboard.operate.station import Station
 from onboard.operate.wishes import Maker, Wish, maker_of
+from onboard.systems.registry import system_of
 from onboard.wire.codec import codecs
 
 EXAMPLES = """\

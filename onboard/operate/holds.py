@@ -1,4 +1,4 @@
-"""``hold`` and ``release``: a person has a hand in one machine that moves (row M38; onboard/core/manual.py)."""
+"""``hold`` and ``release``: a person has a hand in one machine that moves (row M38; onboard/work/manual.py)."""
 
 from onboard.core.messages import ManualState, Message
 from onboard.core.site import Machine

@@ -5,7 +5,7 @@ import re
 from onboard.config.problems import nearest
 from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, NOBODY, Reason
 from onboard.core.site import Machine, Segment, Site, TrackKind
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems.mapd.site import Mapd
 
 #: Node-IDs under which a person's tool may speak (dbc/fleet.dbc: kept for gateways and tools).
 FIRST_TOOL, LAST_TOOL = MAX_NODE_ID + 1, 255

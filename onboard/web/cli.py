@@ -11,7 +11,7 @@ from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
 from onboard.io.signals import ended_by
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.trace.readers.open_log import Log, LogOpenError
 from onboard.web.address import DEFAULT_PORT, WebError
 from onboard.web.app import Source

@@ -13,10 +13,10 @@ from bus_sim.systems.session import Played, play
 from onboard.core.codes import KindCode
 from onboard.core.messages import Message
 from onboard.core.site import Machine, Segment
-from onboard.kinds.cell.contracts import Arm
-from onboard.kinds.cell.geometry import Area, Point
-from onboard.kinds.cell.robot import ArmRobot
-from onboard.kinds.cell.site import Cell, Wish
+from onboard.systems.cell.contracts import Arm
+from onboard.systems.cell.geometry import Area, Point
+from onboard.systems.cell.robot import ArmRobot
+from onboard.systems.cell.site import Cell, Wish
 from tests.cell.witness import ARMS, DESK, GOAL
 
 M = TypeVar("M", bound=Message)

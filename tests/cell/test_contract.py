@@ -9,10 +9,10 @@ from cantools.database.can import Message as DbcMessage
 
 from dbc import system_dbc_text
 from onboard.core.messages import Message, Reference
-from onboard.kinds.cell import messages as cell_messages
-from onboard.kinds.cell.goal_frames import Hearsay
-from onboard.kinds.cell.messages import OfferHigh, OfferLow, OfferNodes, from_halves, halves
-from onboard.kinds.turning import messages as turning_messages
+from onboard.systems.cell import messages as cell_messages
+from onboard.systems.cell.goal_frames import Hearsay
+from onboard.systems.cell.messages import OfferHigh, OfferLow, OfferNodes, from_halves, halves
+from onboard.systems.turning import messages as turning_messages
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts
 from onboard.wire.decoder import Decoder

@@ -8,8 +8,8 @@ import pytest
 
 from bus_sim.systems.cell.tree import ContractTree
 from onboard.core.messages import Reference
-from onboard.kinds.cell.contracts import Arm, Filter, Goal
-from onboard.kinds.cell.geometry import Area, Point, crosses, shortest_way, way_length_m
+from onboard.systems.cell.contracts import Arm, Filter, Goal
+from onboard.systems.cell.geometry import Area, Point, crosses, shortest_way, way_length_m
 
 
 def _cheapest(arms: tuple[Arm, ...], goal: Goal) -> float | None:

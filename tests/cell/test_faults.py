@@ -6,8 +6,8 @@ from bus_sim.systems.cell.plant import make_plant
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play
 from onboard.core.messages import Bid, CallForProposals, Message, Reference
-from onboard.kinds.cell.messages import ArmPhase, ArmProgress, GoalPath, PartAt
-from onboard.trace.check.cell import RULES
+from onboard.systems.cell.checks import RULES
+from onboard.systems.cell.messages import ArmPhase, ArmProgress, GoalPath, PartAt
 from tests.cell.playing import cell, wish
 from tests.faults.systems import judged, withstands
 

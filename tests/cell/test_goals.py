@@ -7,9 +7,9 @@ import pytest
 from bus_sim.run import BusRun
 from bus_sim.systems.cell.tree import ContractTree
 from onboard.core.messages import Bid, CallForProposals, Reference, TaskReport
-from onboard.kinds.cell.contracts import Goal
-from onboard.kinds.cell.geometry import Area, distance_m
-from onboard.kinds.cell.messages import ArmProgress, OrderResult, PartAt
+from onboard.systems.cell.contracts import Goal
+from onboard.systems.cell.geometry import Area, distance_m
+from onboard.systems.cell.messages import ArmProgress, OrderResult, PartAt
 from tests.cell.playing import Scene, cell, wish
 from tests.cell.witness import ARMS, DESK, arm, metres
 

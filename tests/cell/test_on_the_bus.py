@@ -9,9 +9,9 @@ from bus_sim.systems.cell.show import plan
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, TaskPhase
 from onboard.core.holon import Holon
 from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
-from onboard.kinds.cell.geometry import Point
-from onboard.kinds.cell.memory import undertakings
-from onboard.kinds.cell.messages import (
+from onboard.systems.cell.geometry import Point
+from onboard.systems.cell.memory import undertakings
+from onboard.systems.cell.messages import (
     ArmPhase,
     ArmProgress,
     GoalPath,
@@ -149,7 +149,7 @@ def test_p59_the_cell_runs_on_the_same_holon_as_the_car_park(scene: Scene) -> No
     assert {type(one.holon) for one in scene.played.run.controllers.values()} == {Holon}
     core = Path(__file__).parents[2] / "onboard" / "core"
     for file in core.rglob("*.py"):
-        assert "onboard.kinds" not in file.read_text(encoding="utf-8"), file
+        assert "onboard.systems" not in file.read_text(encoding="utf-8"), file
     phases = [one.arm_phase for _, one in scene.said(ArmProgress) if one.sender == 1]
     assert list(dict.fromkeys(phases))[:5] == [
         *(ArmPhase.IDLE, ArmPhase.WAITING, ArmPhase.TO_PART, ArmPhase.TAKING, ArmPhase.CARRYING)

@@ -5,7 +5,7 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.config.problems import ConfigError
 from onboard.config.site import parse_site
-from onboard.kinds.cell.site import Area, Cell, Point
+from onboard.systems.cell.site import Area, Cell, Point
 
 GOOD = """
 [site]

@@ -7,9 +7,9 @@ import pytest
 
 from bus_sim.systems.cell.text import printed
 from bus_sim.systems.cell.tree import ALL_FILTERS, ContractTree
-from onboard.kinds.cell.contracts import Contract, Filter, filtered
-from onboard.kinds.cell.geometry import Area, Point
-from onboard.kinds.cell.offers import OFFERS, OfferRule, closest_in_x, closest_in_y, equal_steps
+from onboard.systems.cell.contracts import Contract, Filter, filtered
+from onboard.systems.cell.geometry import Area, Point
+from onboard.systems.cell.offers import OFFERS, OfferRule, closest_in_x, closest_in_y, equal_steps
 from tests.cell.witness import ARMS, GOAL, HOMES, metres
 
 

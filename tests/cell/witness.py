@@ -1,8 +1,8 @@
 """The witness geometry of the paper's printed run (Panescu, Miron 2006, Fig. 5): 1 in the paper is 1 m here."""
 
 from onboard.core.messages import Reference
-from onboard.kinds.cell.contracts import Arm, Goal
-from onboard.kinds.cell.geometry import Area, Point
+from onboard.systems.cell.contracts import Arm, Goal
+from onboard.systems.cell.geometry import Area, Point
 
 _ROBOTS = (
     ((2, 4, 22, 16), (8, 11)),

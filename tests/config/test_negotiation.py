@@ -3,7 +3,7 @@
 import pytest
 
 from onboard.config.problems import ConfigError
-from onboard.kinds.car_park.site import RideCalls
+from onboard.systems.car_park.site import RideCalls
 from tests.sites import one_floor
 
 

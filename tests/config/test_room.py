@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from onboard.config.site import parse_site
 from onboard.core.codes import KindCode
-from onboard.core.refuges import open_refuges
+from onboard.ways.refuges import open_refuges
 from tests.config.support import problems_of
 
 LIFTS = 'lifts = [{name = "LL", node = 5, end = "left"}, {name = "LR", node = 6, end = "right"}]\n'

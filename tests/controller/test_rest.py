@@ -14,7 +14,7 @@ from bus_sim.sites import find_site
 from bus_sim.virtual_time import EventLimitError, StandstillError, VirtualTimeLoop
 from onboard.controller.rest import MOST_WAKES, Rest
 
-RESTLESS = "onboard.kinds.car_park.robot.Robot.next_wake"
+RESTLESS = "onboard.systems.car_park.robot.Robot.next_wake"
 SCENE = Scenario("level1", 1, 600.0, Arrivals(1, 5.0, 1.0, 60.0))
 
 

@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from onboard.core.lifts import lift_index_of, lift_tracks
 from onboard.core.site import Site
+from onboard.ways.lifts import lift_index_of, lift_tracks
 
 
 class Ride(NamedTuple):

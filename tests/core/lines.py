@@ -1,7 +1,7 @@
 """Small sites made of plain values, with axes and lengths that no site file would accept."""
 
 from onboard.core.site import Axis, Segment, Timing, Track, TrackKind
-from onboard.kinds.car_park.site import CarLimits, CarPark
+from onboard.systems.car_park.site import CarLimits, CarPark
 
 ALLEY = 1
 SPUR = 192

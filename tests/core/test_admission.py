@@ -19,7 +19,7 @@ from onboard.core.messages import (
     TokenHeld,
 )
 from onboard.core.recovery_messages import Go
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
 

@@ -5,7 +5,7 @@ from onboard.core.codes import KindCode, Reason
 from onboard.core.holding import STOP_LASTS_US, Hold
 from onboard.core.holon import Holon
 from onboard.core.messages import BusTime, EmergencyStop
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 
 SITE = find_site("small")
 BAY, LIFT, OPERATOR = 1, 5, 252

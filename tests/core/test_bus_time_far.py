@@ -6,7 +6,7 @@ from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.holon import Holon
 from onboard.core.messages import BusTime
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 
 SITE = find_site("small")
 BAY, LIFT = 1, 5

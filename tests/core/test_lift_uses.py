@@ -1,7 +1,9 @@
 import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.lift_uses import (
+from onboard.core.messages import Itinerary, Leg, Stamp
+from onboard.core.site import Axis, Segment, Site
+from onboard.ways.lift_uses import (
     GATE_US,
     Gap,
     are_compatible,
@@ -11,11 +13,9 @@ from onboard.core.lift_uses import (
     run_up_us,
     standing_after,
 )
-from onboard.core.lifts import platform
-from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.occupancy import final_position, itinerary_windows, lift_uses
-from onboard.core.reservations import FOREVER, Interval, Reservations, Use, Window
-from onboard.core.site import Axis, Segment, Site
+from onboard.ways.lifts import platform
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
+from onboard.ways.reservations import FOREVER, Interval, Reservations, Use, Window
 from tests.core.buildings import LEFT, RIGHT, building
 
 #: As in the tests of occupancy: 10 mm a segment and a floor; one step of either takes 20 ms, each more 10 ms.

@@ -10,7 +10,7 @@ from onboard.core.messages import CarAt, Heartbeat, Reference, SyncRequest, Toke
 from onboard.core.mirror import MAX_GONE_CARS, Mirror
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 from tests.core.walkers import Alley
 from tests.sites import one_floor
 

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from onboard.core.codes import NOBODY, Grade, LegAction, Reason, Side
 from onboard.core.messages import Itinerary, Leg, Progress, Stamp
-from onboard.core.passing import Plan
-from onboard.core.passing_order import PassingOrder
 from onboard.core.site import Segment
+from onboard.ways.passing import Plan
+from onboard.ways.passing_order import PassingOrder
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)

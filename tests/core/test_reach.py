@@ -3,8 +3,8 @@
 import pytest
 
 from onboard.config.site import parse_site
-from onboard.core.reach import hidden_by, passages, reached, stranded_by
 from onboard.core.site import Segment, Site
+from onboard.ways.reach import hidden_by, passages, reached, stranded_by
 
 LIFT = '[[lifts]]\nname = "L{node}"\nnode = {node}\nend = "{end}"\nfloors = {floors}\n'
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.core.reservations import FOREVER, Interval, Reservations, Window
 from onboard.core.site import Segment
+from onboard.ways.reservations import FOREVER, Interval, Reservations, Window
 
 HERE = Segment(1, 4)
 THERE = Segment(1, 5)

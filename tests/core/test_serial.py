@@ -4,7 +4,7 @@ import pytest
 
 from onboard.core.messages import Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS, away, from_bus_ms, ms_after, to_bus_ms
-from onboard.kinds.cell.contracts import NO_LIMIT, Urgency
+from onboard.systems.cell.contracts import NO_LIMIT, Urgency
 
 LAST_MS = BUS_MS_MODULUS - 1
 HALF_MS = BUS_MS_MODULUS >> 1

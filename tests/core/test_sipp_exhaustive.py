@@ -5,11 +5,11 @@ import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.occupancy import itinerary_windows
-from onboard.core.reservations import FOREVER, Reservations, Window
 from onboard.core.serial import to_bus_ms
-from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Segment
+from onboard.ways.occupancy import itinerary_windows
+from onboard.ways.reservations import FOREVER, Reservations, Window
+from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from tests.core.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Exhaustive, Place, Problem
 from tests.core.lines import line_site
 

@@ -4,16 +4,16 @@ from itertools import combinations
 
 import pytest
 
-from onboard.core import lift_uses as lifts_module
 from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.lift_uses import are_compatible
-from onboard.core.lifts import platform
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.occupancy import itinerary_windows, lift_uses
-from onboard.core.reservations import FOREVER, Reservations, Use, Window
 from onboard.core.serial import to_bus_ms
-from onboard.core.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.core.site import Segment, Site
+from onboard.ways import lift_uses as lifts_module
+from onboard.ways.lift_uses import are_compatible
+from onboard.ways.lifts import platform
+from onboard.ways.occupancy import itinerary_windows, lift_uses
+from onboard.ways.reservations import FOREVER, Reservations, Use, Window
+from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from tests.core.buildings import LEFT, RIGHT, building
 from tests.core.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Place
 from tests.core.exhaustive_lifts import GATE, Building, ExhaustiveLifts, Ridden, empty_run

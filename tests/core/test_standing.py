@@ -5,7 +5,7 @@ from dataclasses import replace
 from onboard.core.codes import Grade, LegAction, Reason, Side
 from onboard.core.messages import Itinerary, Leg, Progress, Stamp, Waiting
 from onboard.core.mirror import Mirror
-from onboard.core.standing import STANDS_AFTER_US, WAITS_AFTER_US, Standing
+from onboard.ways.standing import STANDS_AFTER_US, WAITS_AFTER_US, Standing
 from tests.sites import one_floor
 
 ROBOT, ME = 11, 1

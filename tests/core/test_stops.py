@@ -4,13 +4,13 @@ import random
 
 import pytest
 
-from onboard.core import stops
-from onboard.core.occupancy import itinerary_windows, lift_uses
-from onboard.core.reservations import Reservations
-from onboard.core.roads import roads_of
-from onboard.core.sipp import Route, Visit, plan_route
 from onboard.core.site import Axis, Segment, Site
-from onboard.core.stops import settling_segments
+from onboard.ways import stops
+from onboard.ways.occupancy import itinerary_windows, lift_uses
+from onboard.ways.reservations import Reservations
+from onboard.ways.roads import roads_of
+from onboard.ways.sipp import Route, Visit, plan_route
+from onboard.ways.stops import settling_segments
 from tests.core.buildings import building
 from tests.core.exhaustive import AXIS, PITCH_MM, TICK_US
 from tests.core.lines import ALLEY

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from onboard.config.site import parse_site
-from onboard.core.all_or_none import AllOrNone
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
@@ -29,8 +28,9 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Machine, Segment, Site
-from onboard.kinds.car_park.travel import ORDER_PATIENCE_US
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.travel import ORDER_PATIENCE_US
+from onboard.systems.registry import factory_for
+from onboard.ways.all_or_none import AllOrNone
 
 STEP_US = 20_000
 #: A walker needs this long for a segment.

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from bus_sim.demand import WHOLE_DAY, Demand, DemandError, Stay
-from bus_sim.plant.bodies import CarBody
+from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.window import (
     DAY_US,
     EVE_US,

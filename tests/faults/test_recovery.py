@@ -99,7 +99,7 @@ def test_a_trial_hears_what_the_checkers_find(monkeypatch: pytest.MonkeyPatch) -
     def plant(simulation: Simulation, _: object) -> None:
         BUGS["custody-first"].plant(simulation)
 
-    monkeypatch.setattr("bus_sim.campaign.car_park.arm", plant)
+    monkeypatch.setattr("bus_sim.systems.car_park.stage.arm", plant)
     report = trial(cars=2)
     assert report.verdict is Verdict.VIOLATION
     assert "one-custodian" in report.violations[0]

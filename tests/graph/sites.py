@@ -6,9 +6,9 @@ from bus_sim.systems.graph.plant import make_plant
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import Played, play
 from onboard.config.site import parse_site
-from onboard.kinds.graph.network import Graph, grid
-from onboard.kinds.graph.rules import Rules
-from onboard.kinds.graph.site import FactoryGraph
+from onboard.systems.graph.network import Graph, grid
+from onboard.systems.graph.rules import Rules
+from onboard.systems.graph.site import FactoryGraph
 
 #: (after s, robot or "any", nodes).
 Wanted = tuple[int, str, tuple[int, ...]]

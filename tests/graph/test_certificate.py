@@ -11,8 +11,8 @@ from bus_sim.certify.model import Model
 from bus_sim.certify.search import Search, Tasks, task_sets
 from bus_sim.certify.throughput import Pace, measure
 from bus_sim.cli import main
-from onboard.kinds.graph.network import Graph, complete, edge, grid, ring
-from onboard.kinds.graph.rules import Rules
+from onboard.systems.graph.network import Graph, complete, edge, grid, ring
+from onboard.systems.graph.rules import Rules
 from tests.graph.brute_force import can_stick
 
 #: SYSTEMS 2.4: graph, robots, task sets, and how many of them can stick with rule G21 off and on.

@@ -8,7 +8,7 @@ from cantools.database.can import Message as DbcMessage
 
 from dbc import system_dbc_text
 from onboard.core.messages import Message
-from onboard.kinds.graph.messages import MESSAGES, NodeVerdict, VisitList, five, stops_of
+from onboard.systems.graph.messages import MESSAGES, NodeVerdict, VisitList, five, stops_of
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts
 from onboard.wire.decoder import Decoder

@@ -8,8 +8,8 @@ from bus_sim.certify.certificate import certify
 from bus_sim.certify.on_the_bus import Scene, play_scene
 from bus_sim.cli import main
 from bus_sim.systems.registry import SystemOptions
-from onboard.kinds.graph.network import Graph, grid, ring
-from onboard.kinds.graph.rules import Rules
+from onboard.systems.graph.network import Graph, grid, ring
+from onboard.systems.graph.rules import Rules
 
 
 def scene_of(graph: Graph, robots: int, rules: Rules) -> Scene:

@@ -2,7 +2,7 @@
 
 import random
 
-from onboard.kinds.graph.network import NOWHERE, Graph, edge, grid, ring
+from onboard.systems.graph.network import NOWHERE, Graph, edge, grid, ring
 
 
 def test_g01_lengths_decide_between_ways() -> None:

@@ -14,7 +14,8 @@ from bus_sim.systems.session import Played, play
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, TokenKind
 from onboard.core.messages import Bid, CallForProposals, Message, TokenGrant
-from onboard.kinds.graph.messages import (
+from onboard.systems.graph.checks import RULES
+from onboard.systems.graph.messages import (
     BodyPlace,
     EdgeNotice,
     EdgeState,
@@ -26,12 +27,11 @@ from onboard.kinds.graph.messages import (
     VisitList,
     VisitResult,
 )
-from onboard.kinds.graph.network import Graph, complete, ring
-from onboard.kinds.graph.robot import GraphRobot
-from onboard.kinds.graph.rules import Rules
-from onboard.kinds.graph.site import FactoryGraph
+from onboard.systems.graph.network import Graph, complete, ring
+from onboard.systems.graph.robot import GraphRobot
+from onboard.systems.graph.rules import Rules
+from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.check.checks import Checks
-from onboard.trace.check.graph import RULES
 from tests.graph.sites import busy_orders, hall, made
 
 M = TypeVar("M", bound=Message)

@@ -4,8 +4,8 @@ from bus_sim.certify.optimum import least_steps, some_tasks
 from bus_sim.certify.search import Tasks
 from bus_sim.sites import find_site
 from bus_sim.systems.graph.against_optimum import compare
-from onboard.kinds.graph.network import complete, grid, ring
-from onboard.kinds.graph.site import FactoryGraph
+from onboard.systems.graph.network import complete, grid, ring
+from onboard.systems.graph.site import FactoryGraph
 
 
 def test_the_optimum_of_cases_that_can_be_seen() -> None:

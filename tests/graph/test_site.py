@@ -5,8 +5,8 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.config.problems import ConfigError
 from onboard.config.site import parse_site
-from onboard.kinds.graph.rules import Rules
-from onboard.kinds.graph.site import FactoryGraph
+from onboard.systems.graph.rules import Rules
+from onboard.systems.graph.site import FactoryGraph
 from tests.graph.sites import hall, site_text
 
 GOOD = site_text(hall(), (0, 8), [(0, "any", (1, 2)), (5, "R1", (3, 4, 5))], Rules.KEEP, capacity=3)

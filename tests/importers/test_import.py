@@ -9,8 +9,8 @@ import bus_sim
 from bus_sim.cli import main
 from onboard.cli import main as onboard_main
 from onboard.config.site import load_site
-from onboard.kinds import registry
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems import registry
+from onboard.systems.mapd.site import Mapd
 
 DATA = Path(bus_sim.__file__).parent / "data"
 DEMO = DATA / "plants" / "Demo-01.xml"

@@ -26,9 +26,9 @@ from onboard.core.messages import (
     ShuttleState,
 )
 from onboard.core.site import Station
-from onboard.kinds.car_park.program import Handling, Work
-from onboard.kinds.car_park.recovery import award_record, handled_record
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.program import Handling, Work
+from onboard.systems.car_park.recovery import award_record, handled_record
+from onboard.systems.registry import factory_for
 from tests.sites import one_floor
 
 Entry = Mapping[str, str | int]

@@ -23,7 +23,7 @@ from onboard.core.compaction import CORE_RULES, NUMBERS_KEPT, Entry, compact
 from onboard.core.holon import Holon
 from onboard.core.site import Site
 from onboard.io.sealed import SLOTS_BYTES, read
-from onboard.kinds.registry import compaction_for, factory_for, system_of
+from onboard.systems.registry import compaction_for, factory_for, system_of
 from tests.mapd.sites import drawn, made
 
 SITES = ("small", "cell", "graph", "mapd", "terminal", "turning")

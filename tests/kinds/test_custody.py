@@ -37,7 +37,7 @@ from onboard.core.messages import (
     TokenHeld,
 )
 from onboard.core.site import Station
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 from tests.sites import one_floor
 
 SITE = one_floor()

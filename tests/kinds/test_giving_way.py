@@ -11,11 +11,11 @@ from onboard.core.codes import KindCode, LegAction, TokenKind
 from onboard.core.messages import CallForProposals, Itinerary, Stamp, TokenGrant, TokenHeld
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation, Proposal
-from onboard.core.reservations import FOREVER
-from onboard.core.sipp import Route, Visit, plan_route
 from onboard.core.site import Axis, Machine, Segment, Site
-from onboard.kinds.car_park.giving_way import Answer, GivingWay
-from onboard.kinds.car_park.program import Program, Step
+from onboard.systems.car_park.giving_way import Answer, GivingWay
+from onboard.systems.car_park.program import Program, Step
+from onboard.ways.reservations import FOREVER
+from onboard.ways.sipp import Route, Visit, plan_route
 from tests.core.buildings import building
 from tests.core.lines import ALLEY, SPUR, line_site
 

@@ -4,7 +4,7 @@ from bus_sim.sites import find_site
 from onboard.core.codes import LegAction
 from onboard.core.messages import Stamp
 from onboard.core.site import Segment
-from onboard.kinds.car_park.program import Program, Step
+from onboard.systems.car_park.program import Program, Step
 
 SECOND = 1_000_000
 

@@ -19,7 +19,7 @@ from onboard.core.messages import NO_REFERENCE, Award, Bid, Message, Reference, 
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Segment, Site
-from onboard.kinds.registry import System, add_system, remove_system
+from onboard.systems.registry import System, add_system, remove_system
 
 PAGE = Path(__file__).parents[2] / "docs" / "new-kind.md"
 DESK, OLD, NEW = 1, 21, 22

@@ -6,9 +6,9 @@ from onboard.core.effects import Record
 from onboard.core.holon import Holon
 from onboard.core.messages import CarAt, Itinerary, Reference, Stamp
 from onboard.core.site import Station
-from onboard.kinds.car_park.program import Handling, Step, Work, to_itinerary
-from onboard.kinds.car_park.recovery import Recovery
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.program import Handling, Step, Work, to_itinerary
+from onboard.systems.car_park.recovery import Recovery
+from onboard.systems.registry import factory_for
 from tests.kinds.board import AWARDED, CALL, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, TASK, Board
 
 #: When a robot that was started again goes on, us.

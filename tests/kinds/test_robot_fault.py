@@ -3,7 +3,7 @@
 from onboard.core.codes import DriveMode, KindCode, MachineState, ShuttleMode, Side
 from onboard.core.holon import Holon
 from onboard.core.messages import BusTime, DriveState, ShuttleState
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 from tests.sites import one_floor
 
 SITE = one_floor()

@@ -6,7 +6,6 @@ from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, Reason, ShuttleMode, Side, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.holon import Holon
-from onboard.core.lifts import gate, platform, says_standing, under_gate
 from onboard.core.messages import (
     BusTime,
     DriveOrder,
@@ -23,9 +22,10 @@ from onboard.core.messages import (
     TokenRequest,
 )
 from onboard.core.site import Segment
-from onboard.kinds.car_park.lift import Lift
-from onboard.kinds.car_park.robot import Robot
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.lift import Lift
+from onboard.systems.car_park.robot import Robot
+from onboard.systems.registry import factory_for
+from onboard.ways.lifts import gate, platform, says_standing, under_gate
 
 SITE = find_site("small")
 BAY, LIFT, ROBOT, OTHER = 1, 5, 11, 12

@@ -1,7 +1,7 @@
 """A spur as a carrier's drive sees it: the mouth is index 0, and whoever turns there needs both slots."""
 
 from onboard.core.site import Segment
-from onboard.kinds.car_park.axis import TrackAxis
+from onboard.systems.car_park.axis import TrackAxis
 from tests.sites import one_floor
 
 MOUTH, INSIDE = Segment(1, 7), Segment(192, 1)

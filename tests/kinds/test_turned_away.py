@@ -4,7 +4,7 @@ from onboard.core.codes import DriveMode, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import DriveState, TokenGrant
 from onboard.core.site import Segment
-from onboard.kinds.car_park.travel import Carriage
+from onboard.systems.car_park.travel import Carriage
 from tests.kinds.test_turning import PITCH_MM, ROBOT, carriage, get, orders
 
 #: Where it began, by the site file: it was never there.

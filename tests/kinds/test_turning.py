@@ -8,7 +8,7 @@ from onboard.core.messages import DriveOrder, DriveState, Progress, TokenGrant, 
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation
 from onboard.core.site import Segment, Site
-from onboard.kinds.car_park.travel import Carriage
+from onboard.systems.car_park.travel import Carriage
 from tests.kinds.test_giving_way import Nobody
 from tests.sites import one_floor
 

@@ -4,8 +4,8 @@ from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation,
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.mirror import Mirror
 from onboard.core.site import Segment, Station
-from onboard.kinds.car_park.generation import YIELDING_US, CarParkGeneration
-from onboard.kinds.car_park.program import Program
+from onboard.systems.car_park.generation import YIELDING_US, CarParkGeneration
+from onboard.systems.car_park.program import Program
 from tests.system.test_giving_way import BUSY, IDLE, tower
 
 CAR = Reference(1, 7)

@@ -7,7 +7,7 @@ from bus_sim.systems.mapd.run import play_day
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import Played
 from onboard.config.site import parse_site
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems.mapd.site import Mapd
 
 #: A small warehouse: homes in the left and right columns, shelves between, endpoints beside them.
 ROWS = (

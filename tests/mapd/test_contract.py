@@ -8,7 +8,7 @@ from cantools.database.can import Message as DbcMessage
 
 from dbc import system_dbc_text
 from onboard.core.messages import Message
-from onboard.kinds.mapd.messages import MESSAGES
+from onboard.systems.mapd.messages import MESSAGES
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts
 from onboard.wire.decoder import Decoder

@@ -13,9 +13,9 @@ from bus_sim.importers.mapf import Wanted
 from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.steps import Day
 from onboard.config.site import parse_site
-from onboard.kinds.mapd.auction import Offer, Rule, Task, cost, winners
-from onboard.kinds.mapd.floor import grid_floor
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems.mapd.auction import Offer, Rule, Task, cost, winners
+from onboard.systems.mapd.floor import grid_floor
+from onboard.systems.mapd.site import Mapd
 
 DATA = Path(bus_sim.__file__).parent / "data" / "mapd"
 

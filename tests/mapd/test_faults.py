@@ -7,7 +7,7 @@ from bus_sim.importers.draft import site_text
 from bus_sim.importers.mapf import Wanted
 from onboard.config.site import parse_site
 from onboard.core.messages import Message
-from onboard.kinds.mapd.messages import (
+from onboard.systems.mapd.messages import (
     NO_TASK,
     PathHead,
     PathMoves,

@@ -13,8 +13,8 @@ from bus_sim.systems.mapd.steps import Day
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play
 from onboard.cli import main as onboard
-from onboard.kinds.mapd.messages import MESSAGES, StepAward, StepState, TransportBid, TransportCall
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems.mapd.messages import MESSAGES, StepAward, StepState, TransportBid, TransportCall
+from onboard.systems.mapd.site import Mapd
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts
 from tests.mapd.sites import drawn, made, played, site_text

@@ -4,9 +4,9 @@ import random
 
 import pytest
 
-from onboard.kinds.mapd.floor import Floor, Line, flood, grid_floor, lasting_rests, network_floor
-from onboard.kinds.mapd.paths import Path, Paths
-from onboard.kinds.mapd.search import find_path
+from onboard.systems.mapd.floor import Floor, Line, flood, grid_floor, lasting_rests, network_floor
+from onboard.systems.mapd.paths import Path, Paths
+from onboard.systems.mapd.search import find_path
 
 ROW = grid_floor(["....."])
 

@@ -13,7 +13,7 @@ from bus_sim.sites import find_site
 from onboard.core.messages import Message
 from onboard.gateway.publisher import Outgoing, Publisher
 from onboard.gateway.settings import GatewaySettings
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import codecs
 from onboard.wire.decoder import Decoder

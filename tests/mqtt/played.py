@@ -13,8 +13,8 @@ from onboard.core.journal_state import INTACT
 from onboard.gateway.gateway import Gateway
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewaySettings
-from onboard.kinds.registry import system_of
 from onboard.ports.journal import Compaction, Entry
+from onboard.systems.registry import system_of
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import codecs
 from tests.mqtt.double import DoubleBroker

@@ -6,7 +6,7 @@ import pytest
 
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import CallForProposals, TaskReport
-from onboard.kinds.graph.messages import VisitList
+from onboard.systems.graph.messages import VisitList
 from tests.mqtt.ordered import NODE
 from tests.mqtt.test_named_orders import run
 

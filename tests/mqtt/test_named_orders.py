@@ -14,7 +14,7 @@ from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import Played, play
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import TaskReport
-from onboard.kinds.graph.messages import RobotAt, RobotMode, VisitList
+from onboard.systems.graph.messages import RobotAt, RobotMode, VisitList
 from tests.graph.sites import hall, made
 from tests.mqtt.logs import VERSIONS, validator
 from tests.mqtt.ordered import NODE, FatalJournal, Ordered, park_and_order

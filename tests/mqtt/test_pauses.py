@@ -18,7 +18,7 @@ from onboard.core.messages import Heartbeat, ManualOrder, ManualState
 from onboard.core.site import Site
 from onboard.gateway.machines import Machines
 from onboard.gateway.pauses import Pauses
-from onboard.kinds.graph.messages import RobotAt
+from onboard.systems.graph.messages import RobotAt
 from tests.graph.sites import hall, made
 from tests.mapd.sites import made as made_floor
 from tests.mqtt.logs import VERSIONS, validator

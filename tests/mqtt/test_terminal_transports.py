@@ -10,7 +10,7 @@ from bus_sim.run import RunOptions
 from bus_sim.systems.terminal.run import Outcome, TerminalRun, play
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import CallForProposals, Message, TaskReport
-from onboard.kinds.terminal.messages import BoxOrder, TaskTerms
+from onboard.systems.terminal.messages import BoxOrder, TaskTerms
 from tests.mqtt.ordered import NODE, Ordered
 from tests.terminal.seeds import short
 

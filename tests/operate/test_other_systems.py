@@ -19,11 +19,11 @@ from onboard.core.codes import MachineState, Reason
 from onboard.core.messages import Award, Bid, CallForProposals, Heartbeat, Message, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.recovery_messages import Halted, TokenGiven
 from onboard.core.site import Site
-from onboard.kinds.graph.messages import NodeAnswer
 from onboard.operate.names import OperateError
 from onboard.operate.park import Park
 from onboard.operate.status import Status
 from onboard.operate.wishes import Wish, maker_of
+from onboard.systems.graph.messages import NodeAnswer
 from tests.faults.systems import PLANTS
 
 AT_S, OFF_S, END_S = 30, 3, 60

@@ -5,15 +5,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from bus_sim.plant.bodies import CarBody
-from bus_sim.plant.carrier import Carrier
-from bus_sim.plant.compartment import Compartment
-from bus_sim.plant.lift import LiftDrive
-from bus_sim.plant.link import MessageHandler
-from bus_sim.plant.oracle import Oracle
-from bus_sim.plant.shuttle import Shuttle
-from bus_sim.plant.street import Street
-from bus_sim.plant.world import World
+from bus_sim.devices.link import MessageHandler
+from bus_sim.systems.car_park.plant.bodies import CarBody
+from bus_sim.systems.car_park.plant.carrier import Carrier
+from bus_sim.systems.car_park.plant.compartment import Compartment
+from bus_sim.systems.car_park.plant.lift import LiftDrive
+from bus_sim.systems.car_park.plant.oracle import Oracle
+from bus_sim.systems.car_park.plant.shuttle import Shuttle
+from bus_sim.systems.car_park.plant.street import Street
+from bus_sim.systems.car_park.plant.world import World
 from onboard.config.site import parse_site
 from onboard.core.codes import DoorAction, DoorName, LightColour, ShuttleAction, Side
 from onboard.core.messages import DoorOrder, DriveOrder, LightOrder, Message, ShuttleOrder

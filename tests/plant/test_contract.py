@@ -4,7 +4,7 @@ import cantools.database
 import pytest
 from cantools.database.can import Database
 
-from bus_sim.plant import carrier, compartment, lift, shuttle
+from bus_sim.systems.car_park.plant import carrier, compartment, lift, shuttle
 from dbc import device_dbc_text
 
 

@@ -5,8 +5,8 @@ import random
 import pytest
 
 from bus_sim.demand import Demand, Stay
-from bus_sim.plant.bodies import CarBody, random_car
-from bus_sim.plant.customer import Outcome, State
+from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
+from bus_sim.systems.car_park.plant.customer import Outcome, State
 from onboard.core.codes import DeskText
 from onboard.core.messages import DeskOrder, Reference
 from tests.plant.support import COMPARTMENT, SECOND, Bench

@@ -7,8 +7,8 @@ from functools import partial
 import pytest
 
 from bus_sim.can.medium import Medium
-from bus_sim.plant.link import BusDeviceLink
-from bus_sim.plant.timers import LoopTimers
+from bus_sim.devices.link import BusDeviceLink
+from bus_sim.devices.timers import LoopTimers
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.codes import LightColour
 from onboard.core.frame import Frame

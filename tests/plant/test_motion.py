@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bus_sim.plant.motion import Motion, braking, driving, standing, stop_distance_mm
+from bus_sim.systems.car_park.plant.motion import Motion, braking, driving, standing, stop_distance_mm
 
 positions = st.floats(-20_000, 20_000)
 speeds = st.floats(-1_500, 1_500)

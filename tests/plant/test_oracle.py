@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bus_sim.plant.motion import driving, standing
-from bus_sim.plant.oracle import least_distance
+from bus_sim.systems.car_park.plant.motion import driving, standing
+from bus_sim.systems.car_park.plant.oracle import least_distance
 from onboard.core.codes import DoorName, DoorPosition, ShuttleAction, Side
 from onboard.core.site import Station
 from tests.plant.support import CAR, COMPARTMENT, ROBOT, SECOND, Bench

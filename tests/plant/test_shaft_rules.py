@@ -2,7 +2,7 @@
 
 import pytest
 
-from bus_sim.plant.motion import driving, standing
+from bus_sim.systems.car_park.plant.motion import driving, standing
 from tests.plant.support import LEFT, RIGHT, ROBOT, SECOND, Bench, three_floors
 
 FLOOR_MM = 2500

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bus_sim.plant.bodies import Aboard, CarBody
+from bus_sim.systems.car_park.plant.bodies import Aboard, CarBody
 from onboard.core.codes import ShuttleAction, ShuttleMode, Side
 from onboard.core.messages import ShuttleOrder, ShuttleState
 from onboard.core.site import Station

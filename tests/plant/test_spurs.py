@@ -2,7 +2,7 @@
 
 import pytest
 
-from bus_sim.plant.motion import driving, standing
+from bus_sim.systems.car_park.plant.motion import driving, standing
 from onboard.core.codes import DriveMode, ShuttleAction, ShuttleMode, Side
 from onboard.core.messages import DriveOrder, DriveState, ShuttleState
 from onboard.core.site import Segment

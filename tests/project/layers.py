@@ -24,7 +24,7 @@ CORE_TYPES = (
 
 #: What each system's machines know beforehand and what they say beyond the messages of all: values as well.
 SYSTEM_TYPES = tuple(
-    f"onboard.kinds.{system}.{noun}"
+    f"onboard.systems.{system}.{noun}"
     for system in ("car_park", "cell", "graph", "mapd", "terminal", "turning")
     for noun in ("messages", "site")
 )
@@ -54,7 +54,7 @@ ALL_OF_ONBOARD = (
     "onboard.controller",
     "onboard.core",
     "onboard.io",
-    "onboard.kinds",
+    "onboard.systems",
     "onboard.ports",
     "onboard.wire",
 )
@@ -77,7 +77,7 @@ class Layer:
 #: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
     "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.kinds": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.systems": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(("onboard.core", *SYSTEM_TYPES), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
@@ -97,7 +97,7 @@ LAYERS: dict[str, Layer] = {
     # The page shows what the trace knows; only its own command line opens files and buses.
     "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
-        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.trace", "onboard.web", "onboard.wire")
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.systems", "onboard.trace", "onboard.web", "onboard.wire")
     ),
     # What is published is decided from the decoded bus alone; sessions, files and buses come in through ports.
     "onboard.gateway": Layer(
@@ -111,7 +111,7 @@ LAYERS: dict[str, Layer] = {
             "onboard.config",
             "onboard.gateway",
             "onboard.io",
-            "onboard.kinds",
+            "onboard.systems",
             "onboard.ports",
             "onboard.wire",
         )
@@ -132,7 +132,7 @@ LAYERS: dict[str, Layer] = {
     ),
     # Its command line is a composition root: it opens the bus and the site file.
     "onboard.operate.cli": Layer(
-        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.kinds", "onboard.operate", "onboard.wire")
+        (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.systems", "onboard.operate", "onboard.wire")
     ),
     "onboard.gateway.options": Layer((*CORE_TYPES, "onboard.gateway", "onboard.io")),
     "onboard": Layer(

@@ -28,7 +28,7 @@ def test_every_package_of_onboard_has_a_line_in_the_table() -> None:
 
 def tree(root: Path, sources: dict[str, str]) -> Path:
     """A small source tree: the files given, and an empty ``__init__.py`` in each of their packages."""
-    for name in ("onboard/core/messages.py", "onboard/core/sipp.py", "onboard/trace/candump.py", *sources):
+    for name in ("onboard/core/messages.py", "onboard/ways/sipp.py", "onboard/trace/candump.py", *sources):
         file = root / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(sources.get(name, ""), encoding="utf-8")
@@ -54,20 +54,20 @@ WRONG = [
     ("onboard/core/a.py", "print('decided')"),
     ("onboard/core/a.py", "order = sorted([], key=lambda one: id(one))"),
     ("onboard/core/a.py", "first = min([], key=id)"),
-    ("onboard/kinds/a.py", "draw = hash('seed') % 6"),
+    ("onboard/systems/a.py", "draw = hash('seed') % 6"),
     ("onboard/core/a.py", "def f() -> None:\n    import socket"),
     ("onboard/core/a.py", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from onboard.io import pycan"),
     ("onboard/core/a.py", "from importlib import import_module"),
-    ("onboard/kinds/a.py", "from onboard.wire import codec"),
-    ("onboard/kinds/a.py", "import random"),
+    ("onboard/systems/a.py", "from onboard.wire import codec"),
+    ("onboard/systems/a.py", "import random"),
     ("onboard/wire/codec.py", "import cantools"),
     ("onboard/wire/codec.py", "from onboard.core import sipp"),
-    ("onboard/wire/codec.py", "from onboard.core.sipp import plan_route"),
+    ("onboard/wire/codec.py", "from onboard.ways.sipp import plan_route"),
     ("onboard/wire/dbc_file.py", "import can"),
     ("onboard/ports/bus.py", "from onboard.controller import shell"),
     ("onboard/config/site.py", "from onboard.wire import codec"),
     ("onboard/controller/shell.py", "from onboard.io import pycan"),
-    ("onboard/controller/shell.py", "from onboard.kinds import registry"),
+    ("onboard/controller/shell.py", "from onboard.systems import registry"),
     ("onboard/controller/shell.py", "import time"),
     ("onboard/io/pycan.py", "from onboard.controller import shell"),
     ("onboard/io/journal.py", "import can"),
@@ -104,11 +104,11 @@ def test_a_wrong_import_is_reported_with_its_file(tmp_path: Path, file: str, sou
 RIGHT = {
     "onboard/core/a.py": "from dataclasses import dataclass\nfrom onboard.core.messages import Message\nimport heapq",
     "onboard/core/b.py": "from . import messages\nfrom .sipp import plan_route\nkept = {id(b): b for b in ()}",
-    "onboard/kinds/a.py": "from onboard.core.sipp import plan_route",
+    "onboard/systems/a.py": "from onboard.ways.sipp import plan_route",
     "onboard/wire/dbc_file.py": "import cantools\nfrom dbc import fleet_dbc_text",
     "onboard/wire/codec.py": "from onboard.core import messages as m\nfrom onboard.wire.dbc_file import read_layouts",
     "onboard/ports/bus.py": "from typing import Protocol\nfrom onboard.core.messages import Message",
-    "onboard/config/site.py": "import tomllib\nfrom pathlib import Path\nfrom onboard.core.sipp import plan_route",
+    "onboard/config/site.py": "import tomllib\nfrom pathlib import Path\nfrom onboard.ways.sipp import plan_route",
     "onboard/controller/shell.py": "import asyncio\nfrom onboard.core import sipp\nimport onboard.wire.codec",
     "onboard/io/pycan.py": "import can\nimport threading\nfrom onboard.ports.bus import Bus",
     "onboard/io/mqtt.py": "import aiomqtt",

@@ -7,8 +7,8 @@ from typing import TypeVar
 
 from bus_sim.can.faults import Fault
 from bus_sim.demand import Demand, Stay
-from bus_sim.plant.bodies import CarBody
 from bus_sim.run import FLEET, RunOptions, Simulation, build, run_until
+from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
 from onboard.core.messages import Message

@@ -11,7 +11,6 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
 from onboard.core.codes import MachineState, ManualMode, Reason, ShuttleMode, TaskPhase
-from onboard.core.lifts import lift_at
 from onboard.core.messages import (
     Bid,
     Heartbeat,
@@ -24,6 +23,7 @@ from onboard.core.messages import (
 from onboard.core.site import Segment, Site, TrackKind
 from onboard.trace.story.why import Why
 from onboard.trace.view import SiteView
+from onboard.ways.lifts import lift_at
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
 from tests.system.test_spurs import alley

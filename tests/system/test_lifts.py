@@ -6,7 +6,6 @@ from bus_sim.sites import find_site
 from onboard.config.site import parse_site
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, Operation, TaskPhase
-from onboard.core.lifts import gate, platform
 from onboard.core.messages import (
     Award,
     Bid,
@@ -18,6 +17,7 @@ from onboard.core.messages import (
     TaskReport,
     TokenGrant,
 )
+from onboard.ways.lifts import gate, platform
 from tests.system.scene import Scene, play, stays
 
 

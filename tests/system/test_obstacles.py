@@ -15,8 +15,8 @@ from onboard.core.authority import genesis_holder, segment_token, station_token
 from onboard.core.codes import SEEN_VERSION_BITS, CallResult, Grade, MachineState, Reason
 from onboard.core.messages import Award, Bid, Blocked, CallForProposals, Clear, Heartbeat, Itinerary, Progress
 from onboard.core.site import Segment
-from onboard.kinds.car_park.compartment import Compartment
-from onboard.kinds.car_park.robot import Robot
+from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.robot import Robot
 from tests.system.scene import Scene, play, stays
 
 #: The robots of the small site; the first one wins the first task and comes down by the left lift at 46 s.

@@ -21,10 +21,10 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Site
-from onboard.kinds.car_park.bay_generation import BayGeneration
-from onboard.kinds.car_park.generation import CarParkGeneration
-from onboard.kinds.car_park.program import Program, Step, to_itinerary
-from onboard.kinds.registry import factory_for
+from onboard.systems.car_park.bay_generation import BayGeneration
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.program import Program, Step, to_itinerary
+from onboard.systems.registry import factory_for
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 

@@ -7,19 +7,19 @@ import pytest
 from bus_sim.baselines.session_lock import SessionLocks
 from bus_sim.sites import find_site
 from onboard.core.codes import ANY_STATION, Criterion, Grade, KindCode, LegAction, Operation, Side
-from onboard.core.lift_uses import GATE_US, ride_us, run_up_us
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.core.sipp import Route, Visit, plan_route
 from onboard.core.site import Segment, Site
-from onboard.kinds.car_park.asking import TOLERANCE_US, AskingGeneration
-from onboard.kinds.car_park.generation import CarParkGeneration, Solution
-from onboard.kinds.car_park.lift_generation import LiftGeneration, Promise
-from onboard.kinds.car_park.ride_calls import calls_after_winning, ride_terms, rides_of
-from onboard.kinds.car_park.robot import RobotFactory
-from onboard.kinds.car_park.site import RideCalls
+from onboard.systems.car_park.asking import TOLERANCE_US, AskingGeneration
+from onboard.systems.car_park.generation import CarParkGeneration, Solution
+from onboard.systems.car_park.lift_generation import LiftGeneration, Promise
+from onboard.systems.car_park.ride_calls import calls_after_winning, ride_terms, rides_of
+from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.car_park.site import RideCalls
+from onboard.ways.lift_uses import GATE_US, ride_us, run_up_us
+from onboard.ways.sipp import Route, Visit, plan_route
 
 NOW_US = 100_000_000
 CAR = Reference(1, 7)

@@ -6,11 +6,11 @@ import pytest
 
 from bus_sim.sites import find_site
 from onboard.core.codes import CallResult, Grade, KindCode, LegAction, Operation
-from onboard.core.lifts import gate, platform
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Reference, TokenGrant
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Site
-from onboard.kinds.car_park.site import RideCalls
+from onboard.systems.car_park.site import RideCalls
+from onboard.ways.lifts import gate, platform
 from tests.system.scene import Scene, play, stays
 
 CARS = 4

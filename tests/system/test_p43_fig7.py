@@ -14,10 +14,10 @@ from bus_sim.run import Simulation
 from onboard.config.site import parse_site
 from onboard.core.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Side
 from onboard.core.messages import Bid, CallForProposals, Heartbeat, Itinerary, Leg, Message, Stamp
-from onboard.core.occupancy import itinerary_windows
-from onboard.core.reservations import Reservations
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Site
+from onboard.ways.occupancy import itinerary_windows
+from onboard.ways.reservations import Reservations
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
 

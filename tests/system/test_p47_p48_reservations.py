@@ -12,8 +12,8 @@ from onboard.core.codes import CallResult, Grade, KindCode, Operation, Reason, T
 from onboard.core.frame import Frame
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.serial import from_bus_ms
-from onboard.kinds.car_park.generation import CarParkGeneration
-from onboard.kinds.car_park.robot import Robot
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.robot import Robot
 from onboard.wire.codec import Part, fleet_codec
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays

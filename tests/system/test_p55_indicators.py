@@ -11,8 +11,8 @@ import pytest
 
 from bus_sim.cli import build_parser
 from bus_sim.cli import main as bus_sim
-from bus_sim.day import DayOptions, run_day
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.day import DayOptions, run_day
 from onboard.core.codes import CallResult, Operation, TaskPhase
 from onboard.core.messages import Award, Bid, CallForProposals, Progress, TaskReport
 from onboard.trace.candump_reader import CandumpReader

@@ -43,8 +43,8 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.io.open_bus import BusSettings, open_bus
-from onboard.kinds.registry import factory_for
 from onboard.ports.bus import Bus
+from onboard.systems.registry import factory_for
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.decoder import Decoder
 from tests.sites import one_floor

@@ -45,10 +45,10 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site, Station
-from onboard.kinds.car_park.compartment import Compartment
-from onboard.kinds.car_park.compartment_factory import CompartmentFactory
-from onboard.kinds.car_park.generation import CarParkGeneration
-from onboard.kinds.car_park.program import Handling, Program, Step, Work
+from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.compartment_factory import CompartmentFactory
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.program import Handling, Program, Step, Work
 from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
 from tests.system.scene import car, play, stays

@@ -9,8 +9,8 @@ import pytest
 
 from bus_sim.demand import Demand
 from bus_sim.run import Simulation
-from bus_sim.show import draw_floor
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.show import draw_floor
 from onboard.config.site import parse_site
 from onboard.core.authority import segment_token
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, TaskPhase

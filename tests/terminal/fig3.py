@@ -5,10 +5,10 @@ from dataclasses import replace
 from onboard.core.codes import KindCode
 from onboard.core.messages import NO_REFERENCE
 from onboard.core.site import Machine, Segment, Timing
-from onboard.kinds.terminal.messages import Action
-from onboard.kinds.terminal.plan import Load, Plan, VisitKey, drive_steps, handling_steps
-from onboard.kinds.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
-from onboard.kinds.terminal.traffic import Node, Traffic
+from onboard.systems.terminal.messages import Action
+from onboard.systems.terminal.plan import Load, Plan, VisitKey, drive_steps, handling_steps
+from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
+from onboard.systems.terminal.traffic import Node, Traffic
 
 A1, L3, C1, L2, A4, L11, A2, S2, S1 = 1, 2, 3, 4, 5, 6, 7, 8, 9
 TIMING = Timing(0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0)

@@ -2,8 +2,8 @@
 
 from bus_sim.sites import site_text
 from onboard.config.site import parse_site
-from onboard.kinds.terminal.site import Terminal
-from onboard.kinds.terminal.vehicle import terminal
+from onboard.systems.terminal.site import Terminal
+from onboard.systems.terminal.vehicle import terminal
 
 #: "Load S10 with 2 of T1 from A4", "tranship B11 and B12 to S4", and a blocked lane.
 SHORT = """

@@ -6,10 +6,10 @@ from itertools import pairwise
 import pytest
 
 from onboard.core.messages import NO_REFERENCE
-from onboard.kinds.terminal.messages import Action
-from onboard.kinds.terminal.plan import Load, Plan, Step, VisitKey
-from onboard.kinds.terminal.site import Entity, EntityKind
-from onboard.kinds.terminal.traffic import Traffic
+from onboard.systems.terminal.messages import Action
+from onboard.systems.terminal.plan import Load, Plan, Step, VisitKey
+from onboard.systems.terminal.site import Entity, EntityKind
+from onboard.systems.terminal.traffic import Traffic
 from tests.terminal.fig3 import A4, C1, L3, PRINTED, S1, S2, fig3, intervals, plan_of
 
 

@@ -10,7 +10,7 @@ from bus_sim.systems.terminal.run import Outcome, TerminalRun, play
 from onboard.config.problems import ConfigError
 from onboard.core.codes import ManualMode
 from onboard.core.messages import Bid, CallForProposals, ManualState, Message
-from onboard.kinds.terminal.messages import StepReport, StepResult
+from onboard.systems.terminal.messages import StepReport, StepResult
 from tests.terminal.seeds import short
 
 Said = list[tuple[int, Message]]

@@ -10,15 +10,15 @@ from bus_sim.systems.terminal.table import plan_table
 from onboard.core.codes import Criterion, KindCode, Operation
 from onboard.core.messages import CallForProposals, Reference
 from onboard.core.mirror import Mirror
-from onboard.kinds.terminal.generation import VehicleGeneration
-from onboard.kinds.terminal.messages import Action, MissionKey, Verb
-from onboard.kinds.terminal.mirror import TerminalMirror
-from onboard.kinds.terminal.missions import Orders
-from onboard.kinds.terminal.plan import Plan, PlanReader, Step, to_frames
-from onboard.kinds.terminal.search import Job, Search
-from onboard.kinds.terminal.site import StationKind
-from onboard.kinds.terminal.traffic import Traffic
-from onboard.kinds.terminal.vehicle import terminal
+from onboard.systems.terminal.generation import VehicleGeneration
+from onboard.systems.terminal.messages import Action, MissionKey, Verb
+from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.missions import Orders
+from onboard.systems.terminal.plan import Plan, PlanReader, Step, to_frames
+from onboard.systems.terminal.search import Job, Search
+from onboard.systems.terminal.site import StationKind
+from onboard.systems.terminal.traffic import Traffic
+from onboard.systems.terminal.vehicle import terminal
 from tests.terminal.fig3 import A1, PRINTED, S1, S2, fig3, plan_of
 
 SITE = terminal(find_site("terminal"))

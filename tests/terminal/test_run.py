@@ -15,7 +15,7 @@ from bus_sim.systems.terminal.show import summary_lines
 from bus_sim.systems.terminal.table import picture
 from onboard.core.codes import CallResult, TaskPhase
 from onboard.core.messages import Award, CallForProposals, Message, TaskReport
-from onboard.kinds.terminal.messages import (
+from onboard.systems.terminal.messages import (
     Action,
     Assignment,
     LaneState,
@@ -26,7 +26,7 @@ from onboard.kinds.terminal.messages import (
     StepReport,
     StepResult,
 )
-from onboard.kinds.terminal.vehicle import Vehicle, terminal
+from onboard.systems.terminal.vehicle import Vehicle, terminal
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import check_records
 from onboard.trace.check.holds import LetGoAgain

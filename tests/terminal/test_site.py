@@ -5,8 +5,8 @@ import pytest
 from bus_sim.sites import find_site, site_text
 from onboard.config.problems import ConfigError
 from onboard.config.site import parse_site
-from onboard.kinds.terminal.site import EntityKind
-from onboard.kinds.terminal.vehicle import terminal
+from onboard.systems.terminal.site import EntityKind
+from onboard.systems.terminal.vehicle import terminal
 
 TEXT = site_text("terminal")
 SITE = terminal(find_site("terminal"))

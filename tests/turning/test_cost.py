@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from onboard.kinds.turning.cost import Edge, bill
-from onboard.kinds.turning.lathe import LatheState
-from onboard.kinds.turning.process import generate, wear_of
+from onboard.systems.turning.cost import Edge, bill
+from onboard.systems.turning.lathe import LatheState
+from onboard.systems.turning.process import generate, wear_of
 from tests.turning.workshop import JOB, SHAFT, STEEL, lathe
 
 

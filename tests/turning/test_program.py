@@ -6,9 +6,9 @@ from math import atan2, cos, hypot, pi, sin
 import pytest
 from pygcode import Line  # type: ignore[import-untyped]  # the package has no types
 
-from onboard.kinds.turning.drawing import Drawing, Element
-from onboard.kinds.turning.lathe import Job, LatheState
-from onboard.kinds.turning.process import Process, generate
+from onboard.systems.turning.drawing import Drawing, Element
+from onboard.systems.turning.lathe import Job, LatheState
+from onboard.systems.turning.process import Process, generate
 from tests.turning.workshop import JOB, SHAFT, STEEL, contour, lathe
 
 Point = tuple[float, float]

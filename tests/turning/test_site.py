@@ -8,9 +8,9 @@ import bus_sim.sites
 from bus_sim.sites import find_site
 from onboard.config.problems import ConfigError
 from onboard.config.site import parse_site
-from onboard.kinds.turning.drawing import Shape
-from onboard.kinds.turning.lathe import Work
-from onboard.kinds.turning.site import Turning
+from onboard.systems.turning.drawing import Shape
+from onboard.systems.turning.lathe import Work
+from onboard.systems.turning.site import Turning
 
 TEXT = (Path(bus_sim.sites.__file__).parent / "turning.toml").read_text(encoding="utf-8")
 

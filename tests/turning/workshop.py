@@ -2,8 +2,8 @@
 
 from itertools import pairwise
 
-from onboard.kinds.turning.drawing import At, Drawing, Element
-from onboard.kinds.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work
+from onboard.systems.turning.drawing import At, Drawing, Element
+from onboard.systems.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work
 
 STEEL = Material(1, "C45", 2100.0, 1.6, 7.85)
 EVERYTHING = (Work.FACE, Work.ROUGH)

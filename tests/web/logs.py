@@ -10,7 +10,7 @@ from tempfile import mkdtemp
 from bus_sim.sites import find_site
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.trace.listener import Listener
 from onboard.trace.raw import RawFrame
 from onboard.trace.readers.open_log import Log

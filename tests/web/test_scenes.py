@@ -11,12 +11,12 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import Message, TaskReport
-from onboard.kinds.cell.messages import ArmState, PartAt
-from onboard.kinds.graph.messages import BodyPlace, BodyState
-from onboard.kinds.mapd.messages import StepState
-from onboard.kinds.terminal.messages import MoveState
-from onboard.kinds.terminal.site import EntityKind, Terminal
-from onboard.kinds.turning.messages import NcState
+from onboard.systems.cell.messages import ArmState, PartAt
+from onboard.systems.graph.messages import BodyPlace, BodyState
+from onboard.systems.mapd.messages import StepState
+from onboard.systems.terminal.messages import MoveState
+from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.turning.messages import NcState
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import along, part, spot_on
 from onboard.web.film import Film

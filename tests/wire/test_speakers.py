@@ -5,8 +5,8 @@ import pytest
 from onboard.core.codes import KindCode
 from onboard.core.messages import Award, Blocked, CallForProposals, EmergencyStop, Itinerary, OperatorOrder, TokenGrant
 from onboard.core.recovery_messages import Go
-from onboard.kinds.graph.messages import NodeAnswer, VisitList
-from onboard.kinds.registry import _SYSTEMS as SYSTEMS
+from onboard.systems.graph.messages import NodeAnswer, VisitList
+from onboard.systems.registry import _SYSTEMS as SYSTEMS
 from onboard.wire.codec import codecs, fleet_codec
 
 _EVERYBODY = frozenset(KindCode) - {KindCode.ANY}

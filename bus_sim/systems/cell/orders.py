@@ -8,9 +8,9 @@ from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant, make_plant
 from bus_sim.systems.orders import Orders, System, Tally, last_of, tally_of
 from bus_sim.systems.session import SystemPlant
 from onboard.core.site import Site
-from onboard.kinds.cell.geometry import Point
-from onboard.kinds.cell.messages import OrderResult
-from onboard.kinds.cell.site import Cell, Wish
+from onboard.systems.cell.geometry import Point
+from onboard.systems.cell.messages import OrderResult
+from onboard.systems.cell.site import Cell, Wish
 
 #: Points are drawn so far from edges of areas and obstacles at least, mm. Ours.
 MARGIN_MM = 500

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from functools import partial
 from math import hypot
 
-from bus_sim.plant.link import BusDeviceLink, DeviceLink
-from bus_sim.plant.timers import Timer, Timers
+from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.timers import Timer, Timers
 from onboard.core.messages import Message, Reference
 from onboard.core.serial import is_newer
 from onboard.core.site import Site
-from onboard.kinds.cell.contracts import Arm
-from onboard.kinds.cell.geometry import Area, Point
-from onboard.kinds.cell.messages import (
+from onboard.systems.cell.contracts import Arm
+from onboard.systems.cell.geometry import Area, Point
+from onboard.systems.cell.messages import (
     ArmMode,
     ArmOrder,
     ArmState,
@@ -27,7 +27,7 @@ from onboard.kinds.cell.messages import (
     OrderResult,
     OrderTo,
 )
-from onboard.kinds.cell.site import Cell, Wish
+from onboard.systems.cell.site import Cell, Wish
 
 #: A moving drive that hears no order for this long stops (dbc/cell.dbc).
 DRIVE_TIME_OUT_US = 500_000

@@ -11,10 +11,10 @@ from bus_sim.systems.cell.view import CellView
 from bus_sim.systems.session import Played, SystemPlant, conclude, play
 from onboard.core.messages import Reference
 from onboard.core.site import Site
-from onboard.kinds.cell.contracts import Goal
-from onboard.kinds.cell.messages import OrderResult
-from onboard.kinds.cell.robot import ArmRobot
-from onboard.kinds.cell.site import Cell
+from onboard.systems.cell.contracts import Goal
+from onboard.systems.cell.messages import OrderResult
+from onboard.systems.cell.robot import ArmRobot
+from onboard.systems.cell.site import Cell
 
 if TYPE_CHECKING:
     from bus_sim.systems.registry import SystemOptions

@@ -2,7 +2,7 @@
 
 from bus_sim.systems.cell.plant import CellPlant
 from bus_sim.systems.cell.view import CellView
-from onboard.kinds.cell.geometry import Area, Point
+from onboard.systems.cell.geometry import Area, Point
 
 WIDTH, HEIGHT = 78, 24
 

@@ -1,6 +1,6 @@
 """The paper's printed answer (Panescu, Miron 2006, Fig. 5; row C21): moves, takes and delivers with each cost."""
 
-from onboard.kinds.cell.geometry import Point
+from onboard.systems.cell.geometry import Point
 
 
 def printed(contracts: list[tuple[str, Point, Point, Point, float]], total: float) -> str:

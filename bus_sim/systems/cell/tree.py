@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from itertools import count
 
-from onboard.kinds.cell.contracts import Arm, Contract, Filter, Goal, Move, filtered, moves
-from onboard.kinds.cell.geometry import Area, Point
-from onboard.kinds.cell.offers import OFFERS, OfferRule
+from onboard.systems.cell.contracts import Arm, Contract, Filter, Goal, Move, filtered, moves
+from onboard.systems.cell.geometry import Area, Point
+from onboard.systems.cell.offers import OFFERS, OfferRule
 
 #: Both of the paper's filters.
 ALL_FILTERS = frozenset(Filter)

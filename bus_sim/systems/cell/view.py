@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from bus_sim.systems.cell.text import printed
 from onboard.core.codes import CallResult, TaskPhase
 from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
-from onboard.kinds.cell.geometry import Point
-from onboard.kinds.cell.messages import (
+from onboard.systems.cell.geometry import Point
+from onboard.systems.cell.messages import (
     ArmProgress,
     GoalEnd,
     GoalStart,
@@ -18,7 +18,7 @@ from onboard.kinds.cell.messages import (
     OfferLow,
     from_halves,
 )
-from onboard.kinds.cell.site import Cell
+from onboard.systems.cell.site import Cell
 
 _ORIGIN = Point(0, 0)
 

@@ -11,8 +11,8 @@ from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play
 from onboard.core.codes import KindCode, Side
 from onboard.core.site import Machine, Segment, Station
-from onboard.kinds.graph.network import Graph
-from onboard.kinds.graph.site import FactoryGraph, Order
+from onboard.systems.graph.network import Graph
+from onboard.systems.graph.site import FactoryGraph, Order
 
 #: Node-ID of the first robot of a case.
 FIRST_ROBOT = 101

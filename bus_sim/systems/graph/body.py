@@ -2,12 +2,12 @@
 
 from typing import TYPE_CHECKING
 
-from bus_sim.plant.link import DeviceLink
-from bus_sim.plant.timers import Timer
+from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.timers import Timer
 from onboard.core.messages import Message
 from onboard.core.site import Machine
-from onboard.kinds.graph.messages import NO_NODE, ApproachSensor, BodyPlace, BodyState, RouteAction, RouteOrder
-from onboard.kinds.graph.site import edge
+from onboard.systems.graph.messages import NO_NODE, ApproachSensor, BodyPlace, BodyState, RouteAction, RouteOrder
+from onboard.systems.graph.site import edge
 
 if TYPE_CHECKING:
     from bus_sim.systems.graph.plant import GraphPlant

@@ -7,8 +7,8 @@ from bus_sim.systems.graph.plant import ORIGIN_US, GraphPlant, make_plant
 from bus_sim.systems.orders import Orders, System, Tally, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.session import SystemPlant
 from onboard.core.site import Site
-from onboard.kinds.graph.messages import VisitResult
-from onboard.kinds.graph.site import MAX_STOPS, FactoryGraph, Order
+from onboard.systems.graph.messages import VisitResult
+from onboard.systems.graph.site import MAX_STOPS, FactoryGraph, Order
 
 #: So many orders name their robot. Ours.
 NAMED = 0.2

@@ -7,13 +7,13 @@ two bodies on one edge (row G08), a body that leaves the graph or turns back (ro
 from dataclasses import dataclass
 from functools import partial
 
-from bus_sim.plant.link import BusDeviceLink, DeviceLink
-from bus_sim.plant.timers import Timers
+from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.timers import Timers
 from bus_sim.systems.graph.body import Body
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.kinds.graph.messages import BodyPlace, VisitAnswer, VisitKey, VisitResult, five
-from onboard.kinds.graph.site import FactoryGraph, Order, Rules, edge
+from onboard.systems.graph.messages import BodyPlace, VisitAnswer, VisitKey, VisitResult, five
+from onboard.systems.graph.site import FactoryGraph, Order, Rules, edge
 
 #: Orders begin so long after power-up, us: the machines find each other first.
 ORIGIN_US = 10_000_000

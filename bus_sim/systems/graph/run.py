@@ -11,8 +11,8 @@ from bus_sim.systems.graph.show import picture
 from bus_sim.systems.session import Played, SystemPlant, conclude, play
 from onboard.core.messages import Bid, CallForProposals
 from onboard.core.site import Site
-from onboard.kinds.graph.messages import EdgeNotice, NodeAnswer, NodeVerdict, TurnSignal, VisitResult
-from onboard.kinds.graph.site import FactoryGraph
+from onboard.systems.graph.messages import EdgeNotice, NodeAnswer, NodeVerdict, TurnSignal, VisitResult
+from onboard.systems.graph.site import FactoryGraph
 
 if TYPE_CHECKING:
     from bus_sim.systems.registry import SystemOptions

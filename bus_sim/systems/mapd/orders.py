@@ -8,8 +8,8 @@ from bus_sim.systems.mapd.plant import UnitPlant, make_plant
 from bus_sim.systems.orders import Ended, Orders, System, Tally, nothing_to_draw, tally
 from bus_sim.systems.session import SystemPlant
 from onboard.core.site import Site
-from onboard.kinds.mapd.messages import TransportResult
-from onboard.kinds.mapd.site import FAR, Mapd, Task
+from onboard.systems.mapd.messages import TransportResult
+from onboard.systems.mapd.site import FAR, Mapd, Task
 
 #: So many endpoints are looked at to see how long ways are. Ours.
 SAMPLE = 12

@@ -7,11 +7,11 @@ bodies in one cell or zone, a move to where no way leads, two that change places
 from dataclasses import dataclass, field
 from functools import partial
 
-from bus_sim.plant.link import BusDeviceLink, DeviceLink
-from bus_sim.plant.timers import Timer, Timers
+from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.timers import Timer, Timers
 from onboard.core.messages import Message
 from onboard.core.site import Machine, Site
-from onboard.kinds.mapd.messages import (
+from onboard.systems.mapd.messages import (
     NO_TASK,
     CartAction,
     CartOrder,
@@ -20,7 +20,7 @@ from onboard.kinds.mapd.messages import (
     TransportKey,
     TransportResult,
 )
-from onboard.kinds.mapd.site import Mapd, Task
+from onboard.systems.mapd.site import Mapd, Task
 
 #: Bodies tell where they are, and unanswered orders are said again, this often, us (dbc/mapd.dbc).
 WORD_US, KEY_US = 2_000_000, 1_000_000

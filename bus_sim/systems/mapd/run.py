@@ -10,8 +10,8 @@ from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.show import picture
 from bus_sim.systems.session import Played, SystemPlant, conclude, play
 from onboard.core.site import Site
-from onboard.kinds.mapd.messages import PathHead, StepAward, StepRound, TransportBid, TransportCall
-from onboard.kinds.mapd.site import Mapd
+from onboard.systems.mapd.messages import PathHead, StepAward, StepRound, TransportBid, TransportCall
+from onboard.systems.mapd.site import Mapd
 
 if TYPE_CHECKING:
     from bus_sim.systems.registry import SystemOptions

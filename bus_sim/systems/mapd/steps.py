@@ -7,10 +7,10 @@ others have published, in the order of the bids; then all move at once.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from onboard.kinds.mapd.auction import Offer, Rule, Task, winners
-from onboard.kinds.mapd.floor import Floor
-from onboard.kinds.mapd.paths import Path, Paths
-from onboard.kinds.mapd.search import find_path
+from onboard.systems.mapd.auction import Offer, Rule, Task, winners
+from onboard.systems.mapd.floor import Floor
+from onboard.systems.mapd.paths import Path, Paths
+from onboard.systems.mapd.search import find_path
 
 
 @dataclass

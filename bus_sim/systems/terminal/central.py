@@ -15,12 +15,12 @@ from onboard.core.effects import Effect, Record, Send
 from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Site
-from onboard.kinds.registry import factory_for
-from onboard.kinds.terminal.desk import Desk, DeskFactory, DeskGeneration
-from onboard.kinds.terminal.messages import Assignment, TaskTerms
-from onboard.kinds.terminal.missions import Transport
-from onboard.kinds.terminal.search import Job, Search, remaining
-from onboard.kinds.terminal.site import Terminal
+from onboard.systems.registry import factory_for
+from onboard.systems.terminal.desk import Desk, DeskFactory, DeskGeneration
+from onboard.systems.terminal.messages import Assignment, TaskTerms
+from onboard.systems.terminal.missions import Transport
+from onboard.systems.terminal.search import Job, Search, remaining
+from onboard.systems.terminal.site import Terminal
 
 #: An assignment that is in no plan yet is said again after this, us.
 AGAIN_US = 2_000_000

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from bus_sim.systems.terminal.world import Handling
-from onboard.kinds.terminal.site import Mission, Terminal
+from onboard.systems.terminal.site import Mission, Terminal
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.plant import TerminalPlant, make_plant
 from onboard.core.codes import KindCode
 from onboard.core.site import Site
-from onboard.kinds.terminal.site import Blockage, EntityKind, Mission, StationKind, Terminal
-from onboard.kinds.terminal.vehicle import terminal
+from onboard.systems.terminal.site import Blockage, EntityKind, Mission, StationKind, Terminal
+from onboard.systems.terminal.vehicle import terminal
 
 #: Boxes of a mission at most; the first missions come so long after power-up, us. Ours.
 MOST_BOXES, ORIGIN_US = 3, 5_000_000

@@ -4,14 +4,14 @@ import random
 from collections.abc import Callable
 from functools import partial
 
-from bus_sim.plant.link import BusDeviceLink
-from bus_sim.plant.timers import Timers
+from bus_sim.devices.link import BusDeviceLink
+from bus_sim.devices.timers import Timers
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.world import VehicleBody, World
 from onboard.core.codes import KindCode, ManualMode
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.kinds.terminal.messages import (
+from onboard.systems.terminal.messages import (
     Action,
     HandlerMode,
     HandlerOrder,
@@ -25,9 +25,9 @@ from onboard.kinds.terminal.messages import (
     MoveState,
     Verb,
 )
-from onboard.kinds.terminal.missions import types_of
-from onboard.kinds.terminal.site import Blockage, EntityKind, Mission, Press, Terminal
-from onboard.kinds.terminal.vehicle import terminal
+from onboard.systems.terminal.missions import types_of
+from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press, Terminal
+from onboard.systems.terminal.vehicle import terminal
 
 #: What a person presses, by the words of a site file.
 PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMode.AUTOMATIC}

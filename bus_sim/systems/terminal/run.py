@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bus_sim.plant.timers import LoopTimers
+from bus_sim.devices.timers import LoopTimers
 from bus_sim.run import BusRun, RunOptions, buses_of, run_until
 from bus_sim.systems.session import links_of
 from bus_sim.systems.terminal.deliveries import Delivery, deliveries, ordered
@@ -13,10 +13,10 @@ from bus_sim.systems.watched import watched
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.messages import CarAt, Message
 from onboard.core.mirror import Mirror
-from onboard.kinds.terminal.desk import Desk
-from onboard.kinds.terminal.mirror import TerminalMirror
-from onboard.kinds.terminal.site import Terminal
-from onboard.kinds.terminal.vehicle import Vehicle
+from onboard.systems.terminal.desk import Desk
+from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.site import Terminal
+from onboard.systems.terminal.vehicle import Vehicle
 
 #: Looks whether it is over, us.
 STEP_US = 1_000_000

@@ -18,8 +18,8 @@ from bus_sim.systems.terminal.run import LIMIT_US, Outcome, TerminalRun, play
 from bus_sim.systems.terminal.table import picture, plan_table
 from bus_sim.systems.watched import FOREVER_US
 from onboard.core.site import Site
-from onboard.kinds.terminal.site import Terminal
-from onboard.kinds.terminal.vehicle import terminal
+from onboard.systems.terminal.site import Terminal
+from onboard.systems.terminal.vehicle import terminal
 
 if TYPE_CHECKING:  # that module names this one
     from bus_sim.systems.registry import SystemOptions

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from onboard.kinds.terminal.site import EntityKind, StationKind, Terminal
+from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 
 
 @dataclass

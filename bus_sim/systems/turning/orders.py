@@ -7,8 +7,8 @@ from bus_sim.systems.orders import Orders, System, Tally, last_of, nothing_to_dr
 from bus_sim.systems.session import SystemPlant
 from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant, make_plant
 from onboard.core.site import Site
-from onboard.kinds.turning.messages import JobResult
-from onboard.kinds.turning.site import Turning, Wanted
+from onboard.systems.turning.messages import JobResult
+from onboard.systems.turning.site import Turning, Wanted
 
 #: Parts of an order, at least and at most. Ours.
 BATCH = (1, 3)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from functools import partial
 from math import hypot
 
-from bus_sim.plant.link import BusDeviceLink, DeviceLink
-from bus_sim.plant.timers import Timer, Timers
+from bus_sim.devices.link import BusDeviceLink, DeviceLink
+from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.turning.nc import ProgramError, Run, contour_error_mm, run_program
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.kinds.turning.messages import (
+from onboard.systems.turning.messages import (
     CHUNK,
     JobAnswer,
     JobEntry,
@@ -24,7 +24,7 @@ from onboard.kinds.turning.messages import (
     ToolState,
     crc16,
 )
-from onboard.kinds.turning.site import Drawing, Element, Lathe, Turning, Wanted
+from onboard.systems.turning.site import Drawing, Element, Lathe, Turning, Wanted
 
 STATE_REPEAT_US = 2_000_000
 TOOL_REPEAT_US = 10_000_000

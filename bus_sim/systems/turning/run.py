@@ -9,8 +9,8 @@ from bus_sim.systems.turning.plant import TurningPlant, make_plant
 from bus_sim.systems.turning.show import board
 from onboard.core.messages import Bid
 from onboard.core.site import Site
-from onboard.kinds.turning.messages import JobResult
-from onboard.kinds.turning.site import Turning
+from onboard.systems.turning.messages import JobResult
+from onboard.systems.turning.site import Turning
 
 if TYPE_CHECKING:
     from bus_sim.systems.registry import SystemOptions

@@ -9,21 +9,21 @@ from onboard.core.codes import MachineState, Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
+from onboard.systems.car_park.checks.cars import CarsConserved, OneCustodian
+from onboard.systems.car_park.checks.customers import CustomersServed, FullMeansFull, TasksServed
+from onboard.systems.car_park.checks.doors import Doors
+from onboard.systems.car_park.checks.lifts import LiftByGate, LiftCrush, PlatformThere
+from onboard.systems.car_park.checks.motion import InsideAuthority, OneBody
+from onboard.systems.car_park.checks.shuttles import TornCar
 from onboard.trace.candump_reader import CandumpReader, Record
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
-from onboard.trace.check.cars import CarsConserved, OneCustodian
-from onboard.trace.check.customers import CustomersServed, FullMeansFull, TasksServed
-from onboard.trace.check.doors import Doors
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.holds import LetGoAgain
-from onboard.trace.check.lifts import LiftByGate, LiftCrush, PlatformThere
 from onboard.trace.check.liveness import NobodyStarves, NoRounds, SomethingHappens
-from onboard.trace.check.motion import InsideAuthority, OneBody
 from onboard.trace.check.owners import OneOwner
 from onboard.trace.check.picture import SETTLING_US, Picture
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Rule
-from onboard.trace.check.shuttles import TornCar
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.decoder import Decoder
 from onboard.wire.speakers import why_unheard

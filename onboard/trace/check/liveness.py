@@ -6,7 +6,7 @@ from math import sqrt
 from onboard.core.codes import CallResult, KindCode, Operation, TaskPhase
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Progress, Reference, TaskReport, Waiting
 from onboard.core.site import Axis, Site
-from onboard.kinds.car_park.site import car_park
+from onboard.systems.car_park.site import car_park
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.geometry import body_of
 from onboard.trace.check.picture import Picture

@@ -2,17 +2,20 @@
 
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.kinds.cell.messages import MESSAGES as CELL_MESSAGES
-from onboard.kinds.graph.messages import MESSAGES as GRAPH_MESSAGES
-from onboard.kinds.mapd.messages import MESSAGES as MAPD_MESSAGES
-from onboard.kinds.terminal.messages import MESSAGES as TERMINAL_MESSAGES
-from onboard.kinds.turning.messages import MESSAGES as TURNING_MESSAGES
-from onboard.trace.check import cell, graph, mapd, turning
+from onboard.systems.cell import checks as cell
+from onboard.systems.cell.messages import MESSAGES as CELL_MESSAGES
+from onboard.systems.graph import checks as graph
+from onboard.systems.graph.messages import MESSAGES as GRAPH_MESSAGES
+from onboard.systems.mapd import checks as mapd
+from onboard.systems.mapd.messages import MESSAGES as MAPD_MESSAGES
+from onboard.systems.terminal.checks import TERMINAL_RULES
+from onboard.systems.terminal.messages import MESSAGES as TERMINAL_MESSAGES
+from onboard.systems.turning import checks as turning
+from onboard.systems.turning.messages import MESSAGES as TURNING_MESSAGES
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.checks import RULES, Checks
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Rule
-from onboard.trace.check.terminal import TERMINAL_RULES
 from onboard.wire.codec import codecs
 
 #: What every system keeps to, whatever its machines do.

@@ -8,7 +8,7 @@ from typing import Protocol
 
 from onboard.config.site import load_site
 from onboard.core.site import Site
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
 from onboard.wire.codec import Codecs, codecs

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from onboard.config.site import load_site
-from onboard.kinds.registry import system_of
+from onboard.systems.registry import system_of
 from onboard.trace.commands.common import Commands, add_command
 from onboard.trace.dissector import dissector
 

@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from onboard.kinds.car_park.site import CarPark
+from onboard.systems.car_park.site import CarPark
 from onboard.trace.commands.common import (
     Commands,
     TraceError,

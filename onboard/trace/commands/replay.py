@@ -9,7 +9,7 @@ from onboard.core.behaviour import BehaviourFactory
 from onboard.core.holon import Holon
 from onboard.core.messages import Heartbeat
 from onboard.core.site import Machine, Site
-from onboard.kinds.registry import factory_for
+from onboard.systems.registry import factory_for
 from onboard.trace.commands.common import Commands, TraceError, add_command, add_log, codecs_of, open_log, tell_faults
 from onboard.trace.replay.driver import JOURNAL_US, Driver, RaisedCosts, Recording, compare, in_words, record
 from onboard.wire.codec import Codecs

@@ -2,18 +2,18 @@
 
 from onboard.core.messages import Message, Reference
 from onboard.core.site import Site
-from onboard.kinds.cell.site import Cell
-from onboard.kinds.graph.site import FactoryGraph
-from onboard.kinds.mapd.site import Mapd
-from onboard.kinds.terminal.site import Terminal
-from onboard.kinds.turning.site import Turning
-from onboard.trace.scene.car_park import CarParkScene
-from onboard.trace.scene.cell import CellScene
-from onboard.trace.scene.graph import GraphScene
-from onboard.trace.scene.mapd import MapdScene
+from onboard.systems.car_park.scene import CarParkScene
+from onboard.systems.cell.scene import CellScene
+from onboard.systems.cell.site import Cell
+from onboard.systems.graph.scene import GraphScene
+from onboard.systems.graph.site import FactoryGraph
+from onboard.systems.mapd.scene import MapdScene
+from onboard.systems.mapd.site import Mapd
+from onboard.systems.terminal.scene import TerminalScene
+from onboard.systems.terminal.site import Terminal
+from onboard.systems.turning.scene import TurningScene
+from onboard.systems.turning.site import Turning
 from onboard.trace.scene.scene import Json, Scene
-from onboard.trace.scene.terminal import TerminalScene
-from onboard.trace.scene.turning import TurningScene
 from onboard.trace.view import SiteView
 
 

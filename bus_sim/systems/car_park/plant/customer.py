@@ -1,0 +1,314 @@
+"""A customer: brings a car, takes a ticket, and comes back for it; one transition table.
+
+A customer sees what a person sees (light, doors, the desk's text, whose car stands in the bay) and acts on the world
+and the desk; no message of any bus is known here.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar
+
+from bus_sim.demand import Stay
+from bus_sim.devices.timers import Timer, Timers
+from bus_sim.systems.car_park.plant.bodies import DRIVER_S
+from bus_sim.systems.car_park.plant.compartment import Compartment
+from bus_sim.systems.car_park.plant.oracle import Oracle
+from bus_sim.systems.car_park.plant.rules import Rule
+from bus_sim.systems.car_park.plant.world import World
+from onboard.core.messages import Reference
+
+#: From seeing that one may go to going, us (ours).
+REACTION_US = 1_000_000
+#: Getting from the car over the sill with the ticket in hand, s (ours).
+WALK_S = (4.0, 8.0)
+#: The key is pressed, or the ticket inserted, again after this long without an answer, us (ours).
+PATIENCE_US = 15_000_000
+#: A ticket that the desk does not know is tried again after this, us, and so many times in all (ours).
+UNKNOWN_RETRY_US = 60_000_000
+UNKNOWN_TRIES = 5
+
+
+class State(Enum):
+    """What the customer is doing."""
+
+    COMING = "coming"
+    QUEUEING = "queueing"
+    DRIVING_IN = "driving in"
+    AWAITING_TICKET = "awaiting ticket"
+    WALKING_OUT = "walking out"
+    PARKED = "parked"
+    AT_DESK = "at the desk"
+    AWAITING_DOOR = "awaiting the door"
+    DRIVING_OUT = "driving out"
+    GONE = "gone"
+
+
+class Event(Enum):
+    """What the customer sees, or what falls due."""
+
+    ARRIVE = "arrive"
+    INVITED = "invited"
+    TIMER = "timer"
+    TICKET = "ticket"
+    FULL = "full"
+    TOO_LARGE = "too large"
+    LEAVE = "leave"
+    CANCEL = "cancel"
+    WAIT = "please wait"
+    UNKNOWN = "unknown ticket"
+    READY = "car ready"
+    DOOR_OPEN = "door open"
+
+
+class Outcome(Enum):
+    """How the visit ended; STAYING until then."""
+
+    STAYING = "staying"
+    SERVED = "served"
+    FULL = "refused: full"
+    TOO_LARGE = "refused: too large"
+    CANCELLED = "cancelled"
+    TICKET_UNKNOWN = "ticket unknown"
+    WRONG_CAR = "wrong car"
+
+
+#: (state, event) -> (next state, what the customer does). Pairs not listed change nothing.
+TABLE: dict[tuple[State, Event], tuple[State, str]] = {
+    (State.COMING, Event.ARRIVE): (State.QUEUEING, "arrive"),
+    (State.QUEUEING, Event.INVITED): (State.DRIVING_IN, "drive_in"),
+    (State.DRIVING_IN, Event.TIMER): (State.AWAITING_TICKET, "get_out"),
+    (State.AWAITING_TICKET, Event.TIMER): (State.AWAITING_TICKET, "press_key"),
+    (State.AWAITING_TICKET, Event.TICKET): (State.WALKING_OUT, "walk_out"),
+    (State.AWAITING_TICKET, Event.FULL): (State.DRIVING_OUT, "turn_back"),
+    (State.AWAITING_TICKET, Event.TOO_LARGE): (State.DRIVING_OUT, "turn_back_too_large"),
+    (State.WALKING_OUT, Event.FULL): (State.DRIVING_OUT, "turn_back"),
+    (State.WALKING_OUT, Event.TIMER): (State.PARKED, "walk_away"),
+    (State.PARKED, Event.FULL): (State.AWAITING_DOOR, "come_back"),
+    (State.PARKED, Event.LEAVE): (State.AT_DESK, "insert_ticket"),
+    (State.PARKED, Event.CANCEL): (State.AT_DESK, "cancel"),
+    (State.AT_DESK, Event.TIMER): (State.AT_DESK, "insert_ticket"),
+    (State.AT_DESK, Event.WAIT): (State.AT_DESK, "be_patient"),
+    (State.AT_DESK, Event.UNKNOWN): (State.AT_DESK, "try_later"),
+    (State.AT_DESK, Event.READY): (State.AWAITING_DOOR, "be_patient"),
+    (State.AWAITING_DOOR, Event.DOOR_OPEN): (State.DRIVING_OUT, "fetch"),
+    (State.DRIVING_OUT, Event.TIMER): (State.GONE, "drive_away"),
+}
+
+
+@dataclass
+class Visit:
+    """What is measured of one customer; times in us of loop time, None while not reached."""
+
+    outcome: Outcome = Outcome.STAYING
+    arrived_us: int | None = None
+    parked_us: int | None = None
+    asked_us: int | None = None
+    gone_us: int | None = None
+
+    @property
+    def in_wait_us(self) -> int | None:
+        """From arrival in the queue to walking away with a ticket."""
+        return _span(self.arrived_us, self.parked_us)
+
+    @property
+    def out_wait_us(self) -> int | None:
+        """From the ticket in the desk to driving out."""
+        return _span(self.asked_us, self.gone_us)
+
+
+def _span(begin_us: int | None, end_us: int | None) -> int | None:
+    return end_us - begin_us if begin_us is not None and end_us is not None else None
+
+
+class Customer:
+    """One customer with one car. ``on_step`` is told after every transition; the street sets ``compartment``."""
+
+    def __init__(
+        self,
+        stay: Stay,
+        world: World,
+        oracle: Oracle,
+        timers: Timers,
+        seed: int,
+        choose: Callable[["Customer"], Compartment],
+        on_step: Callable[["Customer"], None],
+    ) -> None:
+        self.stay = stay
+        self.state = State.COMING
+        self.visit = Visit()
+        self.ticket: Reference | None = None
+        self.compartment: Compartment | None = None
+        #: Dawdles so long in the compartment before driving out, us; set by faults.
+        self.dawdle_us = 0
+        #: Has nothing to put into the desk; set by faults.
+        self.has_lost_ticket = False
+        self._world = world
+        self._oracle = oracle
+        self._timers = timers
+        self._choose = choose
+        self._on_step = on_step
+        self._chance = random.Random(f"customer:{seed}:{stay.car.name}")
+        self._timer: Timer | None = None
+        self._tries = 0
+        self._leave_us: int | None = None
+        self._refusal = Outcome.SERVED
+
+    def begin(self, origin_us: int) -> None:
+        """Take up the plan for the day; ``origin_us`` is the loop time of the demand's time zero."""
+        self._timers.call_at(origin_us + self.stay.arrival_us, lambda: self.on(Event.ARRIVE))
+        if self.stay.departure_us is not None:
+            self._leave_us = origin_us + self.stay.departure_us
+        if self.stay.cancel_us is not None:
+            self._timers.call_at(origin_us + self.stay.cancel_us, lambda: self.on(Event.CANCEL))
+
+    @property
+    def is_leaving(self) -> bool:
+        """Whether a time to leave is set, or the customer came for the car already."""
+        return self._leave_us is not None
+
+    def leave_now(self) -> None:
+        """Come for the car now, or as soon as it is parked, whatever was planned."""
+        self._leave_us = self._timers.now_us()
+        self.on(Event.LEAVE)
+
+    def on(self, event: Event) -> None:
+        """See something, or have something fall due."""
+        following = TABLE.get((self.state, event))
+        if following is None:
+            return
+        self.state = following[0]
+        self._ACTIONS[following[1]](self)
+        self._on_step(self)
+
+    @property
+    def _place(self) -> Compartment:
+        if self.compartment is None:
+            raise ValueError(f"{self.stay.car.name} is at no compartment")
+        return self.compartment
+
+    def _wait(self, delay_us: int) -> None:
+        self._be_patient()
+        self._timer = self._timers.call_at(self._timers.now_us() + delay_us, lambda: self.on(Event.TIMER))
+
+    def _be_patient(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _draw_us(self, span_s: tuple[float, float]) -> int:
+        return round(self._chance.uniform(*span_s) * 1e6)
+
+    # --- coming ------------------------------------------------------------------------------------------------
+
+    def _arrive(self) -> None:
+        self.visit.arrived_us = self._timers.now_us()
+        self.compartment = self._choose(self)
+
+    def _drive_in(self) -> None:
+        self._world.begin_crossing(self._place.node_id)
+        self._world.person_enters(self._place.node_id)
+        self._wait(self._draw_us(DRIVER_S))
+
+    def _get_out(self) -> None:
+        self._world.car_enters(self._place.node_id, self.stay.car)
+        self._press_key()
+
+    def _press_key(self) -> None:
+        # Patience first: the answer may come before the call returns.
+        self._wait(PATIENCE_US)
+        self._place.press_key()
+
+    def _walk_out(self) -> None:
+        self._wait(self._draw_us(WALK_S))
+
+    def _walk_away(self) -> None:
+        self.visit.parked_us = self._timers.now_us()
+        self._world.person_leaves(self._place.node_id)
+        if self._leave_us is not None:
+            when_us = max(self._leave_us, self._timers.now_us())
+            self._timers.call_at(when_us, lambda: self.on(Event.LEAVE))
+
+    # --- refused -----------------------------------------------------------------------------------------------
+
+    def _turn_back(self) -> None:
+        self._refusal = Outcome.FULL
+        self._drive_out()
+
+    def _turn_back_too_large(self) -> None:
+        self._refusal = Outcome.TOO_LARGE
+        self._drive_out()
+
+    def _come_back(self) -> None:
+        """Told FULL after walking away: the car is still in the bay."""
+        self._refusal = Outcome.FULL
+
+    # --- going -------------------------------------------------------------------------------------------------
+
+    def _insert_ticket(self) -> None:
+        # Whoever pressed cancel in vain has become an ordinary customer.
+        self._refusal = Outcome.SERVED
+        if self.visit.asked_us is None:
+            self.visit.asked_us = self._timers.now_us()
+            self.compartment = self._choose(self)
+        self._wait(PATIENCE_US)
+        if self.ticket is not None and not self.has_lost_ticket:
+            self._place.insert_ticket(self.ticket)
+
+    def _cancel(self) -> None:
+        """While the car is still in the bay the cancel key may do; else, or without an answer, the ticket does."""
+        if self._place.car != self.stay.car or self.ticket is None:
+            self._insert_ticket()
+            return
+        self._refusal = Outcome.CANCELLED
+        self.visit.asked_us = self._timers.now_us()
+        self._wait(PATIENCE_US)
+        self._place.press_cancel(self.ticket)
+
+    def _try_later(self) -> None:
+        self._tries += 1
+        if self._tries < UNKNOWN_TRIES:
+            self._wait(UNKNOWN_RETRY_US)
+            return
+        self._be_patient()
+        self.state = State.GONE
+        self.visit.outcome = Outcome.TICKET_UNKNOWN
+
+    def _fetch(self) -> None:
+        if self._place.car != self.stay.car:
+            there = self._place.car.name if self._place.car is not None else "no car"
+            self._oracle.report(Rule.OWN_CAR, f"{self.stay.car.name} is called, {there} stands in the bay")
+            self.state = State.GONE
+            self.visit.outcome = Outcome.WRONG_CAR
+            return
+        self._world.person_enters(self._place.node_id)
+        self._drive_out()
+
+    def _drive_out(self) -> None:
+        self._world.begin_crossing(self._place.node_id)
+        self._wait(self._draw_us(DRIVER_S) + self.dawdle_us)
+
+    def _drive_away(self) -> None:
+        self.visit.gone_us = self._timers.now_us()
+        self.visit.outcome = self._refusal
+        self._world.car_leaves(self._place.node_id, self.stay.car)
+        self._world.person_leaves(self._place.node_id)
+
+    _ACTIONS: ClassVar[dict[str, Callable[["Customer"], None]]] = {
+        "arrive": _arrive,
+        "drive_in": _drive_in,
+        "get_out": _get_out,
+        "press_key": _press_key,
+        "walk_out": _walk_out,
+        "walk_away": _walk_away,
+        "turn_back": _turn_back,
+        "turn_back_too_large": _turn_back_too_large,
+        "come_back": _come_back,
+        "insert_ticket": _insert_ticket,
+        "cancel": _cancel,
+        "be_patient": _be_patient,
+        "try_later": _try_later,
+        "fetch": _fetch,
+        "drive_away": _drive_away,
+    }

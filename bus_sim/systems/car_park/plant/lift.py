@@ -1,0 +1,98 @@
+"""A lift: the drive of its platform, which obeys orders as a carrier's does, and the platform's sensors."""
+
+from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.timers import Timer, Timers
+from bus_sim.systems.car_park.plant.carrier import Carrier
+from bus_sim.systems.car_park.plant.motion import Motion
+from bus_sim.systems.car_park.plant.shaft import PlatformBody
+from bus_sim.systems.car_park.plant.world import Change, World, is_at_mark
+from onboard.core.messages import DriveOrder, PlatformState
+from onboard.core.site import Axis, Site
+
+#: PlatformState is repeated at least this often (dbc/device.dbc).
+REPEAT_US = 10_000_000
+#: Why a lift's drive refuses while its light curtain is broken.
+OVER_THE_SILL = "something is over the sill"
+
+
+class LiftDrive(Carrier):
+    """Drive, position sensor and mark sensor of one lift, and its platform's curtain, load cells and mark.
+
+    The light curtain at the sill is wired to the drive: while a body is over the sill the drive refuses to move, in
+    mode FAULT until the sill is free. A PlatformState follows on every change of what the platform senses, and slowly
+    otherwise.
+    """
+
+    def __init__(self, node_id: int, site: Site, world: World, timers: Timers, link: DeviceLink) -> None:
+        super().__init__(node_id, site, world, timers, link, lambda: True)
+        self._told: PlatformState | None = None
+        self._platform_timer: Timer | None = None
+        self._crossing_timer: Timer | None = None
+
+    def start(self) -> None:
+        """Power on: say where the platform is and what it senses."""
+        super().start()
+        self._say_platform()
+        self._watch_sill()
+
+    def platform_state(self) -> PlatformState:
+        """What the platform's sensors see now."""
+        robot = self._world.aboard(self.node_id)
+        car = self._world.car_aboard(robot) if robot is not None else None
+        crossing = self._world.overhang(self.node_id) is not None
+        return PlatformState(self.node_id, robot is not None, crossing, car.mass_kg if car is not None else 0)
+
+    @property
+    def _body(self) -> PlatformBody:
+        return self._world.platforms[self.node_id]
+
+    @property
+    def _axis(self) -> Axis:
+        return self._site.lift
+
+    @property
+    def _pitch_mm(self) -> int:
+        return self._site.tracks[self._body.track].pitch_mm
+
+    def _move(self, motion: Motion) -> None:
+        self._world.move_platform(self.node_id, motion)
+
+    def _at_mark(self) -> bool:
+        return is_at_mark(self._body.motion.at(self._timers.now_us())[0], self._pitch_mm)
+
+    def _refusal(self, order: DriveOrder) -> str:
+        if self._world.overhang(self.node_id) is not None:
+            return OVER_THE_SILL
+        if order.across:
+            return "a platform does not turn"
+        if not 0 <= order.target_mm <= (self._site.tracks[self._body.track].length - 1) * self._pitch_mm:
+            return f"target {order.target_mm} mm is beyond the end of the shaft"
+        return ""
+
+    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
+        if change in (Change.CARRIER, Change.CAR, Change.PLATFORM):
+            self._look()
+
+    def _look(self) -> None:
+        """Tell what the platform senses where that has changed; a sill that has become free ends its fault."""
+        state = self.platform_state()
+        if self._told is not None and state != self._told:
+            self._say_platform()
+        if self.fault == OVER_THE_SILL and not state.crossing:
+            self.fault = ""
+            self._say(self._timers.now_us())
+        self._watch_sill()
+
+    def _watch_sill(self) -> None:
+        """Look again when a body that moves now reaches the sill, or has passed it."""
+        if self._crossing_timer is not None:
+            self._crossing_timer.cancel()
+        when_us = self._world.next_crossing_us(self.node_id)
+        self._crossing_timer = None if when_us is None else self._timers.call_at(when_us, self._look)
+
+    def _say_platform(self) -> None:
+        self._told = self.platform_state()
+        self._link.send(self._told)
+        if self._platform_timer is not None:
+            self._platform_timer.cancel()
+        self._platform_timer = self._timers.call_at(self._timers.now_us() + REPEAT_US, self._say_platform)

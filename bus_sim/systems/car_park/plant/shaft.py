@@ -1,0 +1,48 @@
+"""Lift shafts as they are: the sill at which an alley ends, and the platform that carries a robot past the floors."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from bus_sim.systems.car_park.plant.motion import Motion
+from onboard.core.site import Site
+
+
+class Sill(NamedTuple):
+    """Where an alley ends at a shaft: beyond ``edge_mm`` on its axis, ``towards`` -1 or +1, nothing is but a platform.
+
+    ``centre_mm`` is where the centre of a carrier on the platform is, on the same axis.
+    """
+
+    edge_mm: float
+    towards: int
+    centre_mm: float
+
+    def beyond_mm(self, position_mm: float, length_mm: float) -> float:
+        """How far a body with its centre at ``position_mm`` reaches into the shaft; negative while it keeps away."""
+        return (position_mm - self.edge_mm) * self.towards + length_mm / 2
+
+
+@dataclass
+class PlatformBody:
+    """A lift's platform as it is: its motion along the shaft of ``track``, and the robot that rides on it.
+
+    ``robot`` is set only while the platform is not at a floor; that robot's position then stays on the axis of the
+    alley ``axis``, where it boarded.
+    """
+
+    track: int
+    motion: Motion
+    robot: int | None = None
+    axis: int = 0
+
+
+def sills_of(site: Site, lift_track: int) -> dict[int, Sill]:
+    """The sills of one lift by floor."""
+    return {segment.track: _sill(site, segment.track, segment.index) for segment in site.tracks[lift_track].joins}
+
+
+def _sill(site: Site, floor: int, index: int) -> Sill:
+    pitch_mm = site.tracks[floor].pitch_mm
+    towards = -1 if index == 1 else 1
+    middle_mm = (index - 1) * pitch_mm
+    return Sill(middle_mm + towards * pitch_mm / 2, towards, float(middle_mm + towards * pitch_mm))

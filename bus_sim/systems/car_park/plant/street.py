@@ -1,0 +1,200 @@
+"""The street before the compartments: queues of arriving cars, people at the desks, and what they had to wait."""
+
+from dataclasses import dataclass, field
+from functools import partial
+
+from bus_sim.demand import Demand, Stay
+from bus_sim.devices.timers import Timers
+from bus_sim.systems.car_park.plant.compartment import Compartment
+from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, Event, Outcome, State
+from bus_sim.systems.car_park.plant.oracle import Oracle
+from bus_sim.systems.car_park.plant.world import World
+from onboard.core.codes import DeskText
+from onboard.core.messages import Reference
+
+#: What a text on the desk means to the customer whom it concerns.
+TEXTS: dict[DeskText, Event] = {
+    DeskText.TAKE_TICKET: Event.TICKET,
+    DeskText.FULL: Event.FULL,
+    # Turned away as well, if not for want of room.
+    DeskText.OUT_OF_ORDER: Event.FULL,
+    DeskText.CAR_TOO_LARGE: Event.TOO_LARGE,
+    DeskText.PLEASE_WAIT: Event.WAIT,
+    DeskText.UNKNOWN_TICKET: Event.UNKNOWN,
+    DeskText.CAR_READY: Event.READY,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The customers' day: how many, and waiting times in us in the order of the visits.
+
+    ``parked`` came in and took a ticket; ``served`` of them drove out again; ``inside`` are parked now; ``queueing``
+    wait with their car to come in, ``asking`` for their car to come out.
+    """
+
+    arrived: int
+    parked: int
+    served: int
+    inside: int
+    queueing: int
+    asking: int
+    refused_full: int
+    refused_too_large: int
+    cancelled: int
+    in_wait_us: tuple[int, ...] = field(repr=False)
+    out_wait_us: tuple[int, ...] = field(repr=False)
+
+
+class Street:
+    """All customers of a run. They go to the compartment with the fewest waiting, the lowest node-ID among equals."""
+
+    def __init__(
+        self, compartments: dict[int, Compartment], world: World, oracle: Oracle, timers: Timers, seed: int
+    ) -> None:
+        self.customers: list[Customer] = []
+        self.tickets_uncollected = 0
+        self._compartments = compartments
+        self._world = world
+        self._oracle = oracle
+        self._timers = timers
+        self._seed = seed
+        self._by_ticket: dict[Reference, Customer] = {}
+        #: Customers at each compartment in the order of their coming, with a car to park and with a ticket.
+        self._waiting: dict[int, list[Customer]] = {node: [] for node in compartments}
+        for node_id, compartment in compartments.items():
+            compartment.watch(partial(self._look, node_id))
+            compartment.watch_desk(partial(self._read, node_id))
+
+    def add(self, stay: Stay, origin_us: int = 0) -> Customer:
+        """A customer for one stay; ``origin_us`` is the loop time of the stay's time zero."""
+        customer = Customer(stay, self._world, self._oracle, self._timers, self._seed, self._choose, self._after_step)
+        self.customers.append(customer)
+        customer.begin(origin_us)
+        return customer
+
+    def add_all(self, demand: Demand, origin_us: int = 0) -> None:
+        """A customer for every stay of a demand."""
+        for stay in demand.stays:
+            self.add(stay, origin_us)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether everybody who had a time to leave has left, and nobody waits for anything."""
+        return all(c.state is State.GONE or self._stays_for_good(c) for c in self.customers)
+
+    def summary(self, since_us: int = 0) -> Summary:
+        """What happened so far, or since a loop time; waiting of those who came, or asked, since then."""
+        visits = [customer.visit for customer in self.customers]
+        outcomes = [visit.outcome for visit in visits if _is_since(visit.gone_us, since_us)]
+        states = [customer.state for customer in self.customers]
+        return Summary(
+            arrived=sum(_is_since(visit.arrived_us, since_us) for visit in visits),
+            parked=sum(_is_since(visit.parked_us, since_us) for visit in visits),
+            served=outcomes.count(Outcome.SERVED),
+            inside=states.count(State.PARKED),
+            queueing=states.count(State.QUEUEING),
+            asking=states.count(State.AT_DESK) + states.count(State.AWAITING_DOOR),
+            refused_full=outcomes.count(Outcome.FULL),
+            refused_too_large=outcomes.count(Outcome.TOO_LARGE),
+            cancelled=outcomes.count(Outcome.CANCELLED),
+            in_wait_us=self.in_waits_us(since_us),
+            out_wait_us=tuple(
+                visit.out_wait_us
+                for visit in visits
+                if visit.out_wait_us is not None
+                and visit.outcome is Outcome.SERVED
+                and _is_since(visit.asked_us, since_us)
+            ),
+        )
+
+    def in_waits_us(self, since_us: int, until_us: int | None = None) -> tuple[int, ...]:
+        """Waiting of all who came from one loop time on, or until another, and have their ticket, in us."""
+        visits = [customer.visit for customer in self.customers]
+        return tuple(
+            visit.in_wait_us
+            for visit in visits
+            if visit.in_wait_us is not None
+            and visit.arrived_us is not None
+            and since_us <= visit.arrived_us
+            and (until_us is None or visit.arrived_us < until_us)
+        )
+
+    def _stays_for_good(self, customer: Customer) -> bool:
+        return customer.state is State.PARKED and customer.stay.departure_us is None
+
+    # --- who goes where ----------------------------------------------------------------------------------------
+
+    def _choose(self, customer: Customer) -> Compartment:
+        node_id = min(self._waiting, key=lambda node: (len(self._waiting[node]), node))
+        return self._compartments[node_id]
+
+    def _after_step(self, customer: Customer) -> None:
+        """Keep the lists of who waits where, and let people look at what they now wait for."""
+        for waiting in self._waiting.values():
+            if customer in waiting:
+                waiting.remove(customer)
+        if customer.compartment is None:
+            return
+        node_id = customer.compartment.node_id
+        if customer.state not in (State.PARKED, State.GONE):
+            self._waiting[node_id].append(customer)
+            self._waiting[node_id].sort(key=_came_us)
+        self._look(node_id)
+
+    # --- what people see ---------------------------------------------------------------------------------------
+
+    def _look(self, node_id: int) -> None:
+        """After a visible change: whoever may go now goes after the reaction time, if it still holds then."""
+        if self._who_may_go(node_id) is not None:
+            self._timers.call_at(self._timers.now_us() + REACTION_US, lambda: self._go(node_id))
+
+    def _go(self, node_id: int) -> None:
+        found = self._who_may_go(node_id)
+        if found is not None:
+            found[0].on(found[1])
+
+    def _who_may_go(self, node_id: int) -> tuple[Customer, Event] | None:
+        compartment = self._compartments[node_id]
+        if not compartment.is_input_open:
+            return None
+        for customer in self._waiting[node_id]:
+            if customer.state is State.AWAITING_DOOR:
+                return customer, Event.DOOR_OPEN
+        for customer in self._waiting[node_id]:
+            if customer.state is State.QUEUEING:
+                return (customer, Event.INVITED) if compartment.invites else None
+        return None
+
+    def _read(self, node_id: int, text: DeskText, car: Reference) -> None:
+        """A text concerns the customer of that ticket; a ticket and texts without a number whoever pressed the key."""
+        event = TEXTS.get(text)
+        if event is None:
+            return
+        reader = self._by_ticket.get(car)
+        if reader is None:
+            reader = self._at_key(node_id)
+            if text is DeskText.TAKE_TICKET:
+                self._take(reader, car)
+        if reader is not None:
+            reader.on(event)
+
+    def _at_key(self, node_id: int) -> Customer | None:
+        waiting = self._waiting[node_id]
+        return next((customer for customer in waiting if customer.state is State.AWAITING_TICKET), None)
+
+    def _take(self, customer: Customer | None, car: Reference) -> None:
+        if customer is None:
+            self.tickets_uncollected += 1
+            return
+        customer.ticket = car
+        self._by_ticket[car] = customer
+
+
+def _is_since(moment_us: int | None, since_us: int) -> bool:
+    return moment_us is not None and moment_us >= since_us
+
+
+def _came_us(customer: Customer) -> int:
+    visit = customer.visit
+    return visit.asked_us if visit.asked_us is not None else visit.arrived_us or 0

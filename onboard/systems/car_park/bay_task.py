@@ -1,0 +1,126 @@
+"""The one task that uses a compartment's bay, and what is said about it: its call and its award."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from onboard.core.authority import TokenKey, car_token
+from onboard.core.codes import (
+    CallResult,
+    Criterion,
+    DeskInput,
+    DeskText,
+    KindCode,
+    Operation,
+    OperatorAction,
+    Reason,
+    TaskPhase,
+)
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Award, BayState, CallForProposals, Reference, TaskReport, TokenRefusal
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import CallTerms
+from onboard.systems.car_park.site import CarLimits
+
+#: A call that nobody could serve is made again after this, us. Ours.
+RETRY_US = 30_000_000
+#: After a restart the machines say again what they have in hand; a task that nobody names is called anew so much later.
+#: Ours.
+SETTLING_US = 2_000_000
+#: What an operator's order stands for at the desk.
+DESK_INPUT = {
+    OperatorAction.PRESS_KEY: DeskInput.KEY,
+    OperatorAction.INSERT_TICKET: DeskInput.TICKET,
+    OperatorAction.CANCEL: DeskInput.CANCEL,
+    OperatorAction.URGENT_TICKET: DeskInput.TICKET,
+}
+#: The custodian's word that the winner is lost is answered so often with the newest award, before it counts. Ours.
+REMINDERS = 3
+
+
+class BayPhase(Enum):
+    """What the compartment is doing."""
+
+    STARTING = "starting"
+    FREE = "free"
+    LOCKING = "locking"
+    AWAITING = "awaiting"
+    OPENING = "opening"
+    SERVING = "serving"
+    CLOSING = "closing"
+    HANDOVER = "handover"
+    RESERVING = "reserving"
+
+
+@dataclass
+class BayTask:
+    """The task. ``version`` (16 bits) is raised each time that it is called anew; ``call`` is the one last awarded."""
+
+    task: Reference
+    operation: Operation
+    car: Reference
+    wheelbase_mm: int
+    winner: int = 0
+    version: int = 1
+    call: int = 0
+    was_granted: bool = False
+    retry_at_us: int | None = None
+    reminders: int = 0
+
+    def terms(self, source: int, sink: int, floor: Callable[[CallForProposals, int], int]) -> CallTerms:
+        """The call for it, between two stations by number; no robot can be better than ``floor``."""
+        return CallTerms(
+            task=self.task,
+            operation=self.operation,
+            kind=KindCode.ROBOT,
+            criterion=Criterion.FINISH_TIME,
+            from_station=source,
+            to_station=sink,
+            car=self.car,
+            wheelbase_mm=self.wheelbase_mm,
+            task_version=self.version,
+            floor=floor,
+        )
+
+    def is_unknown_to(self, refusal: TokenRefusal, mirror: Mirror) -> bool:
+        """Whether the car's custodian refuses it to the task's winner: it was off when the task was called, or won."""
+        record, wanted = mirror.cars.get(self.car), TokenKey(refusal.token_kind, refusal.token)
+        is_its_word = record is not None and record.custodian == refusal.sender and wanted == car_token(*self.car)
+        knows_not = refusal.requester == self.winner and refusal.reason is Reason.TOKEN_NOT_GRANTABLE_YET
+        return is_its_word and knows_not and self.call != 0
+
+    def award(self, sender: int) -> Award:
+        """The newest award, to be said again."""
+        return Award(sender, self.call, self.winner, self.task, self.version, CallResult.AWARDED, Reason.NONE)
+
+
+def queue_ticket(tickets: deque[Reference], car: Reference, *, urgent: bool) -> bool:
+    """Put a ticket behind those that wait, or an urgent one, new or not, before them; whether that changed anything."""
+    if urgent and tickets and tickets[0] == car:
+        return False
+    if car in tickets and not urgent:
+        return False
+    if car in tickets:
+        tickets.remove(car)
+    tickets.insert(0 if urgent else len(tickets), car)
+    return True
+
+
+def withdrawal(node: int, report: TaskReport) -> list[Effect]:
+    """The answer of ``node`` to who takes one of its tasks in hand that is another's, or over: it was away for long."""
+    if report.task.origin != node or report.phase not in (TaskPhase.AWARDED, TaskPhase.STARTED):
+        return []
+    return [Send(Award(node, 0, 0, report.task, 0, CallResult.WITHDRAWN, Reason.CANCELLED))]
+
+
+def fits(bay: BayState, limits: CarLimits) -> bool:
+    """Whether the car in the bay is one that the park takes (row P33)."""
+    small = bay.length_mm <= limits.max_length_mm and bay.height_mm <= limits.max_height_mm
+    grips = limits.min_wheelbase_mm <= bay.wheelbase_mm <= limits.max_wheelbase_mm
+    return small and grips and bay.load_kg <= limits.max_load_kg
+
+
+def refusal_text(mirror: Mirror) -> DeskText:
+    """What a customer is told whom nobody can serve; that nobody can although there is room is not called full."""
+    return DeskText.OUT_OF_ORDER if mirror.free_places() else DeskText.FULL

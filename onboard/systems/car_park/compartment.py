@@ -1,0 +1,503 @@
+"""The input/output compartment (IOC): bay, two doors, light, desk; custodian of cars, steward of tokens, initiator.
+
+The order of the 21 steps (Pujo et al. 2006, Fig. 9) is kept but for one hazard in it: the output door opens only when
+the input door is locked and the robot stands before it (docs/decisions.md, flag 5).
+"""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey, car_token, station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import (
+    ANY_STATION,
+    NOBODY,
+    OUTSIDE,
+    TASK_VERSION_BITS,
+    CallResult,
+    DeskInput,
+    DeskText,
+    DoorAction,
+    DoorName,
+    DoorPosition,
+    KindCode,
+    LightColour,
+    MachineState,
+    Operation,
+    OperatorAction,
+    Reason,
+    TaskPhase,
+    TokenKind,
+)
+from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.messages import (
+    BayState,
+    CarAt,
+    DeskEvent,
+    DoorState,
+    Message,
+    OperatorOrder,
+    Reference,
+    TaskReport,
+    TokenRefusal,
+    TokenRequest,
+)
+from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
+from onboard.core.serial import successor
+from onboard.core.site import Station
+from onboard.systems.car_park import bay_task, custody
+from onboard.systems.car_park.bay_generation import BayGeneration
+from onboard.systems.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
+from onboard.systems.car_park.bay_task import (
+    DESK_INPUT,
+    REMINDERS,
+    RETRY_US,
+    SETTLING_US,
+    BayPhase,
+    BayTask,
+    withdrawal,
+)
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.outputs import BayOutputs
+from onboard.systems.car_park.program import Program
+from onboard.systems.car_park.site import car_park
+from onboard.systems.car_park.stewardship import Stewardship
+
+
+@dataclass
+class Compartment:
+    """One compartment. At most one task uses its bay; tickets wait in the order in which they came."""
+
+    fleet: Fleet
+    generation: BayGeneration
+    kind: KindCode = KindCode.COMPARTMENT
+    phase: BayPhase = BayPhase.STARTING
+    job: BayTask | None = None
+    doors: DoorState | None = None
+    bay: BayState | None = None
+    tickets: deque[Reference] = field(default_factory=deque)
+    stewardship: Stewardship = field(init=False)
+    memory: BayMemory = field(init=False)
+    outputs: BayOutputs = field(init=False)
+    _number: int = 0
+    _desk_sequence: int | None = None
+    _key_pressed: bool = False
+    _robot_waits: bool = False
+
+    def __post_init__(self) -> None:
+        self.stewardship = Stewardship(self.fleet)
+        self.outputs = BayOutputs(self.fleet.node_id)
+        site, machine = self.fleet.site, self.fleet.machine
+        self._robots = CarParkGeneration(site, machine, self.fleet.mirror, Program(site))
+        self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
+        self.stewardship.replay(self.memory)
+        self.tickets.extend(self.memory.tickets)
+        for entry in self.fleet.entries:
+            if entry.get("record") == "number":
+                self._number = int(entry["number"])
+        self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
+            BayPhase.STARTING: self._when_starting,
+            BayPhase.FREE: self._when_free,
+            BayPhase.LOCKING: self._when_locking,
+            BayPhase.AWAITING: self._when_awaiting,
+            BayPhase.OPENING: self._when_opening,
+            BayPhase.SERVING: self._when_serving,
+            BayPhase.CLOSING: self._when_closing,
+            BayPhase.HANDOVER: self._when_handover,
+            BayPhase.RESERVING: self._when_reserving,
+        }
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def station(self) -> Station:
+        """The bay."""
+        assert self.fleet.machine.station is not None
+        return self.fleet.machine.station
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        if self.phase is BayPhase.STARTING:
+            return MachineState.STARTING
+        return MachineState.IDLE if self.phase is BayPhase.FREE else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """A compartment does not move."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Nothing is ordered before doors and bay are sensed."""
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Doors, bay and desk."""
+        if isinstance(message, DoorState):
+            self.doors = message
+            return self.outputs.again(message, now_us)
+        if isinstance(message, BayState):
+            self.bay = message
+            return self.outputs.again(message, now_us)
+        if isinstance(message, DeskEvent) and message.sequence != self._desk_sequence:
+            self._desk_sequence = message.sequence
+            return self._at_desk(message.event, message.car)
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Awards tell who may fetch a stored car; a car given into my custody is stated anew; an operator's press."""
+        if isinstance(message, OperatorOrder) and message.compartment == self.fleet.node_id:
+            urgent = message.action is OperatorAction.URGENT_TICKET
+            return self._at_desk(DESK_INPUT[message.action], message.car, urgent=urgent)
+        if isinstance(message, TaskReport):
+            return self.stewardship.hear(message, now_us) + self._on_report(message, now_us)
+        job = self.job
+        if isinstance(message, TokenRequest) and job is not None:
+            wanted = TokenKey(message.token_kind, message.token)
+            return self._remind(job, message.sender) if wanted == car_token(*job.car) else []
+        if isinstance(message, TokenRefusal) and job is not None and job.is_unknown_to(message, self.fleet.mirror):
+            job.reminders += 1
+            # Whoever has not heard the call does not know by the award which car it is about.
+            return [Send(job.award(self.fleet.node_id))] if job.reminders < REMINDERS else self._call_again(job, now_us)
+        return self.stewardship.hear(message, now_us)
+
+    def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
+        """What its winner, or who has won it once, says of a task of mine; or the custodian of its car."""
+        job, machine = self.job, self.fleet.site.machines.get(report.sender)
+        if job is not None and report.task == job.task and report.phase is TaskPhase.FORFEITED:
+            return self._on_forfeit(job, report.sender, now_us)
+        if machine is None or machine.kind is not KindCode.ROBOT or self.phase is BayPhase.STARTING:
+            return []
+        if job is None or report.task != job.task:
+            return withdrawal(self.fleet.node_id, report)
+        if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None:
+            # I was restarted and asked all: its winner says that the task is in hand.
+            return self._won_by(report.sender, job.call)
+        return self._remind(job, report.sender)
+
+    def _on_forfeit(self, job: BayTask, sender: int, now_us: int) -> list[Effect]:
+        """The winner gives the task back, or the custodian of the car has taken the right to it back."""
+        record = self.fleet.mirror.cars.get(job.car)
+        if job.winner and sender == job.winner:
+            return self._call_again(job, now_us)
+        if not job.winner and self._is_unheard(job, now_us) and record is not None and sender == record.custodian:
+            return self._call_again(job, now_us)
+        if not job.winner or record is None or sender != record.custodian:
+            return []
+        heard = job.winner not in self.fleet.mirror.obstacles.machines
+        if heard and job.version != 1 and job.reminders < REMINDERS:
+            # It has not heard of the newest award yet.
+            job.reminders += 1
+            return [Send(job.award(self.fleet.node_id))]
+        return self._call_again(job, now_us)
+
+    def _remind(self, job: BayTask, node: int) -> list[Effect]:
+        """Who was lost and comes back believing that the task is its own still hears whose it is."""
+        is_clear = job.winner in (0, node) or not job.call or job.version == 1
+        return [] if is_clear else [Send(job.award(self.fleet.node_id))]
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
+        if isinstance(event, Awarded):
+            steps = Report("program: " + "; ".join(event.proposal.program))
+            return [steps, self._accepts(event.call.task), *self._take_ticket(event.call.car)]
+        if isinstance(event, AwardedAgain):
+            return [self._accepts(event.call.task)]
+        if not isinstance(event, Closed) or self.job is None or event.call.task != self.job.task:
+            return []
+        if event.result is CallResult.AWARDED:
+            return self._won_by(event.winner, event.call.call)
+        if event.result is CallResult.REJECTED:
+            # The winner gave the task back before it began: it is called anew, by the custodian of the car.
+            return self._call_again(self.job, now_us)
+        return self._refused(self.job, event.reason, now_us)
+
+    def _accepts(self, task: Reference) -> Effect:
+        return Send(TaskReport(self.fleet.node_id, task, TaskPhase.AWARDED, self.station.number, Reason.NONE))
+
+    def _won_by(self, winner: int, call: int) -> list[Effect]:
+        job = self.job
+        assert job is not None
+        job.winner, job.call, job.retry_at_us, job.reminders = winner, call, None, 0
+        return self.stewardship.won(job.car, winner, job.task, job.version)
+
+    def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
+        """Its winner gave the task back, or is lost: it is called anew under a raised version."""
+        outcome = self.fleet.negotiation.abandon(job.task, Reason.NODE_SILENT, now_us)
+        effects: list[Effect] = [item for item in outcome if not isinstance(item, EVENT_TYPES)]
+        job.winner, self._robot_waits = 0, False
+        job.version = successor(job.version, TASK_VERSION_BITS)
+        effects += self.stewardship.won(job.car, 0, job.task, job.version)
+        return effects + self._call_for(job, now_us)
+
+    def _call_for(self, job: BayTask, now_us: int) -> list[Effect]:
+        if job.operation is Operation.PARK:
+            job.retry_at_us = None
+            return self._call(job, self.station.number, ANY_STATION, now_us)
+        return self._fetch(job, now_us)
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Bay and the car in it: to the winner while the output door is open. All else by the steward's rules."""
+        if self.job is not None and key in (station_token(self.station), car_token(*self.job.car)):
+            if key.kind is TokenKind.CAR and self.fleet.mirror.car_station(self.job.car) != self.station:
+                return self.stewardship.may_grant(key, requester, now_us)
+            if requester != self.job.winner:
+                return Reason.TOKEN_NOT_GRANTABLE_YET
+            self._robot_waits = True
+            if self.phase is not BayPhase.SERVING or not self._is_open_to_machines():
+                return Reason.DOOR_NOT_READY
+            self.job.was_granted |= key.kind is TokenKind.STATION
+            return Reason.NONE
+        if key == station_token(self.station):
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        return self.stewardship.may_grant(key, requester, now_us)
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """One step of the phase table, where its condition is met."""
+        effects = self._review(now_us)
+        if self.doors is None or self.bay is None:
+            return effects
+        return effects + self._table[self.phase](now_us)
+
+    def _review(self, now_us: int) -> list[Effect]:
+        """As custodian: winners that are lost; for my own task I call anew at once."""
+        effects = self.stewardship.review(now_us)
+        job = self.job
+        if job is not None and job.winner and effects and self.stewardship.is_given_back(job.car):
+            effects += self._call_again(job, now_us)
+        elif job is not None and not job.winner and self._is_unheard(job, now_us):
+            # Nobody has a right by the award that was not heard: its car is mine, and goes to the winner only.
+            effects += self._call_again(job, now_us)
+        return effects
+
+    def _is_unheard(self, job: BayTask, now_us: int) -> bool:
+        return custody.is_mine(self.fleet, job.car) and self.fleet.negotiation.unheard(job.task, now_us) != NOBODY
+
+    def next_wake(self) -> int | None:
+        """When a refused call is made again, or a winner counts as lost."""
+        retry_us = self.job.retry_at_us if self.job is not None and self.phase is BayPhase.AWAITING else None
+        due = [time for time in (retry_us, self.stewardship.next_wake()) if time is not None]
+        return min(due, default=None)
+
+    def watches(self, now_us: int) -> bool:
+        """It looks often whether an award of its own was never heard."""
+        return self.job is not None and not self.job.winner
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """The cars in my custody and the tokens that I hold."""
+        return self.stewardship.car_statements() + self.fleet.tokens.statements()
+
+    # --- the desk ----------------------------------------------------------------------------------------------
+
+    def _at_desk(self, event: DeskInput, car: Reference, *, urgent: bool = False) -> list[Effect]:
+        if event is DeskInput.KEY:
+            self._key_pressed = True
+            return []
+        # Whoever cancels wants the car back at once: the same as coming for it.
+        return self._take_ticket(car, urgent=urgent)
+
+    def _take_ticket(self, car: Reference, *, urgent: bool = False) -> list[Effect]:
+        record = self.fleet.mirror.cars.get(car)
+        if record is None or record.station == OUTSIDE:
+            return [self.outputs.show(DeskText.UNKNOWN_TICKET, car)]
+        in_hand = self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE
+        new = not in_hand and bay_task.queue_ticket(self.tickets, car, urgent=urgent)
+        return [*([ticket_record(car, urgent=urgent)] if new else []), self.outputs.show(DeskText.PLEASE_WAIT, car)]
+
+    # --- the phases --------------------------------------------------------------------------------------------
+
+    def _when_starting(self, now_us: int) -> list[Effect]:
+        if self.memory.job is not None:
+            return self._take_up_job(now_us)
+        effects = self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
+        if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
+            return effects
+        return effects + self._to_free()
+
+    def _park_again(self, left: CarAt, now_us: int) -> list[Effect]:
+        """My journal is lost and my rights are new: whatever was meant with the car in my bay, it is parked."""
+        self.stewardship.left, self.memory.job = None, (left.car, Operation.PARK, left.car, left.wheelbase_mm)
+        return [job_record(*self.memory.job), *self._take_up_job(now_us), self.outputs.light_up(LightColour.RED)]
+
+    def _take_up_job(self, now_us: int) -> list[Effect]:
+        """After a restart in the middle of a task: journal, tokens and sensors tell how far it has come."""
+        assert self.memory.job is not None
+        task, operation, car, wheelbase_mm = self.memory.job
+        of_task, version = self.stewardship.tasks.get(car, (task, 1))
+        winner = self.stewardship.winners.get(car, 0)
+        self.job = BayTask(task, operation, car, wheelbase_mm, winner, version if of_task == task else 1)
+        self.job.was_granted = self.memory.was_granted
+        if self.job.was_granted:
+            self._go(BayPhase.SERVING)
+            return self._when_serving(now_us)
+        if not self.job.winner:
+            # Whoever won meanwhile says so when asked, which every machine does at power-up.
+            self.job.retry_at_us = now_us + SETTLING_US
+        self._go(BayPhase.LOCKING)
+        is_unsaid = operation is Operation.PARK and car not in self.fleet.mirror.cars
+        said = custody.state(self.fleet, car, self.station.number, wheelbase_mm) if is_unsaid else []
+        return said + self._when_locking(now_us)
+
+    def _to_free(self) -> list[Effect]:
+        over: list[Effect] = [job_over_record()] if self.job is not None else []
+        self.job, self._robot_waits, self._key_pressed = None, False, False
+        self._go(BayPhase.FREE)
+        return over + self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
+
+    def _when_free(self, now_us: int) -> list[Effect]:
+        assert self.bay is not None and self.doors is not None
+        if not self._is(DoorName.INPUT, DoorPosition.OPEN):
+            return []
+        if self.stewardship.left is not None and self.bay.load_kg:
+            return self._park_again(self.stewardship.left, now_us)
+        if self._key_pressed:
+            self._key_pressed = False
+            return self._admit(now_us)
+        if self.tickets and not self.bay.load_kg and not self.bay.person_inside and self._is_stored(self.tickets[0]):
+            self._go(BayPhase.RESERVING)
+            return [self.outputs.light_up(LightColour.RED), *self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)]
+        if self.outputs.light is not LightColour.GREEN and not self.bay.load_kg:
+            return [self.outputs.light_up(LightColour.GREEN)]
+        return []
+
+    def _is_stored(self, car: Reference) -> bool:
+        return self._place_of(car) is not None
+
+    def _place_of(self, car: Reference) -> Station | None:
+        """The place that a car stands in; None while it is in a bay or aboard: its entry is still under way."""
+        station = self.fleet.mirror.car_station(car)
+        return station if station not in self.fleet.site.compartments.values() else None
+
+    def _admit(self, now_us: int) -> list[Effect]:
+        """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
+        assert self.bay is not None
+        bay, limits = self.bay, car_park(self.fleet.site).cars
+        if not bay.load_kg:
+            return []
+        if not bay_task.fits(bay, limits):
+            return [self.outputs.show(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
+        if not self.fleet.mirror.free_places():
+            return [self.outputs.show(DeskText.FULL, Reference(0, 0))]
+        car = next_reference(self._number, self.fleet)
+        self._number = car.number
+        self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
+        # The number first: one that is not used is no harm, one used twice would be.
+        effects: list[Effect] = [Record({"record": "number", "number": self._number})]
+        effects += self.fleet.tokens.create(car_token(*car))
+        effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
+        effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
+        effects.append(self.outputs.show(DeskText.TAKE_TICKET, car))
+        effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
+        self._go(BayPhase.LOCKING)
+        return [*effects, self.outputs.light_up(LightColour.RED)]
+
+    def _when_locking(self, now_us: int) -> list[Effect]:
+        assert self.bay is not None and self.job is not None
+        if self._is(DoorName.INPUT, DoorPosition.LOCKED):
+            self._go(BayPhase.AWAITING)
+            return self._when_awaiting(now_us)
+        if self.bay.person_inside:
+            # Who presses again has no ticket: the power failed before it was printed.
+            asked, self._key_pressed = self._key_pressed, False
+            is_new = self.job.operation is Operation.PARK
+            return [self.outputs.show(DeskText.TAKE_TICKET, self.job.car)] if asked and is_new else []
+        return self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)
+
+    def _when_reserving(self, now_us: int) -> list[Effect]:
+        """Light red, input closing for a car that is to come out; a car that still came in goes first."""
+        assert self.bay is not None
+        if self.bay.load_kg or self.bay.person_inside:
+            self._go(BayPhase.FREE)
+            return self.outputs.door(DoorName.INPUT, DoorAction.OPEN)
+        if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
+            return []
+        car = self.tickets.popleft()
+        task = next_reference(self._number, self.fleet)
+        self._number = task.number
+        self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
+        self._go(BayPhase.AWAITING)
+        job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
+        return [Record({"record": "number", "number": self._number}), job, *self._fetch(self.job, now_us)]
+
+    def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
+        where = self._place_of(job.car)
+        if where is None:
+            job.retry_at_us = now_us + RETRY_US
+            return [Report(f"car {job.car.number} is nowhere to be fetched from")]
+        job.retry_at_us = None
+        return self._call(job, where.number, self.station.number, now_us)
+
+    def _when_awaiting(self, now_us: int) -> list[Effect]:
+        assert self.job is not None
+        if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
+            return self._call_for(self.job, now_us)
+        if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
+            return []
+        self._go(BayPhase.OPENING)
+        return self.outputs.door(DoorName.OUTPUT, DoorAction.OPEN)
+
+    def _when_opening(self, now_us: int) -> list[Effect]:
+        if self._is(DoorName.OUTPUT, DoorPosition.OPEN):
+            self._go(BayPhase.SERVING)
+        return []
+
+    def _when_serving(self, now_us: int) -> list[Effect]:
+        """The robot has had the bay and gave it back: steps 13 and 14."""
+        assert self.job is not None
+        if not self.job.was_granted or not self.fleet.tokens.holds(station_token(self.station)):
+            return []
+        self._go(BayPhase.CLOSING)
+        return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
+
+    def _when_closing(self, now_us: int) -> list[Effect]:
+        assert self.job is not None
+        if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
+            return []
+        if self.job.operation is Operation.PARK:
+            return self._to_free()
+        self._go(BayPhase.HANDOVER)
+        return [
+            *self.outputs.door(DoorName.INPUT, DoorAction.OPEN),
+            self.outputs.show(DeskText.CAR_READY, self.job.car),
+        ]
+
+    def _when_handover(self, now_us: int) -> list[Effect]:
+        assert self.bay is not None and self.job is not None
+        is_open = self._is(DoorName.INPUT, DoorPosition.OPEN)
+        if not is_open or self.bay.load_kg or self.bay.person_inside:
+            return []
+        car = self.job.car
+        effects = custody.state(self.fleet, car, OUTSIDE, self.job.wheelbase_mm)
+        effects.append(self.outputs.show(DeskText.WELCOME, Reference(0, 0)))
+        return effects + self._to_free()
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _refused(self, job: BayTask, reason: Reason, now_us: int) -> list[Effect]:
+        """Nobody could: a car to be parked is given back with a word, a car to be fetched is called for again."""
+        if job.operation is Operation.RETRIEVE:
+            job.retry_at_us = now_us + RETRY_US
+            return [Report(f"nobody can fetch car {job.car.number}: {reason.name}; called again in 30 s")]
+        effects: list[Effect] = [
+            Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
+            *custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm),
+            self.outputs.show(bay_task.refusal_text(self.fleet.mirror), job.car),
+        ]
+        return effects + self._to_free()
+
+    def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
+        return list(self.fleet.negotiation.open(job.terms(source, sink, self._robots.floor), now_us))
+
+    def _is(self, door: DoorName, position: DoorPosition) -> bool:
+        assert self.doors is not None
+        return (self.doors.input_door if door is DoorName.INPUT else self.doors.output_door) is position
+
+    def _is_open_to_machines(self) -> bool:
+        """Whether a shuttle can come in and a person cannot, by what the doors say now."""
+        return self._is(DoorName.OUTPUT, DoorPosition.OPEN) and self._is(DoorName.INPUT, DoorPosition.LOCKED)
+
+    def _go(self, phase: BayPhase) -> None:
+        self.phase = phase
+        self.generation.is_free = phase is BayPhase.FREE
+        self.generation.queue = len(self.tickets)

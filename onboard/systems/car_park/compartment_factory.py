@@ -1,0 +1,25 @@
+"""What makes a compartment: its task-generation function, and its steps."""
+
+from dataclasses import dataclass
+
+from onboard.core.behaviour import Fleet
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Estimator
+from onboard.core.site import Machine, Site
+from onboard.systems.car_park.bay_generation import BayGeneration
+from onboard.systems.car_park.compartment import Compartment
+
+
+@dataclass(frozen=True)
+class CompartmentFactory:
+    """Makes compartments."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
+        """The compartment's task-generation function."""
+        return BayGeneration(site, machine)
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:
+        """The compartment's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, BayGeneration):
+            raise TypeError("a compartment needs its own task-generation function")
+        return Compartment(fleet, estimator)

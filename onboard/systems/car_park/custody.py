@@ -1,0 +1,121 @@
+"""How the custody of a car is passed on: its token, and the word where it stands, together or not at all.
+
+Whoever has put a car down says where (CarAt) and gives its token away. A frame can be missed, and a token without the
+place would leave the new custodian saying what it last heard, under the newest version, so that all others believe it.
+So the giver journals the place first and says it again with each repeated grant, and the keeper of a station takes a
+car's token only when it has heard from the giver that the car stands there; its own journal knows the place before it
+knows the token.
+"""
+
+from collections.abc import Container, Iterable
+
+from onboard.core.authority import TokenKey, car_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import CarAt, Reference, TokenGrant
+from onboard.core.mirror import Mirror
+from onboard.core.site import Site, Station
+from onboard.systems.car_park.bay_memory import car_record
+
+
+def keeper(site: Site, station: Station) -> int:
+    """Node that keeps a station's token and its car: the compartment itself, else the track's steward."""
+    for node_id, bay in site.compartments.items():
+        if bay == station:
+            return node_id
+    return site.stewards[station.track]
+
+
+def car_of(grant: TokenGrant) -> Reference:
+    """The car that a grant of a car's token is about."""
+    return Reference(grant.token >> 16, grant.token & 0xFFFF)
+
+
+def state(fleet: Fleet, car: Reference, station: int, wheelbase_mm: int) -> list[Effect]:
+    """Journal and say where a car in my custody is; what somebody else holds is its custodian's to say: nothing."""
+    key = car_token(*car)
+    if not fleet.tokens.holds(key):
+        return []
+    said = CarAt(fleet.node_id, car, station, fleet.tokens.seen[key], wheelbase_mm)
+    fleet.mirror.on_car(said)
+    return [car_record(said), Send(said)]
+
+
+def others_in(mirror: Mirror, station: Station, car: Reference | None = None) -> list[Reference]:
+    """Cars that stand in a station by their custodians' word, other than ``car``."""
+    return [one for one, record in mirror.cars.items() if record.station == station.number and one != car]
+
+
+def replay(fleet: Fleet, said: Iterable[CarAt]) -> None:
+    """Take up what the journal tells of cars in my custody, and of those whose new custodian was not heard yet.
+
+    What was said under an older version is no knowledge of the place: the car has been elsewhere since.
+    """
+    tokens = fleet.tokens
+    for one in said:
+        key = car_token(*one.car)
+        leaving = tokens.leaving.get(key)
+        given = leaving is not None and leaving.version == one.version + 1
+        if given or tokens.held.get(key) == one.version:
+            fleet.mirror.on_car(one)
+
+
+def statements(fleet: Fleet) -> list[Effect]:
+    """Where each car in my custody is that has not left."""
+    return [
+        Send(CarAt(fleet.node_id, car, record.station, record.version, record.wheelbase_mm))
+        for car, record in fleet.mirror.cars.items()
+        if record.custodian == fleet.node_id and record.station != OUTSIDE
+    ]
+
+
+def before_grant(fleet: Fleet, grant: TokenGrant) -> list[Effect]:
+    """Where the car stood when I gave its token away, as long as nobody has said anything newer."""
+    record = fleet.mirror.cars.get(car_of(grant)) if grant.token_kind is TokenKind.CAR else None
+    if record is None or record.custodian != fleet.node_id or record.version + 1 != grant.version:
+        return []
+    return [Send(CarAt(fleet.node_id, car_of(grant), record.station, record.version, record.wheelbase_mm))]
+
+
+def before_taking(fleet: Fleet, grant: TokenGrant) -> list[Effect] | None:
+    """What a keeper of stations journals before it becomes a car's custodian; None while its place is not known."""
+    if grant.token_kind is not TokenKind.CAR:
+        return []
+    record = fleet.mirror.cars.get(car_of(grant))
+    if (
+        record is None
+        or record.station in (ANY_STATION, OUTSIDE)
+        or record.custodian != grant.sender
+        or record.version + 1 != grant.version
+    ):
+        fleet.drops[Reason.MIRROR_BEHIND] += 1
+        return None
+    said = CarAt(fleet.node_id, car_of(grant), record.station, grant.version, record.wheelbase_mm)
+    fleet.mirror.on_car(said)
+    return [car_record(said)]
+
+
+def give_back(fleet: Fleet, needed: Container[TokenKey], now_us: int) -> list[Effect]:
+    """Return rights to stations and cars that no work of mine needs: their grants came after the work was dropped.
+
+    A car goes with the word where it stands; one that is aboard, or that nobody has told of, is kept.
+    """
+    effects: list[Effect] = []
+    for key in [key for key in fleet.tokens.mine() if key.kind is not TokenKind.SEGMENT and key not in needed]:
+        if key.kind is TokenKind.STATION:
+            effects += fleet.tokens.give(key, keeper(fleet.site, Station.from_number(key.number)), now_us)
+            continue
+        car = Reference(key.number >> 16, key.number & 0xFFFF)
+        station, record = fleet.mirror.car_station(car), fleet.mirror.cars.get(car)
+        if station is not None and record is not None:
+            effects += state(fleet, car, station.number, record.wheelbase_mm)
+            effects += fleet.tokens.give(key, keeper(fleet.site, station), now_us)
+    return effects
+
+
+def is_mine(fleet: Fleet, car: Reference) -> bool:
+    """Whether a car is in my custody: by the mirror, and by its token."""
+    record = fleet.mirror.cars.get(car)
+    is_custodian = record is not None and record.custodian == fleet.node_id
+    return is_custodian and fleet.tokens.holds(car_token(*car))

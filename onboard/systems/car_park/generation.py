@@ -1,0 +1,406 @@
+"""The mobile robot's task-generation function: what would this task cost *me*, around everybody's plans?
+
+It is asked twice (row P20): for an estimate when a call is heard, and for the operating sequence once awarded. Its cost
+is the finishing time (row P41): when the car stands where it shall stand and the shuttle is home. It depends on the
+others' present and foreseen tasks (rows P21, P28), unlike that of a lathe. Where the destination is open, the robot
+chooses the place itself and evaluates all its solutions (row P46).
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from onboard.core.codes import ANY_STATION, Criterion, Grade, LegAction, Operation
+from onboard.core.messages import CallForProposals, Stamp
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Needs, Proposal
+from onboard.core.serial import from_bus_ms, to_bus_ms
+from onboard.core.site import Machine, Segment, Site, Station
+from onboard.systems.car_park.program import MAX_STEPS, STAMP_AHEAD_US, Handling, Program, Step, Work, to_itinerary
+from onboard.systems.car_park.site import car_park
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
+from onboard.ways.refuges import open_refuges
+from onboard.ways.reservations import FOREVER, Reservations
+from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
+
+#: From the deadline to the first motion: award frame, journal writes and the first tokens. Ours, measured in tests.
+AWARD_LATENCY_US = 150_000
+#: Tokens, orders and sensor frames around one handling of a car, beside the motions themselves. Ours, measured.
+HANDLING_OVERHEAD_US = 400_000
+#: A customer has left the compartment this long after the call: walking out takes 4 to 8 s. Ours, so that the real
+#: days of the tests finish no later than bid.
+CUSTOMER_US = 9_500_000
+#: How long past its planned end another robot's work still keeps its place promised: it may be late. Ours.
+PROMISE_GRACE_US = 60_000_000
+#: From so many places on, the way to taking the car is searched once for all of them. Ours.
+FEW_PLACES = 3
+#: Whoever only stands in the way is out of it so long after the award: planning, tokens, and a way to another refuge.
+#: Ours.
+YIELDING_US = 45_000_000
+#: Bound of one route search, in expansions (a wall-time bound would not replay).
+MAX_EXPANSIONS = 4_000
+
+
+class Alternative(NamedTuple):
+    """One solution that was weighed: the place chosen and when it would be finished (bus us), None where impossible.
+
+    ``bound_us`` stands instead of the date where that was not worked out: it is no earlier than this, and so no better
+    than the solution chosen.
+    """
+
+    station: Station
+    finish_us: int | None
+    bound_us: int | None = None
+
+
+def weighed(alternatives: Iterable[Alternative]) -> str:
+    """What was weighed, in words for the log: dates in bus time, s, and how many places were not worked out, or why."""
+    told, bounded, blocked = [], 0, 0
+    for station, finish_us, bound_us in alternatives:
+        if finish_us is not None:
+            told.append(f"{station} at {finish_us / 1e6:.3f}")
+        elif bound_us is not None:
+            bounded += 1
+        else:
+            blocked += 1
+    return f"weighed: {', '.join(told)}; no sooner: {bounded}; out of reach: {blocked}"
+
+
+class Solution(NamedTuple):
+    """The operating sequence for one call: new steps after the ``kept`` ones, from ``origin`` at ``start_us``."""
+
+    kept: int
+    origin: Segment
+    start_us: int
+    steps: tuple[Step, ...]
+    finish_us: int
+    place: Station
+
+
+@dataclass
+class CarParkGeneration:
+    """Estimates and operating sequences for one robot. Implements the negotiation's ``Estimator``."""
+
+    site: Site
+    machine: Machine
+    mirror: Mirror
+    program: Program
+    tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
+    #: A person has a hand in (row M38): no new tasks.
+    is_held: bool = False
+
+    # --- the Estimator -----------------------------------------------------------------------------------------
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """Least finishing time (bus ms) that any robot could name, from call and site alone: it stands at the start."""
+        start_us = self._deadline_us(call, now_us) + AWARD_LATENCY_US
+        return to_bus_ms(min(self._lower_bounds(call, self._all_candidates(call), None, start_us).values()))
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """Least finishing time (bus ms) for me if nobody were in my way; None where I cannot do it at all."""
+        if call.criterion is not Criterion.FINISH_TIME or call.operation not in (Operation.PARK, Operation.RETRIEVE):
+            return None
+        if self.program.standing is None or self.program.unplanned:
+            return None
+        if self.is_held or len(self.program.remaining) + 4 > MAX_STEPS:
+            return None
+        limits = car_park(self.site).cars
+        # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
+        if not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
+            return None
+        _, segment, start_us = self._start(call, now_us)
+        bounds = self._lower_bounds(call, self._candidates(call, now_us), segment, start_us)
+        least_us = min(bounds.values(), default=FOREVER)
+        return to_bus_ms(least_us) if least_us < FOREVER else None
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | Needs | None:
+        """First request: the best solution as a bid with a tentative itinerary, or None: silence (row P45)."""
+        solution, alternatives = self.solve(call, now_us)
+        return None if solution is None else self.proposal(call, solution, alternatives)
+
+    def renewed(self, call: CallForProposals, promised: Solution, now_us: int) -> Solution:
+        """Second request, once the call is awarded: what is really carried out, around what is known by now."""
+        solution, _ = self.solve(call, now_us, behind_bids=False)
+        return promised if solution is None else solution
+
+    def proposal(self, call: CallForProposals, solution: Solution, alternatives: list[Alternative]) -> Proposal:
+        """A solution as a bid."""
+        deadline_ms = call.deadline_ms
+        stamp = Stamp(deadline_ms, call.sender, call.call & 0xFF)
+        # Legs name only the version: a tentative set must never complete a firm one.
+        version = (self.program.version + 128) & 0xFF or 1
+        steps = [*self.program.remaining[: solution.kept], *solution.steps]
+        itinerary = to_itinerary(self.machine.node_id, version, Grade.TENTATIVE, stamp, steps)
+        return Proposal(to_bus_ms(solution.finish_us), itinerary, (solution,), tuple(alternatives))
+
+    # --- the search --------------------------------------------------------------------------------------------
+
+    def solve(
+        self, call: CallForProposals, now_us: int, *, behind_bids: bool = True
+    ) -> tuple[Solution | None, list[Alternative]]:
+        """All solutions evaluated, the earliest finish first; ties by the site's order of places.
+
+        A bid comes behind what this machine has bid for already (``behind_bids``); a task that is won does not.
+
+        Candidates whose bound is no better than the best found are not searched; they are told with that bound. Where
+        there is no solution around machines that only stand there, one that counts on their giving way (design,
+        section 5: idle machines yield); they hear of it with the firm itinerary.
+        """
+        start = self._start(call, now_us, behind_bids=behind_bids)
+        best, alternatives = self._search(call, now_us, start, self.mirror.reservations)
+        if best is None and alternatives:
+            asked_us = max(self._deadline_us(call, now_us), now_us) + YIELDING_US
+            best, more = self._search(call, now_us, start, self.mirror.reservations.with_way_given(asked_us))
+            alternatives += more
+            if best is not None and not self._can_give_way(best, now_us):
+                best = None
+        return best, alternatives
+
+    def _can_give_way(self, solution: Solution, now_us: int) -> bool:
+        """Whether each machine that stands in the way finds another refuge in time, around this and all plans."""
+        mine = to_itinerary(self.machine.node_id, 1, Grade.FIRM, Stamp(to_bus_ms(now_us), 0, 0), list(solution.steps))
+        windows = itinerary_windows(self.site, mine, now_us, solution.start_us)
+        standing = self.mirror.reservations.standing_in(self.machine.node_id, windows)
+        taken = self.mirror.reservations.with_way_given(FOREVER)
+        taken.release(self.machine.node_id)
+        taken.reserve(self.machine.node_id, windows, lift_uses(self.site, mine, now_us, solution.start_us))
+        for node in standing:
+            itinerary = self.mirror.itineraries.get(node)
+            place = None if itinerary is None else final_position(self.site, itinerary)
+            others = [one for one in self.mirror.others_standing() if one != place]
+            if place is None or not self._finds_refuge(
+                node, place, taken, [*others, solution.steps[-1].destination], now_us
+            ):
+                return False
+        return True
+
+    def _finds_refuge(self, node: int, place: Segment, taken: Reservations, others: list[Segment], now_us: int) -> bool:
+        start_us = max(now_us, taken.standing_since(node) or now_us)
+        found = plan_route(
+            self.site,
+            taken,
+            node,
+            place,
+            start_us,
+            (),
+            open_refuges(self.site, others),
+            MAX_EXPANSIONS,
+            self.mirror.lift_floors(now_us, start_us),
+        )
+        return not isinstance(found, NoRoute)
+
+    def _search(
+        self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
+    ) -> tuple[Solution | None, list[Alternative]]:
+        kept, segment, start_us = start
+        bounds = self._bounds(call, now_us, start, reservations)
+        best: Solution | None = None
+        alternatives: list[Alternative] = []
+        # Places on both sides of a segment are reached and served alike.
+        routes: dict[Segment, Route | None] = {}
+        for bound_us, _, place in bounds:
+            if best is not None and bound_us >= best.finish_us:
+                alternatives.append(Alternative(place, None, bound_us))
+                continue
+            if place.segment not in routes:
+                routes[place.segment] = self._route(call, place, segment, start_us, now_us, reservations)
+            route = routes[place.segment]
+            if route is None:
+                alternatives.append(Alternative(place, None))
+                continue
+            alternatives.append(Alternative(place, route.finish_us))
+            if best is None or route.finish_us < best.finish_us:
+                steps = self._steps(call, place, route)
+                best = Solution(kept, segment, start_us, steps, route.finish_us, place)
+        return best, alternatives
+
+    def _bounds(
+        self, call: CallForProposals, now_us: int, start: tuple[int, Segment, int], reservations: Reservations
+    ) -> list[tuple[int, int, Station]]:
+        """Places that may be chosen, each with a time before which it cannot be finished, the most promising first.
+
+        Where there is a choice of places to leave the car at, the search up to taking it is common to all: it is made
+        once, and only the way from there is counted as free. No route to a place takes the car sooner, as it is a
+        route to taking it and to a refuge as well.
+        """
+        _, segment, start_us = start
+        places = self._candidates(call, now_us)
+        taken_us = None
+        if len(places) >= FEW_PLACES and call.from_station != ANY_STATION:
+            take, _ = self._visits(call, places[0], start_us)
+            route = self._plan(reservations, segment, start_us, (take,), now_us)
+            if route is None:
+                return [(FOREVER, 0, places[0])]
+            taken_us = route.finish_us
+        bounds = self._lower_bounds(call, places, segment, start_us, taken_us)
+        return sorted((bounds[one.segment], n, one) for n, one in enumerate(places))
+
+    def _start(self, call: CallForProposals, now_us: int, *, behind_bids: bool = True) -> tuple[int, Segment, int]:
+        kept, segment, start_us = self.program.branch(now_us)
+        for solution in self.tentative.values() if behind_bids else ():
+            # What I may win before counts as won: one robot does one thing after the other.
+            if solution.finish_us > start_us:
+                segment, start_us = solution.place.segment, solution.finish_us
+        earliest_us = max(self._deadline_us(call, now_us), now_us) + AWARD_LATENCY_US
+        return kept, segment, max(start_us, earliest_us)
+
+    def _route(
+        self,
+        call: CallForProposals,
+        place: Station,
+        origin: Segment,
+        start_us: int,
+        now_us: int,
+        reservations: Reservations,
+    ) -> Route | None:
+        return self._plan(reservations, origin, start_us, self._visits(call, place, start_us), now_us)
+
+    def _plan(
+        self, reservations: Reservations, origin: Segment, start_us: int, visits: tuple[Visit, ...], now_us: int
+    ) -> Route | None:
+        route = plan_route(
+            self.site,
+            reservations,
+            self.machine.node_id,
+            origin,
+            start_us,
+            visits,
+            self._refuges(),
+            MAX_EXPANSIONS,
+            self.mirror.lift_floors(now_us, start_us),
+        )
+        return None if isinstance(route, NoRoute) else route
+
+    def reroute(self, origin: Segment, start_us: int, works: list[Work], now_us: int) -> tuple[Step, ...] | None:
+        """The same work by another way, from standing at ``origin`` at bus time ``start_us``; None where there is none.
+
+        Without work the way to another refuge: so a machine that only stands gives way.
+        """
+        visits = tuple(self._work_visit(work, now_us) for work in works)
+        route = self._plan(self.mirror.reservations, origin, start_us, visits, now_us)
+        return None if route is None else _steps_of(route, works)
+
+    def _work_visit(self, work: Work, now_us: int) -> Visit:
+        if work.handling is Handling.TAKE and work.station in self.site.compartments.values():
+            return self._visits(work.call, work.station, now_us)[0]
+        return Visit(work.station.segment, self.handling_us(work.station))
+
+    def _refuges(self) -> frozenset[Segment]:
+        """Where this robot may end."""
+        return open_refuges(self.site, self.mirror.others_standing())
+
+    def _lower_bounds(
+        self,
+        call: CallForProposals,
+        places: list[Station],
+        origin: Segment | None,
+        start_us: int,
+        taken_us: int | None = None,
+    ) -> dict[Segment, int]:
+        """For each segment of ``places`` when the task would end there with nobody in the way; FOREVER: out of reach.
+
+        Without ``origin`` from where the car is taken; ``taken_us`` is when it is taken, by default as early as can be.
+        """
+        bounds: dict[Segment, int] = {}
+        begun: tuple[int, Visit, Visit] | None = None
+        for place in _one_a_segment(places):
+            if begun is None or call.from_station == ANY_STATION:
+                # Otherwise the car is taken at the same time and left in as long a time at whatever place.
+                take, leave = self._visits(call, place, start_us)
+                here = take.segment if origin is None else origin
+                least_us = free_flow_us(self.site, here, start_us, (take,)) if taken_us is None else taken_us
+                begun = least_us, take, leave
+            begun_us, take, leave = begun
+            leave = leave._replace(segment=self.ends(call, place)[1].segment)
+            bounds[place.segment] = free_flow_us(self.site, take.segment, begun_us, (leave,))
+        return bounds
+
+    def _visits(self, call: CallForProposals, place: Station, near_us: int) -> tuple[Visit, Visit]:
+        source, sink = self.ends(call, place)
+        ready_us = 0
+        if source in self.site.compartments.values():
+            # The customer walks out, then the input door locks; only then may the output door open.
+            called_us = self._deadline_us(call, near_us) - self.site.timing.call_window_us
+            ready_us = called_us + CUSTOMER_US + self.site.timing.door_us
+        return (
+            Visit(source.segment, self.handling_us(source), ready_us),
+            Visit(sink.segment, self.handling_us(sink)),
+        )
+
+    def handling_us(self, station: Station) -> int:
+        """Reach, grip or release, retract; at a compartment its output door opens first."""
+        park = car_park(self.site)
+        stroke_us = run_duration_us(park.shuttle_reach_mm, park.shuttle)
+        door_us = self.site.timing.door_us if station in self.site.compartments.values() else 0
+        return door_us + 2 * stroke_us + self.site.timing.grip_us + HANDLING_OVERHEAD_US
+
+    def ends(self, call: CallForProposals, place: Station) -> tuple[Station, Station]:
+        """Where the car is taken and where it is left; ``place`` stands for the end that the call leaves open."""
+        source = place if call.from_station == ANY_STATION else Station.from_number(call.from_station)
+        sink = place if call.to_station == ANY_STATION else Station.from_number(call.to_station)
+        return source, sink
+
+    def _all_candidates(self, call: CallForProposals) -> list[Station]:
+        if ANY_STATION not in (call.from_station, call.to_station):
+            return [Station.from_number(call.to_station)]
+        return list(self.site.places)
+
+    def _candidates(self, call: CallForProposals, now_us: int) -> list[Station]:
+        """Stations that the bidder may choose: free places nobody is on the way to, or the one that the call names."""
+        if ANY_STATION not in (call.from_station, call.to_station):
+            return self._all_candidates(call)
+        return self.free_places(now_us)
+
+    def free_places(self, now_us: int) -> list[Station]:
+        """Places at which no car stands and that nobody has promised, in the site's order."""
+        promised = self._promised(now_us)
+        return [place for place in self.mirror.free_places() if place.number not in promised]
+
+    def _promised(self, now_us: int) -> set[int]:
+        """Places at which somebody's plan, or mine, will work: two parkings never aim at one place (row P42)."""
+        promised = {
+            Station(leg.track, leg.to_index, leg.side).number
+            for node, itinerary in self.mirror.itineraries.items()
+            if node != self.machine.node_id
+            for leg in itinerary.legs
+            if leg.action is LegAction.WORK and from_bus_ms(leg.end_ms, now_us) > now_us - PROMISE_GRACE_US
+        }
+        promised |= {work.station.number for work in self.program.works()}
+        promised |= {solution.place.number for solution in self.tentative.values()}
+        return promised
+
+    def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[Step, ...]:
+        source, sink = self.ends(call, place)
+        works = [
+            Work(Handling.TAKE, source, call.car, call.wheelbase_mm, call),
+            Work(Handling.LEAVE, sink, call.car, call.wheelbase_mm, call),
+        ]
+        return _steps_of(route, works)
+
+    def _deadline_us(self, call: CallForProposals, now_us: int) -> int:
+        """When a call closes, or closed; now where that is read in a time that was not its caller's: work in hand."""
+        deadline_us = from_bus_ms(call.deadline_ms, now_us)
+        return deadline_us if deadline_us <= now_us + STAMP_AHEAD_US else now_us
+
+
+def _one_a_segment(places: list[Station]) -> list[Station]:
+    """The first of each segment's places: both sides are reached and served alike."""
+    return list({place.segment: place for place in reversed(places)}.values())
+
+
+def _steps_of(route: Route, works: list[Work]) -> tuple[Step, ...]:
+    """The legs of a route as steps, each WORK leg with the next work."""
+    ahead = iter(works)
+    return tuple(
+        Step(
+            leg.action,
+            leg.track,
+            leg.from_index,
+            leg.to_index,
+            leg.begin_us,
+            leg.end_us,
+            next(ahead) if leg.action is LegAction.WORK else None,
+        )
+        for leg in route.legs
+    )

@@ -1,0 +1,112 @@
+"""Giving way: what another machine's plan means for mine (rows P38, P44; design, section 5).
+
+Wherever the two plans want one segment at one time:
+- where an order was agreed before, a delay has upset it: who comes first goes on, the other comes later by what is
+  missing (an action dependency graph as of Hoenig et al., "Persistent and Robust Execution of MAPF Schedules in
+  Warehouses", 2019: an order taken from plans without conflict has no cycle, so nobody waits for ever);
+- where none was, the plans were made at the same time: who only stands there gives way; else who holds the segment's
+  token goes on, else who has the lower stamp. The other plans its way anew, under its old stamp, so that nobody is
+  displaced for ever.
+"""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from onboard.core.authority import segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import LegAction
+from onboard.core.site import Site
+from onboard.systems.car_park.program import Program, Step
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.passing import TOLERANCE_US
+from onboard.ways.passing_order import Meeting
+from onboard.ways.reservations import FOREVER
+
+
+class Answer(Enum):
+    """What a machine does about another's plan."""
+
+    NOTHING = "nothing"
+    LATER = "later"
+    ANEW = "anew"
+
+
+@dataclass
+class GivingWay:
+    """Looks at each plan that is heard and changes the program's times where it has to. The way is the robot's part."""
+
+    fleet: Fleet
+    program: Program
+
+    def heed(self, sender: int, now_us: int) -> Answer:
+        """What the newest plan of ``sender`` means; at LATER the program's times have been changed."""
+        meetings = self._meetings(sender, now_us)
+        if any(self._has_to_turn(meeting, sender) for meeting in meetings):
+            return Answer.ANEW
+        return self._come_behind([meeting for meeting in meetings if meeting.first == sender])
+
+    def fall_back(self, sender: int, now_us: int) -> Answer:
+        """Where no other way was found: come behind ``sender`` on the way that I have."""
+        return self._come_behind([one for one in self._meetings(sender, now_us) if one.first != self.fleet.node_id])
+
+    def _meetings(self, sender: int, now_us: int) -> list[Meeting]:
+        found = self.fleet.mirror.order.meetings(self.fleet.node_id, sender)
+        return [meeting for meeting in found if min(meeting.mine.to_us, meeting.theirs.to_us) > now_us]
+
+    def _has_to_turn(self, meeting: Meeting, sender: int) -> bool:
+        if meeting.first is not None:
+            return False
+        i_stand, they_stand = meeting.mine.to_us >= FOREVER, meeting.theirs.to_us >= FOREVER
+        if i_stand != they_stand:
+            return i_stand
+        holder = self.fleet.tokens.holder_of(segment_token(meeting.segment))
+        if holder in (self.fleet.node_id, sender):
+            # A right in hand outranks stamps: whoever has it is about to be there.
+            return holder == sender
+        plans = self.fleet.mirror.itineraries
+        return plans[sender].stamp.ranks_before(plans[self.fleet.node_id].stamp)
+
+    def _come_behind(self, meetings: list[Meeting]) -> Answer:
+        """Move each of my steps so far that it begins when the others' turns are over."""
+        ends_us: dict[int, list[Meeting]] = {}
+        for meeting in meetings:
+            if meeting.theirs.to_us < FOREVER:
+                ends_us.setdefault(meeting.mine.to_come, []).append(meeting)
+        planned = {_to_come(self.program.remaining, number): step for number, step in _moving(self.program.remaining)}
+        answer = Answer.NOTHING
+        for to_come in sorted(ends_us, reverse=True):
+            step = planned.get(to_come)
+            if step is None:
+                continue
+            number = next(
+                n for n, _ in _moving(self.program.remaining) if _to_come(self.program.remaining, n) == to_come
+            )
+            now = self.program.remaining[number]
+            lacking_us = max(meeting.theirs.to_us - meeting.mine.from_us for meeting in ends_us[to_come])
+            if number == 0:
+                by_us = lacking_us - _slack_us(self.fleet.site, now)
+            else:
+                by_us = lacking_us - (now.begin_us - step.begin_us)
+            if by_us > TOLERANCE_US:
+                self.program.delay(number, by_us)
+                answer = Answer.LATER
+        return answer
+
+
+def _moving(steps: list[Step]) -> list[tuple[int, Step]]:
+    return [(number, step) for number, step in enumerate(steps) if step.action is not LegAction.STAND]
+
+
+def _to_come(steps: list[Step], number: int) -> int:
+    return len(_moving(steps[number + 1 :]))
+
+
+def _slack_us(site: Site, step: Step) -> int:
+    """How much later than at once a run in hand may still enter what lies ahead, by its planned end."""
+    if step.action is not LegAction.TRAVEL:
+        return 0
+    if step.from_index == step.to_index:
+        # A hop through the mouth of a spur holds both ends from its beginning.
+        return 0
+    length_mm = abs(step.to_index - step.from_index) * site.tracks[step.track].pitch_mm
+    return max(0, step.end_us - step.begin_us - run_duration_us(length_mm, site.carrier))

@@ -1,0 +1,340 @@
+"""Going around obstacles, and giving back what cannot be done (design, section 4 and 5; issue 4, point 3).
+
+A plan that leads through an obstacle is made anew from where the carrier can turn; all others stay as they are. Where
+there is no way for a while, tasks whose car was not touched are forfeited with a reason, the last one first, and called
+for anew by their initiators. A task whose car is aboard is never given back: it waits until there is a way.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from onboard.core.authority import car_token, segment_token, station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import NOBODY, Grade, LegAction, Reason, TaskPhase
+from onboard.core.effects import Effect, Report, Send
+from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
+from onboard.core.site import Segment
+from onboard.systems.car_park import custody
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.handling import Phase, ShuttleWork
+from onboard.systems.car_park.places import Places
+from onboard.systems.car_park.program import Handling, Program, Step, Work, to_itinerary
+from onboard.systems.car_park.recovery import forfeited_record, sink_record
+from onboard.systems.car_park.standoff import Standoff
+from onboard.systems.car_park.travel import Carriage
+from onboard.ways.lifts import gate, lift_at
+from onboard.ways.obstacles import holder_in
+from onboard.ways.occupancy import itinerary_windows
+from onboard.ways.reservations import FOREVER, Window
+
+#: A plan that finds no way is tried again after this, us. Ours.
+RETRY_US = 3_000_000
+#: A run that has not come to a stand is looked at again after this, us. Ours.
+LOOK_US = 500_000
+#: Tasks are kept so long without a way, us: a machine that is only restarted is back by then. Ours.
+KEEP_US = 12_000_000
+#: Other places that are tried for a car at one moment: each is a search. Ours.
+MOST_PLACES = 4
+#: FORFEITED is said again so often and so many times, until the task is called or awarded anew. Ours.
+SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
+
+
+@dataclass
+class GoingAround:
+    """One robot's way around obstacles. ``take_up(kept, steps, works, now)`` makes a new program the robot's own."""
+
+    fleet: Fleet
+    generation: CarParkGeneration
+    carriage: Carriage
+    shuttle: ShuttleWork
+    take_up: Callable[[int, Sequence[Step], list[Work], int], list[Effect]]
+    #: Tasks given back, with why, how often to say so still, and when next.
+    given_back: dict[Reference, tuple[Reason, int, int]] = field(default_factory=dict)
+    #: Whether the drive does not do what it is told.
+    is_stuck: bool = False
+    _seen: int = 0
+    _tokens_seen: int = -1
+    _admissions: int = 0
+    _since_us: int | None = None
+    _retry_at_us: int | None = None
+    #: Plans and cars heard, what was known when places were last looked at, and when to look again.
+    _heard: int = 0
+    _places_seen: tuple[int, int] = (-1, -1)
+    _place_at_us: int | None = None
+    #: Since when somebody stands in my way for ever, by its plan.
+    _stands_since_us: int | None = None
+
+    def __post_init__(self) -> None:
+        self.places = Places(self.fleet, self.generation, self.shuttle)
+        self.standoff = Standoff(self.fleet, self.carriage)
+
+    @property
+    def program(self) -> Program:
+        """The order program in hand."""
+        return self.generation.program
+
+    def next_wake(self) -> int | None:
+        """When to try again, or to say again what was given back."""
+        stands_us = None if self._stands_since_us is None else self._stands_since_us + KEEP_US
+        times = [self.next_word(), self._retry_at_us, self._place_at_us, stands_us, self.standoff.due_us]
+        return min((time for time in times if time is not None), default=None)
+
+    def next_word(self) -> int | None:
+        """When a task that was given back is to be named again, bus time in us."""
+        return min((due_us for _, _, due_us in self.given_back.values()), default=None)
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Look whether the plan leads through an obstacle, where anything about them has changed."""
+        effects = self.say_again(now_us) + self._return_rights(now_us)
+        if self.fleet.admissions != self._admissions:
+            self._admissions = self.fleet.admissions
+            self._since_us = self._retry_at_us = now_us
+        changes = self.fleet.mirror.obstacles.changes
+        if changes != self._seen:
+            self._seen = changes
+            if self._since_us is not None or self._is_hindered(self.program.remaining, now_us):
+                self._since_us = now_us if self._since_us is None else self._since_us
+                self._retry_at_us = now_us
+        if self._stood_for_us(now_us) >= KEEP_US:
+            return effects + self._make_room(now_us)
+        if self._retry_at_us is not None and self._retry_at_us <= now_us:
+            effects += self._try(now_us)
+        other = self.standoff.look(now_us)
+        if other != NOBODY:
+            effects += self._turn_away(other, now_us)
+        return effects + self._leave_elsewhere(now_us)
+
+    def _stood_for_us(self, now_us: int) -> int:
+        """How long whoever has the slot that I wait for has stood there for ever by its own plan, us; 0 where nobody.
+
+        Who only stands gives way (``giving_way``); one that does not finds no way around what I plan.
+        """
+        slot, me = self.carriage.blocked, self.fleet.node_id
+        stands = False
+        if slot is not None and self.carriage.refresh_at_us is None:
+            holder = self.fleet.tokens.holder_of(segment_token(slot))
+            window = Window(slot, now_us, FOREVER)
+            stands = holder != me and holder in self.fleet.mirror.reservations.standing_in(me, [window])
+        if not stands:
+            self._stands_since_us = None
+            return 0
+        self._stands_since_us = now_us if self._stands_since_us is None else self._stands_since_us
+        return now_us - self._stands_since_us
+
+    def _make_room(self, now_us: int) -> list[Effect]:
+        """Another way; where there is none, stand without a plan until the other has gone: it plans around mine."""
+        self._stands_since_us = None
+        works = self.program.works()
+        kept, origin, start_us = self._turning((), now_us)
+        steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
+        if steps is None:
+            self.turn_later(now_us)
+        return self.take_up(kept, steps or (), works, now_us)
+
+    def drive_changes(self, now_us: int) -> bool:
+        """Whether drive or shuttle have got stuck by now, or are so no more."""
+        return (self.carriage.stall.is_stuck(now_us) or self.shuttle.stall.is_stuck(now_us)) is not self.is_stuck
+
+    def watch_drive(self, now_us: int) -> list[Effect]:
+        """A drive that does not move makes the robot an obstacle: it goes on trying, others get its untouched tasks.
+
+        So does a shuttle that does not take up its order.
+        """
+        if not self.drive_changes(now_us):
+            return []
+        self.is_stuck = not self.is_stuck
+        if not self.is_stuck:
+            self.turn_later(now_us)
+            return [Report("the drive moves again")]
+        lost = self.untouched()
+        effects: list[Effect] = [Report("the drive does not move")]
+        effects += self.drop(lost, now_us) if lost else []
+        for task in lost:
+            effects += self.forfeit(task, Reason.ACTUATOR_FAULT, now_us)
+        return effects
+
+    def turn_later(self, now_us: int) -> None:
+        """The program does not end where a machine may stand for ever: make it anew as soon as that is possible."""
+        self._since_us = now_us if self._since_us is None else self._since_us
+        self._retry_at_us = now_us + RETRY_US
+
+    def hear(self, message: Message) -> None:
+        """What was given back is called or awarded anew: enough was said of it. A place may have been taken."""
+        self._heard += isinstance(message, Itinerary | CarAt)
+        if isinstance(message, CallForProposals) and message.task in self.given_back and not message.depth:
+            del self.given_back[message.task]
+
+    def forfeit(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
+        """Give an untouched task back; its steps are the caller's business."""
+        self.given_back[task] = reason, SAY_AGAIN, now_us + SAY_AGAIN_US
+        return [forfeited_record(task), Send(self._report(task, reason))]
+
+    def lose(self, task: Reference) -> list[Effect]:
+        """A task is another's by its initiator's word; nobody need hear of that from me."""
+        return [forfeited_record(task), Report(f"task {task.origin}.{task.number} is another's now")]
+
+    def untouched(self) -> list[Reference]:
+        """Tasks in the program whose car was not touched and is in others' custody, in order."""
+        tokens = self.fleet.tokens
+        found = []
+        for work in self.program.works():
+            begun = self.shuttle.work == work and self.shuttle.phase not in (Phase.ACQUIRE, Phase.DONE)
+            has_right = tokens.holds(car_token(*work.car)) or tokens.holds(station_token(work.station))
+            if work.handling is Handling.TAKE and not begun and not has_right:
+                found.append(work.call.task)
+        return found
+
+    def drop(self, tasks: Sequence[Reference], now_us: int) -> list[Effect]:
+        """Take untouched tasks out of the program and plan the rest anew."""
+        works = [work for work in self.program.works() if work.call.task not in tasks]
+        if self.shuttle.work is not None and self.shuttle.work.call.task in tasks:
+            self.shuttle.drop()
+        kept, origin, start_us = self._turning(tasks, now_us)
+        steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
+        if steps is None or self._is_trapped(now_us):
+            self.turn_later(now_us)
+            steps = ()
+            if not works and self._is_trapped(now_us):
+                # Who waits aboard for its lift plans no further than off it: more would stand in the way of others.
+                self._cut_behind_ride()
+        return self.take_up(kept, steps, works, now_us)
+
+    def _return_rights(self, now_us: int) -> list[Effect]:
+        """Give back what was granted for work that is dropped; looked for where tokens have moved."""
+        if self.fleet.tokens.changes == self._tokens_seen:
+            return []
+        works, at_hand = self.program.works(), self.shuttle.work
+        if at_hand is not None and self.shuttle.phase is not Phase.DONE:
+            works.append(at_hand)
+        needed = {key for work in works for key in (station_token(work.station), car_token(*work.car))}
+        effects = custody.give_back(self.fleet, needed, now_us)
+        self._tokens_seen = self.fleet.tokens.changes
+        return effects
+
+    def _cut_behind_ride(self) -> None:
+        steps = self.program.remaining[:2]
+        if len(steps) == 2 and steps[1].action is LegAction.TRAVEL:
+            off = steps[1]
+            step = 1 if off.to_index > off.from_index else -1
+            self.program.steps[self.program.current + 1] = off._replace(to_index=off.from_index + step)
+
+    # --- other places ------------------------------------------------------------------------------------------
+
+    def _leave_elsewhere(self, now_us: int) -> list[Effect]:
+        """A car whose place has become another's goes to a place that is free."""
+        changed = (self.fleet.tokens.changes, self._heard)
+        retries = self._place_at_us is not None and self._place_at_us <= now_us
+        if changed == self._places_seen and not retries:
+            return []
+        self._places_seen, self._place_at_us = changed, None
+        for work in self.places.lost():
+            effects = self._choose_for(work, now_us)
+            if effects:
+                return effects
+            self._place_at_us = now_us + RETRY_US
+        return []
+
+    def _choose_for(self, work: Work, now_us: int) -> list[Effect]:
+        """Nothing where there is no other place, or no way there, now: it waits at its own then."""
+        in_hand = self.program.step is not None and self.program.step.work == work
+        kept, origin, start_us = self._turning([work.call.task] if in_hand else (), now_us)
+        works = self._ahead(self.program.works(), kept)
+        for place in self.places.instead(work, now_us)[:MOST_PLACES] if work in works else ():
+            moved = [one._replace(station=place) if one == work else one for one in works]
+            steps = self.generation.reroute(origin, start_us, moved, now_us)
+            if steps is None:
+                continue
+            if self.shuttle.work == work:
+                self.shuttle.drop()
+            self._heard += 1
+            told = Report(f"car {work.car.number} is left at {place}: {work.station} is another's")
+            return [sink_record(work.call.task, place), told, *self.take_up(kept, steps, moved, now_us)]
+        return []
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _try(self, now_us: int) -> list[Effect]:
+        """Plan anew from where the carrier can turn; forfeit what finds no way for too long."""
+        self._retry_at_us = now_us + RETRY_US
+        remaining = self.program.remaining
+        step = remaining[0] if remaining else None
+        is_driving = self.carriage.standing_at is None or self.carriage.target is not None
+        if step is not None and step.action is LegAction.TRAVEL and is_driving and self._is_hindered([step], now_us):
+            # It comes to a stand by itself where its rights end.
+            self._retry_at_us = now_us + LOOK_US
+            return []
+        works = self.program.works()
+        kept, origin, start_us = self._turning((), now_us)
+        steps = self.generation.reroute(origin, start_us, self._ahead(works, kept), now_us)
+        if steps is not None and not self._is_trapped(now_us):
+            self._since_us = self._retry_at_us = None
+            return self.take_up(kept, steps, works, now_us)
+        assert self._since_us is not None
+        lost = self.untouched()
+        if now_us - self._since_us < KEEP_US or not lost:
+            return []
+        task = lost[-1]
+        effects: list[Effect] = [Report(f"gives task {task.origin}.{task.number} back: no way")]
+        return effects + self.drop([task], now_us) + self.forfeit(task, Reason.IMPOSSIBLE, now_us)
+
+    def _turn_away(self, other: int, now_us: int) -> list[Effect]:
+        """Plan anew as if who stands face to face with me stood there for ever; without a way all stays as it is."""
+        mirror, machine = self.fleet.mirror, self.fleet.site.machines[other]
+        kept, origin, start_us = self._turning((), now_us)
+        if kept or other in mirror.obstacles.machines:
+            return []
+        slots = mirror.obstacles.slots_of(machine, mirror.progress.get(other), holder_in(self.fleet.tokens.holder_of))
+        works = self.program.works()
+        mirror.set_aside(other, slots, Reason.NOT_AUTHORISED, now_us)
+        steps = self.generation.reroute(origin, start_us, works, now_us)
+        mirror.admit(other, now_us)
+        self._seen = mirror.obstacles.changes
+        return [] if steps is None else self.take_up(0, steps, works, now_us)
+
+    def _is_trapped(self, now_us: int) -> bool:
+        """Whether the ride in hand is with a lift that is an obstacle."""
+        remaining = self.program.remaining
+        return bool(remaining) and remaining[0].action is LegAction.RIDE and self._is_hindered(remaining[:1], now_us)
+
+    def _turning(self, tasks: Sequence[Reference], now_us: int) -> tuple[int, Segment, int]:
+        """As ``Program.turning``, but a run that stands at a mark before an obstacle, or work dropped, ends there."""
+        remaining, here = self.program.remaining, self.carriage.standing_at
+        if remaining and here is not None and lift_at(self.fleet.site, here) is None and self.carriage.target is None:
+            step = remaining[0]
+            if step.action is LegAction.TRAVEL or (step.work is not None and step.work.call.task in tasks):
+                return 0, here, now_us
+        return self.program.turning(now_us)
+
+    def _ahead(self, works: list[Work], kept: int) -> list[Work]:
+        """Works that are not in the steps that are kept."""
+        done = [step.work for step in self.program.remaining[:kept] if step.work is not None]
+        return [work for work in works if work not in done]
+
+    def _is_hindered(self, steps: Sequence[Step], now_us: int) -> bool:
+        """Whether steps lead through an obstacle, but for slots whose tokens I hold myself."""
+        if not steps:
+            return False
+        obstacles, tokens = self.fleet.mirror.obstacles, self.fleet.tokens
+        told = to_itinerary(self.fleet.node_id, 1, Grade.FIRM, self.program.stamp, list(steps))
+        windows = itinerary_windows(self.fleet.site, told, now_us, steps[0].begin_us)
+        slots = {window.segment for window in windows}
+        slots |= {gate(step.track) for step in steps if step.action is LegAction.RIDE}
+        if any(slot in obstacles.blocked for slot in slots.difference(self.carriage.occupied())):
+            return True
+        return any(obstacles.is_at(slot) and not tokens.holds(segment_token(slot)) for slot in slots)
+
+    def say_again(self, now_us: int) -> list[Effect]:
+        """Name what was given back once more, where that is due."""
+        effects: list[Effect] = []
+        for task, (reason, left, due_us) in list(self.given_back.items()):
+            if due_us > now_us:
+                continue
+            effects.append(Send(self._report(task, reason)))
+            if left > 1:
+                self.given_back[task] = reason, left - 1, now_us + SAY_AGAIN_US
+            else:
+                del self.given_back[task]
+        return effects
+
+    def _report(self, task: Reference, reason: Reason) -> TaskReport:
+        return TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, reason)

@@ -1,0 +1,195 @@
+"""Taking a car from a station and leaving it there: the shuttle's steps as one table.
+
+A station's token is the right to send the shuttle in; the car's token is its custody. Both are asked for in front of
+the station; a compartment grants its bay only with the output door open. The journal notes each step before the order
+to the actuator.
+"""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from onboard.core.authority import TokenKey, car_token, station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
+from onboard.core.effects import Actuate, Effect, Record
+from onboard.core.messages import ShuttleOrder, ShuttleState
+from onboard.core.serial import successor
+from onboard.systems.car_park import custody
+from onboard.systems.car_park.program import Handling, Work
+from onboard.systems.car_park.stall import Stall
+from onboard.systems.car_park.travel import Carriage
+from onboard.systems.car_park.unheard import Unheard
+
+
+class Phase(Enum):
+    """Where one handling stands."""
+
+    ACQUIRE = "acquire"
+    REACH = "reach"
+    CLAMP = "clamp"
+    RETRACT = "retract"
+    DONE = "done"
+
+
+#: (phase, handling) -> (shuttle's order on leaving the phase, or None, and the next phase).
+#: CLAMP grips when a car is taken and releases when it is left.
+TABLE: dict[tuple[Phase, Handling], tuple[ShuttleAction | None, Phase]] = {
+    (Phase.ACQUIRE, Handling.TAKE): (ShuttleAction.REACH, Phase.REACH),
+    (Phase.REACH, Handling.TAKE): (ShuttleAction.GRIP, Phase.CLAMP),
+    (Phase.CLAMP, Handling.TAKE): (ShuttleAction.RETRACT, Phase.RETRACT),
+    (Phase.RETRACT, Handling.TAKE): (None, Phase.DONE),
+    (Phase.ACQUIRE, Handling.LEAVE): (ShuttleAction.REACH, Phase.REACH),
+    (Phase.REACH, Handling.LEAVE): (ShuttleAction.RELEASE, Phase.CLAMP),
+    (Phase.CLAMP, Handling.LEAVE): (ShuttleAction.RETRACT, Phase.RETRACT),
+    (Phase.RETRACT, Handling.LEAVE): (None, Phase.DONE),
+}
+
+#: The phase that is left by the order of each phase.
+_BEFORE = {Phase.REACH: Phase.ACQUIRE, Phase.CLAMP: Phase.REACH, Phase.RETRACT: Phase.CLAMP}
+
+#: The shuttle's mode that ends each phase, for the order given on entering it.
+ENDS = {Phase.REACH: ShuttleMode.REACHED, Phase.CLAMP: ShuttleMode.REACHED, Phase.RETRACT: ShuttleMode.HOME}
+
+
+@dataclass
+class ShuttleWork:
+    """One robot's shuttle and the handling in hand."""
+
+    fleet: Fleet
+    work: Work | None = None
+    phase: Phase = Phase.DONE
+    sequence: int = 0
+    sensed: ShuttleState | None = None
+    fault: bool = False
+    stall: Stall = field(default_factory=Stall)
+    _resuming: bool = False
+    _ordered: ShuttleOrder | None = None
+    _unheard: Unheard = field(default_factory=Unheard)
+
+    def begin(self, work: Work) -> list[Effect]:
+        """Start one handling in front of its station."""
+        self.work = work
+        self.phase = Phase.ACQUIRE
+        return []
+
+    def resume(self, work: Work, phase: Phase) -> None:
+        """Go on with a handling after a restart: the journal names its last step, the sensors whether it is over."""
+        self.work, self.phase, self._resuming = work, phase, True
+
+    @property
+    def is_out(self) -> bool:
+        """Whether the shuttle may be outside the carrier: then the carrier must not move (row P32)."""
+        return self.phase in (Phase.REACH, Phase.CLAMP, Phase.RETRACT)
+
+    @property
+    def is_astray(self) -> bool:
+        """Whether its sensor sees it out though nothing in hand has sent it there: the carrier gets no orders then."""
+        return self.sensed is not None and not self.is_home and not self.is_out
+
+    def drop(self) -> None:
+        """The handling in hand, which was not begun, is not to be: its rights are asked for no more."""
+        if self.work is not None:
+            for key in self._rights():
+                self.fleet.tokens.forget(key)
+        self.work, self.phase = None, Phase.DONE
+
+    @property
+    def is_home(self) -> bool:
+        """Whether its own sensor says that it is home; what was never sensed is not."""
+        return self.sensed is not None and self.sensed.mode is ShuttleMode.HOME
+
+    def sense(self, state: ShuttleState, now_us: int) -> list[Effect]:
+        """Take up the shuttle's state; one that goes on without the last order has missed it, and hears it again."""
+        if self.sensed is None:
+            # The shuttle does nothing on an order that it has had: go on from its number after a restart.
+            self.sequence = state.sequence
+        self.sensed = state
+        self.fault = state.mode is ShuttleMode.FAULT
+        order = self._ordered
+        if order is None or not self.is_out or state.sequence == order.sequence:
+            self.stall.rests()
+            return []
+        return [Actuate(order)] if self._unheard.is_due("shuttle", now_us, heard=False) else []
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Take the next step of the table where its condition is met."""
+        if self.work is None or self.phase is Phase.DONE:
+            return []
+        if self._resuming:
+            return self._resume(self.work, now_us)
+        if self.phase is Phase.ACQUIRE:
+            effects = self._acquire(now_us)
+            is_taken = self.work.handling is Handling.LEAVE and custody.others_in(
+                self.fleet.mirror, self.work.station, self.work.car
+            )
+            if is_taken or not self._has_rights():
+                return effects
+            return effects + self._next(now_us)
+        if self.sensed is None or self.sensed.sequence != self.sequence or self.sensed.mode is not ENDS[self.phase]:
+            return []
+        return self._next(now_us)
+
+    def _resume(self, work: Work, now_us: int) -> list[Effect]:
+        """What the last step was to bring about is taken as over where the sensors say so, else ordered again."""
+        state = self.sensed
+        if state is None or state.mode not in (ShuttleMode.HOME, ShuttleMode.REACHED):
+            return []
+        self._resuming = False
+        is_home = state.mode is ShuttleMode.HOME
+        clamped = (state.load_kg > 0) is (work.handling is Handling.TAKE)
+        if self.phase is Phase.CLAMP and clamped and is_home:
+            self.phase = Phase.RETRACT
+        over = {Phase.REACH: not is_home, Phase.CLAMP: clamped, Phase.RETRACT: is_home}
+        if not over[self.phase]:
+            self.phase = _BEFORE[self.phase]
+        return self._next(now_us)
+
+    def _rights(self) -> list[TokenKey]:
+        assert self.work is not None
+        return [station_token(self.work.station), car_token(*self.work.car)]
+
+    def _has_rights(self) -> bool:
+        return all(self.fleet.tokens.holds(key) for key in self._rights())
+
+    def _acquire(self, now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        for key in self._rights():
+            effects += self.fleet.tokens.want(key, now_us)
+        return effects
+
+    def _next(self, now_us: int) -> list[Effect]:
+        assert self.work is not None
+        order, self.phase = TABLE[self.phase, self.work.handling]
+        if order is None:
+            return self._finish(self.work, now_us)
+        self.sequence = successor(self.sequence, 8)
+        entry = {"record": "step", "phase": self.phase.value, "handling": self.work.handling.value}
+        side, wheelbase_mm = self.work.station.side, self.work.wheelbase_mm
+        self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
+        self._unheard.ordered("shuttle")
+        self.stall.ordered(now_us)
+        return [
+            Record({**entry, "station": self.work.station.number, "car": self.work.car.number}),
+            Actuate(self._ordered),
+        ]
+
+    def _finish(self, work: Work, now_us: int) -> list[Effect]:
+        """The shuttle is home: state where the car is, pass custody on after leaving it, give the station back."""
+        key = car_token(*work.car)
+        taken = work.handling is Handling.TAKE
+        # After a restart it may be with its new custodian already, who states it then.
+        effects = custody.state(self.fleet, work.car, ANY_STATION if taken else work.station.number, work.wheelbase_mm)
+        owner = custody.keeper(self.fleet.site, work.station)
+        given = [station_token(work.station)] if taken else [key, station_token(work.station)]
+        for token in given:
+            # After a restart in the middle of this one of them may be gone already.
+            if self.fleet.tokens.holds(token):
+                effects += self.fleet.tokens.give(token, owner, now_us)
+        return effects
+
+
+def handle(carriage: Carriage, shuttle: ShuttleWork, now_us: int) -> list[Effect]:
+    """Carrier or shuttle, never both: who was pushed off the station goes back first, and not with the shuttle out."""
+    if carriage.goal is None or carriage.arrived:
+        return carriage.advance(now_us) + shuttle.advance(now_us)
+    return [] if shuttle.is_out else carriage.advance(now_us)

@@ -1,0 +1,484 @@
+"""The elevator robot (ER): a platform that serves rides in the order of everybody's plans, one at a time.
+
+It schedules its future from the robots' itineraries and is never locked for a session: it goes ahead to the floor of
+the next ride, grants platform and gate there, moves when the gate is back and its sensor sees the carrier wholly
+aboard, and grants the gate again on the floor of arrival. It moves only while it holds the gate itself.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from onboard.core.authority import TokenKey, segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.messages import (
+    Award,
+    DriveOrder,
+    DriveState,
+    Itinerary,
+    Leg,
+    Message,
+    PlatformState,
+    Progress,
+    TaskReport,
+)
+from onboard.core.motion_authority import MotionState, authorised
+from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
+from onboard.core.serial import from_bus_ms, successor
+from onboard.systems.car_park.bay_memory import BayMemory
+from onboard.systems.car_park.lift_generation import LiftGeneration
+from onboard.systems.car_park.stall import Stall
+from onboard.systems.car_park.stewardship import Stewardship
+from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
+
+#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
+OFF_LIMIT_MM = 20_000
+
+
+class LiftPhase(Enum):
+    """What the lift is doing for its present ride."""
+
+    STARTING = "starting"
+    FREE = "free"
+    BOARDING = "boarding"
+    RIDING = "riding"
+    LEAVING = "leaving"
+
+
+@dataclass(frozen=True, slots=True)
+class Ride:
+    """One ride as its robot planned it; ``board`` and ``leave`` are lift indices, ``begin_us`` the RIDE leg's begin."""
+
+    robot: int
+    board: int
+    leave: int
+    begin_us: int
+
+
+@dataclass
+class Lift:
+    """One elevator. ``ride`` is the ride in hand, from the grant of the platform until it is back."""
+
+    fleet: Fleet
+    generation: LiftGeneration
+    kind: KindCode = KindCode.LIFT
+    phase: LiftPhase = LiftPhase.STARTING
+    ride: Ride | None = None
+    drive: DriveState | None = None
+    platform: PlatformState | None = None
+    stewardship: Stewardship = field(init=False)
+    stall: Stall = field(default_factory=Stall)
+    _is_stuck: bool = False
+    _sequence: int = 0
+    _target: int | None = None
+    _refresh_at_us: int | None = None
+    _told: tuple[int, DriveMode, int] | None = None
+    _gate_was_out: bool = False
+    _made: dict[int, int] = field(default_factory=dict)
+    _rides_with_me: dict[int, tuple[Itinerary, bool]] = field(default_factory=dict)
+    _table: dict[LiftPhase, Callable[[int], list[Effect]]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.stewardship = Stewardship(self.fleet)
+        self.stewardship.replay(BayMemory(self.fleet.node_id).read(self.fleet.entries))
+        self._table = {
+            LiftPhase.STARTING: self._when_starting,
+            LiftPhase.FREE: self._when_free,
+            LiftPhase.BOARDING: self._when_boarding,
+            LiftPhase.RIDING: self._when_riding,
+            LiftPhase.LEAVING: self._when_leaving,
+        }
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def track(self) -> int:
+        """The lift's shaft."""
+        return self.fleet.machine.home.track
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        if self.phase is LiftPhase.STARTING:
+            # Who knows where it stands takes part, though it waits for the robot that has its platform to be heard.
+            stands = self.drive is not None and self.drive.mode is DriveMode.STANDING
+            return MachineState.WAITING if stands and self.platform is not None else MachineState.STARTING
+        if self._is_stuck:
+            return MachineState.STOPPED
+        return MachineState.IDLE if self.phase is LiftPhase.FREE else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """A lift's future is in the robots' itineraries."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Nothing moves before the position is sensed."""
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Drive and platform sensors; every floor that is passed or reached is told to the fleet."""
+        if isinstance(message, PlatformState):
+            self.platform = message
+            return []
+        if not isinstance(message, DriveState):
+            return []
+        if abs(message.position_mm - self._position_mm(self._nearest(message.position_mm))) > OFF_LIMIT_MM:
+            self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
+        if self.drive is None:
+            self._sequence = message.sequence
+        self.drive = message
+        self.stall.sensed(message.position_mm, now_us)
+        self.generation.index = self._index()
+        return self._tell()
+
+    def _tell(self) -> list[Effect]:
+        """Say where the platform is, once for each floor, mode and version of the gate."""
+        assert self.drive is not None
+        told = (self._index(), self.drive.mode, self._gate_version)
+        if told == self._told:
+            return []
+        self._told = told
+        return [self._word(self.drive)]
+
+    @property
+    def _gate_version(self) -> int:
+        return self.fleet.tokens.seen.get(segment_token(gate(self.track)), 0)
+
+    def _word(self, drive: DriveState) -> Effect:
+        """Where the platform is, under the version of the gate: whoever holds it under this one may go by it."""
+        index = self._index()
+        offset_mm = drive.position_mm - self._position_mm(index)
+        under = under_gate(self._gate_version)
+        return Send(Progress(self.fleet.node_id, *under, self.track, index, offset_mm, drive.speed_mm_s))
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """As steward of alleys: awards tell who may fetch a stored car, and a car given to me is stated anew."""
+        effects = self.stewardship.hear(message, now_us)
+        if not isinstance(message, Award) or message.result is not CallResult.AWARDED:
+            return effects
+        known = self.fleet.negotiation.knows(message.sender, message.call)
+        if message.winner == self.fleet.node_id and not known:
+            # Of a life before, or of before a sleep: the ride stands in its robot's itinerary, a word ends the repeats.
+            effects.append(Send(TaskReport(self.fleet.node_id, message.task, TaskPhase.AWARDED, 0, Reason.NONE)))
+        return effects
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """An option is kept while it stands, and never driven for: only the robots' firm itineraries move the lift.
+
+        A ride that was awarded stands in the robot's itinerary already; a word ends the award's repeats.
+        """
+        match event:
+            case PreAssigned(call_key=key, proposal=proposal):
+                self.generation.promises.update((key, promise) for promise in proposal.program)
+                return []
+            case Released(call_key=key):
+                self.generation.promises.pop(key, None)
+                return []
+            case Awarded(call_key=key, call=call):
+                self.generation.promises.pop(key, None)
+                taken = TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE)
+                return [Send(taken)]
+            case AwardedAgain(call=call):
+                return [
+                    Send(TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.from_station, Reason.NONE))
+                ]
+        return []
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Platform: to the robot of the next ride, at its floor. Gate: to the robot of the ride, at its floor."""
+        if key == segment_token(platform(self.track)):
+            return self._may_have_platform(requester, now_us)
+        if key == segment_token(gate(self.track)):
+            return self._may_have_gate(requester, now_us)
+        return self.stewardship.may_grant(key, requester, now_us)
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """One step of the phase table."""
+        effects = self.stewardship.review(now_us)
+        self._is_stuck = self.stall.is_stuck(now_us)
+        if self.drive is None or self.platform is None:
+            return effects
+        effects += self._table[self.phase](now_us)
+        if not self._holds_gate():
+            # Who has it goes by no word but one that was said since.
+            effects += self._tell()
+        return effects
+
+    def next_wake(self) -> int | None:
+        """When the drive's order is to be repeated, or a winner counts as lost."""
+        due = [time for time in (self._refresh_at_us, self.stewardship.next_wake()) if time is not None]
+        return min(due, default=None)
+
+    def watches(self, now_us: int) -> bool:
+        """It looks often whether its drive has got stuck, or goes again."""
+        return self.stall.is_stuck(now_us) is not self._is_stuck
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Where the platform is, and the tokens that this node holds."""
+        effects = self.stewardship.car_statements() + self.fleet.tokens.statements()
+        if self.drive is not None and self.drive.mode is DriveMode.STANDING:
+            effects.append(self._word(self.drive))
+        return effects
+
+    # --- grants ------------------------------------------------------------------------------------------------
+
+    def _may_have_platform(self, requester: int, now_us: int) -> Reason:
+        if self.phase is not LiftPhase.FREE:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        following = self.next_ride(now_us)
+        if following is None or following.robot != requester:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        if not self._stands_at(following.board):
+            return Reason.DOOR_NOT_READY
+        self.ride = following
+        self.phase = LiftPhase.BOARDING
+        self._gate_was_out = False
+        return Reason.NONE
+
+    def _may_have_gate(self, requester: int, now_us: int) -> Reason:
+        ride = self.ride
+        if ride is None or ride.robot != requester:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        if self.phase is LiftPhase.BOARDING and not self._gate_was_out and self._stands_at(ride.board):
+            self._gate_was_out = True
+            return Reason.NONE
+        if self.phase is LiftPhase.LEAVING and self._stands_at(ride.leave) and self._onward(now_us) is None:
+            # As often as it is asked for: who waits aboard gives the gate back. The ride ends with the platform.
+            return Reason.NONE
+        return Reason.DOOR_NOT_READY
+
+    def next_ride(self, now_us: int) -> Ride | None:
+        """The ride that the robots' firm itineraries plan first among those not yet made."""
+        rides = [
+            ride
+            for node, itinerary in self.fleet.mirror.itineraries.items()
+            if self._ride_legs(itinerary) and not self._is_absent(node)
+            for ride in self._rides(node, itinerary, now_us)
+        ]
+        rides = [ride for ride in rides if self._made.get(ride.robot) != ride.begin_us]
+        return min(rides, key=lambda ride: (ride.begin_us, ride.robot), default=None)
+
+    def _is_absent(self, robot: int) -> bool:
+        """Whether a robot is an obstacle that does not hold the platform: its planned rides count no more."""
+        holder = self.fleet.tokens.holder_of(segment_token(platform(self.track)))
+        return robot in self.fleet.mirror.obstacles.machines and robot != holder
+
+    def _as_planned_now(self, ride: Ride, now_us: int) -> Ride:
+        """The ride of whoever is aboard by its newest plan: a restarted robot may want to go elsewhere."""
+        itinerary = self.fleet.mirror.itineraries.get(ride.robot)
+        planned = self._rides(ride.robot, itinerary, now_us)
+        return next((one for one in planned if one.board == ride.board), ride)
+
+    def _rides(self, robot: int, itinerary: Itinerary | None, now_us: int) -> list[Ride]:
+        """Rides on this lift that a robot's plan still has before it, by its own word for where in the plan it is."""
+        if itinerary is None:
+            return []
+        return rides_of(self.track, robot, itinerary, self.fleet.mirror.progress.get(robot), now_us)
+
+    def _ride_legs(self, itinerary: Itinerary) -> bool:
+        """Whether an itinerary rides with this lift at all: few do, and it is asked for at every message."""
+        known = self._rides_with_me.get(itinerary.sender)
+        if known is None or known[0] is not itinerary:
+            rides = any(leg.action is LegAction.RIDE and leg.track == self.track for leg in itinerary.legs)
+            known = self._rides_with_me[itinerary.sender] = (itinerary, rides)
+        return known[1]
+
+    # --- the phases --------------------------------------------------------------------------------------------
+
+    def _when_starting(self, now_us: int) -> list[Effect]:
+        """Free where nobody has the platform; after a restart in the middle of a ride, back into its phase."""
+        assert self.platform is not None and self.drive is not None
+        if self.drive.mode is not DriveMode.STANDING:
+            return []
+        holder = self.fleet.tokens.holder_of(segment_token(platform(self.track)))
+        if holder != self.fleet.node_id:
+            return self._take_up_ride(holder, now_us)
+        if self.platform.crossing or self.platform.carrier_aboard:
+            return []
+        self.phase = LiftPhase.FREE
+        return self.statements(now_us)
+
+    def _take_up_ride(self, robot: int, now_us: int) -> list[Effect]:
+        """Who holds the platform is boarding, riding or leaving: tokens, sensors and the journal tell which."""
+        assert self.platform is not None
+        ride = self._ride_in_journal()
+        if ride is not None:
+            self.ride = ride
+            there = self._stands_at(ride.leave)
+            self.phase = LiftPhase.LEAVING if there else LiftPhase.RIDING
+        else:
+            itinerary = self.fleet.mirror.itineraries.get(robot)
+            planned = self._rides(robot, itinerary, now_us)
+            here = next((one for one in planned if self._stands_at(one.board)), None)
+            if here is None:
+                return []
+            self.ride = here
+            self.phase = LiftPhase.BOARDING
+            self._gate_was_out = self.platform.carrier_aboard or not self._holds_gate()
+        return self.statements(now_us)
+
+    def _ride_in_journal(self) -> Ride | None:
+        """The ride that was begun and not ended when the controller stopped."""
+        found: Ride | None = None
+        for entry in self.fleet.entries:
+            if entry.get("record") == "ride":
+                found = Ride(int(entry["robot"]), int(entry["board"]), int(entry["leave"]), 0)
+            elif entry.get("record") == "ride_over":
+                found = None
+        return found
+
+    def _when_free(self, now_us: int) -> list[Effect]:
+        following = self.next_ride(now_us)
+        if following is None:
+            return self._stand()
+        return self._go(following.board, now_us)
+
+    def _when_boarding(self, now_us: int) -> list[Effect]:
+        assert self.platform is not None and self.ride is not None
+        aboard = self.platform.carrier_aboard and not self.platform.crossing
+        if self._gate_was_out and self._holds_gate() and aboard:
+            return self._set_off(self._as_planned_now(self.ride, now_us), now_us)
+        if self._holds_platform():
+            # The robot gave the platform back without boarding: its plan has changed.
+            return self._end_ride(now_us)
+        return self._stand()
+
+    def _when_riding(self, now_us: int) -> list[Effect]:
+        assert self.ride is not None
+        if not self._stands_at(self.ride.leave):
+            return self._go(self.ride.leave, now_us)
+        self.phase = LiftPhase.LEAVING
+        self._gate_was_out = False
+        return self._stand()
+
+    def _when_leaving(self, now_us: int) -> list[Effect]:
+        if self._holds_platform() and self._holds_gate():
+            return self._end_ride(now_us)
+        onward = self._rides_onward(now_us)
+        return self._stand() if onward is None else self._set_off(onward, now_us)
+
+    def _set_off(self, ride: Ride, now_us: int) -> list[Effect]:
+        self.ride, self.phase = ride, LiftPhase.RIDING
+        entry: dict[str, str | int] = {"record": "ride", "robot": ride.robot, "board": ride.board, "leave": ride.leave}
+        return [Record(entry), *self._go(ride.leave, now_us)]
+
+    def _rides_onward(self, now_us: int) -> Ride | None:
+        """Where whoever is aboard says that it rides on from this floor, without having given the platform back.
+
+        Its plan begins with that ride: it has come back before it could give the platform back, or has turned.
+        """
+        assert self.platform is not None
+        aboard = self.platform.carrier_aboard and not self.platform.crossing
+        return self._onward(now_us) if aboard and self._holds_gate() else None
+
+    def _onward(self, now_us: int) -> Ride | None:
+        """The ride from this floor that the robot of the ride in hand says it is in, by its plan and ``Progress``."""
+        assert self.ride is not None
+        robot = self.ride.robot
+        itinerary, seen = self.fleet.mirror.itineraries.get(robot), self.fleet.mirror.progress.get(robot)
+        if itinerary is None or seen is None or seen.itinerary_version != itinerary.version:
+            return None
+        leg = leg_in_hand(itinerary, seen)
+        if leg is None or (leg.action, leg.track, leg.from_index) != (LegAction.RIDE, self.track, self.ride.leave):
+            return None
+        planned = self._rides(robot, itinerary, now_us)
+        return next((one for one in planned if (one.board, one.leave) == (leg.from_index, leg.to_index)), None)
+
+    def _end_ride(self, now_us: int) -> list[Effect]:
+        assert self.ride is not None
+        # The robot need not tell its plan anew after a ride: it is remembered as made.
+        self._made[self.ride.robot] = self._begin_as_told(self.ride, now_us)
+        over = Record({"record": "ride_over", "robot": self.ride.robot})
+        self.ride = None
+        self.phase = LiftPhase.FREE
+        return [over, *self._when_free(now_us)]
+
+    def _begin_as_told(self, ride: Ride, now_us: int) -> int:
+        """When a ride began by its robot's newest plan: who wins a task while aboard tells the same ride anew."""
+        itinerary = self.fleet.mirror.itineraries.get(ride.robot)
+        leg = leg_in_hand(itinerary, self.fleet.mirror.progress.get(ride.robot)) if itinerary is not None else None
+        told = (LegAction.RIDE, self.track, ride.board, ride.leave)
+        if leg is None or (leg.action, leg.track, leg.from_index, leg.to_index) != told:
+            return ride.begin_us
+        return self._rides(ride.robot, itinerary, now_us)[0].begin_us
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _holds_gate(self) -> bool:
+        return self.fleet.tokens.holds(segment_token(gate(self.track)))
+
+    def _holds_platform(self) -> bool:
+        return self.fleet.tokens.holds(segment_token(platform(self.track)))
+
+    def _position_mm(self, index: int) -> int:
+        return (index - 1) * self.fleet.site.tracks[self.track].pitch_mm
+
+    def _index(self) -> int:
+        assert self.drive is not None
+        return self._nearest(self.drive.position_mm)
+
+    def _nearest(self, position_mm: int) -> int:
+        track = self.fleet.site.tracks[self.track]
+        index = (position_mm + track.pitch_mm // 2) // track.pitch_mm + 1
+        return max(1, min(track.length, index))
+
+    def _stands_at(self, index: int) -> bool:
+        drive = self.drive
+        if drive is None or drive.mode is not DriveMode.STANDING or drive.sequence != self._sequence:
+            # One that has not taken up the last order yet may still go by it.
+            return False
+        return abs(drive.position_mm - self._position_mm(index)) <= MARK_TOLERANCE_MM
+
+    def _stand(self) -> list[Effect]:
+        self.stall.rests()
+        self._refresh_at_us = None
+        self._target = None
+        return []
+
+    def _go(self, index: int, now_us: int) -> list[Effect]:
+        """Order the drive to a floor and keep the order fresh, under the authority of the gate."""
+        if self._stands_at(index):
+            return self._stand()
+        state = MotionState(self.fleet.tokens, position_known=True, stopped=False)
+        allowed, _ = authorised(state, gate(self.track))
+        if not allowed or self.platform is None or self.platform.crossing:
+            return self._stand()
+        if index != self._target:
+            self._target = index
+            self._sequence = successor(self._sequence, 8)
+        elif self._refresh_at_us is not None and self._refresh_at_us > now_us:
+            return []
+        site = self.fleet.site
+        self.stall.ordered(now_us)
+        self._refresh_at_us = now_us + site.timing.drive_refresh_us
+        return [Actuate(DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s))]
+
+
+def rides_of(track: int, robot: int, itinerary: Itinerary, seen: Progress | None, now_us: int) -> list[Ride]:
+    """Rides on one lift that a firm itinerary still plans: those in its leg in hand, as its robot said it, and later.
+
+    Whether a ride is over is the robot's word alone: planned times say only in which order rides were planned.
+    """
+    if itinerary.grade is not Grade.FIRM:
+        return []
+    current, rides = _current(itinerary, seen), []
+    begin_us = from_bus_ms(itinerary.stamp.award_ms, now_us)
+    for number, leg in enumerate(itinerary.legs):
+        if number >= current and leg.action is LegAction.RIDE and leg.track == track:
+            rides.append(Ride(robot, leg.from_index, leg.to_index, begin_us))
+        begin_us = from_bus_ms(leg.end_ms, now_us)
+    return rides
+
+
+def leg_in_hand(itinerary: Itinerary, seen: Progress | None) -> Leg | None:
+    """The leg that a robot is in by its own word, the first where it said nothing yet; None where all are done."""
+    current = _current(itinerary, seen)
+    return itinerary.legs[current] if current < len(itinerary.legs) else None
+
+
+def _current(itinerary: Itinerary, seen: Progress | None) -> int:
+    return seen.leg if seen is not None and seen.itinerary_version == itinerary.version else 0

@@ -1,0 +1,84 @@
+"""What a compartment has ordered its doors, light and desk to do, said again until their states show it.
+
+An actuator may miss an order: its plug was out, its board was starting. States come unasked and again and again, so
+each one that still shows the old picture a while after the order is answered by the order. All orders are settings,
+which do nothing when they come twice; a desk that hears the number of its last order prints no second ticket.
+"""
+
+from dataclasses import dataclass, field
+
+from onboard.core.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour
+from onboard.core.effects import Actuate, Effect, Record
+from onboard.core.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Message, Reference
+from onboard.core.serial import successor
+from onboard.systems.car_park.unheard import Unheard
+
+#: A desk tells nobody what it shows: its last order is said again with so many states of the bay (ours).
+DESK_TIMES = 4
+
+#: Where a door is that has heard an order. One that found something in its way has opened again by itself, and closes
+#: when it is told once more or when the way is clear.
+_HEARD = {
+    DoorAction.OPEN: (DoorPosition.OPENING, DoorPosition.OPEN),
+    DoorAction.CLOSE: (DoorPosition.CLOSING, DoorPosition.CLOSED, DoorPosition.LOCKED),
+}
+
+
+@dataclass
+class BayOutputs:
+    """Orders of one compartment; ``light`` is the colour last ordered."""
+
+    node_id: int
+    light: LightColour | None = None
+    _sequence: int = 0
+    _doors: dict[DoorName, DoorOrder] = field(default_factory=dict)
+    _desk: DeskOrder | None = None
+    _desk_left: int = 0
+    _unheard: Unheard = field(default_factory=Unheard)
+
+    def door(self, door: DoorName, action: DoorAction) -> list[Effect]:
+        """Order a door once; the plant's interlock refuses what must not be, and the phase then waits."""
+        last = self._doors.get(door)
+        if last is not None and last.action is action:
+            return []
+        order = self._doors[door] = DoorOrder(self.node_id, self._next(), door, action)
+        self._unheard.ordered(door)
+        return [Record({"record": "door", "door": int(door), "action": int(action)}), Actuate(order)]
+
+    def show(self, text: DeskText, car: Reference) -> Effect:
+        """What the desk is to show; with TAKE_TICKET it prints."""
+        self._desk, self._desk_left = DeskOrder(self.node_id, self._next(), text, car), DESK_TIMES
+        self._unheard.ordered("desk")
+        return Actuate(self._desk)
+
+    def light_up(self, colour: LightColour) -> Effect:
+        """The light before the input door."""
+        self.light = colour
+        self._unheard.ordered("light")
+        return Actuate(LightOrder(self.node_id, colour))
+
+    def again(self, state: DoorState | BayState, now_us: int) -> list[Effect]:
+        """What a state shows as not heard; time in us."""
+        orders = self._doors_again(state, now_us) if isinstance(state, DoorState) else self._desk_again(now_us)
+        return [Actuate(order) for order in orders]
+
+    def _doors_again(self, state: DoorState, now_us: int) -> list[Message]:
+        where = {DoorName.INPUT: state.input_door, DoorName.OUTPUT: state.output_door}
+        orders: list[Message] = [
+            order
+            for door, order in self._doors.items()
+            if self._unheard.is_due(door, now_us, heard=where[door] in _HEARD[order.action])
+        ]
+        if self.light is not None and self._unheard.is_due("light", now_us, heard=state.light is self.light):
+            orders.append(LightOrder(self.node_id, self.light))
+        return orders
+
+    def _desk_again(self, now_us: int) -> list[Message]:
+        if self._desk is None or not self._desk_left or not self._unheard.is_due("desk", now_us, heard=False):
+            return []
+        self._desk_left -= 1
+        return [self._desk]
+
+    def _next(self) -> int:
+        self._sequence = successor(self._sequence, 8)
+        return self._sequence

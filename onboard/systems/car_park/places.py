@@ -1,0 +1,64 @@
+"""Places at which a car is to be left: each is one robot's, and who has lost its place chooses another (row P42).
+
+A robot that starts says only where it stands, so the place that it has aboard a car for can be promised again; so can
+one that two bids have named at the same time. Who has the station's right keeps the place, else whose plan has the
+lower stamp; the other leaves its car elsewhere. A place in which a car stands is nobody's.
+"""
+
+from dataclasses import dataclass
+
+from onboard.core.authority import station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import ANY_STATION, LegAction
+from onboard.core.messages import Itinerary
+from onboard.core.site import Station
+from onboard.systems.car_park import custody
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.handling import Phase, ShuttleWork
+from onboard.systems.car_park.program import Handling, Work
+
+
+@dataclass
+class Places:
+    """One robot's places."""
+
+    fleet: Fleet
+    generation: CarParkGeneration
+    shuttle: ShuttleWork
+
+    def lost(self) -> list[Work]:
+        """Cars in hand that cannot be left where it was planned, though there is a choice."""
+        return [
+            work
+            for work in self.generation.program.works()
+            if work.handling is Handling.LEAVE
+            and work.call.to_station == ANY_STATION
+            and not self._is_begun(work)
+            and (custody.others_in(self.fleet.mirror, work.station, work.car) or self._is_anothers(work.station))
+        ]
+
+    def instead(self, work: Work, now_us: int) -> list[Station]:
+        """Free places that nobody has promised, the nearest to where the car was to be left first."""
+        here = work.station
+        free = self.generation.free_places(now_us)
+        return sorted(free, key=lambda one: (one.track != here.track, abs(one.index - here.index)))
+
+    def _is_begun(self, work: Work) -> bool:
+        return self.shuttle.work == work and self.shuttle.phase not in (Phase.ACQUIRE, Phase.DONE)
+
+    def _is_anothers(self, station: Station) -> bool:
+        me, mirror = self.fleet.node_id, self.fleet.mirror
+        mine = mirror.itineraries.get(me)
+        holder = self.fleet.tokens.holder_of(station_token(station))
+        if holder == me or mine is None:
+            return False
+        rivals = [one for one in mirror.itineraries.values() if one.sender != me and _works_at(one, station)]
+        return any(one.sender == holder or one.stamp < mine.stamp for one in rivals)
+
+
+def _works_at(itinerary: Itinerary, station: Station) -> bool:
+    return any(
+        leg.action is LegAction.WORK
+        and (leg.track, leg.to_index, leg.side) == (station.track, station.index, station.side)
+        for leg in itinerary.legs
+    )

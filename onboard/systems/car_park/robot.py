@@ -1,0 +1,491 @@
+"""The mobile robot (MR): carrier and shuttle carry out the order program of every task that it won."""
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import (
+    CallResult,
+    Grade,
+    KindCode,
+    LegAction,
+    MachineState,
+    Reason,
+    TaskPhase,
+)
+from onboard.core.effects import Effect, Halt, Report, Send
+from onboard.core.messages import (
+    Award,
+    CallForProposals,
+    DriveState,
+    Itinerary,
+    ManualOrder,
+    Message,
+    Reference,
+    ShuttleState,
+    Stamp,
+    TaskReport,
+)
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Answer as LiftAnswer
+from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.site import Machine, Site, TrackKind
+from onboard.systems.car_park import custody
+from onboard.systems.car_park.asking import AskingGeneration
+from onboard.systems.car_park.generation import CarParkGeneration, Solution, weighed
+from onboard.systems.car_park.giving_way import Answer, GivingWay
+from onboard.systems.car_park.going_around import GoingAround
+from onboard.systems.car_park.handling import Phase, ShuttleWork, handle
+from onboard.systems.car_park.holding import Holding
+from onboard.systems.car_park.program import MAX_STEPS, Handling, Program, Step, Work
+from onboard.systems.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
+from onboard.systems.car_park.ride_calls import call_lifts
+from onboard.systems.car_park.riding import Riding
+from onboard.systems.car_park.site import RideCalls, car_park
+from onboard.systems.car_park.starting import Body, Stage, Starting
+from onboard.systems.car_park.travel import Carriage
+from onboard.systems.car_park.way import way_to_refuge
+from onboard.ways.lifts import sill
+
+#: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
+REPLAN_TOLERANCE_US = 500_000
+#: A step that is not over this long after its planned end is told to be late, by as much again. Ours.
+OVERDUE_US = 2_000_000
+
+
+@dataclass(frozen=True)
+class RobotFactory:
+    """Makes mobile robots."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
+        """The robot's task-generation function."""
+        generation = AskingGeneration if car_park(site).rides is RideCalls.BEFORE else CarParkGeneration
+        return generation(site, machine, mirror, Program(site))
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Robot":
+        """The robot's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, CarParkGeneration):
+            raise TypeError("a robot needs the car park's task-generation function")
+        return Robot(fleet, estimator)
+
+
+@dataclass
+class Robot:
+    """One mobile robot: waits for awards, drives, handles cars, and stands in a refuge in between."""
+
+    fleet: Fleet
+    generation: CarParkGeneration
+    kind: KindCode = KindCode.ROBOT
+    carriage: Carriage = field(init=False)
+    shuttle: ShuttleWork = field(init=False)
+    riding: Riding = field(init=False)
+    giving_way: GivingWay = field(init=False)
+    recovery: Recovery = field(init=False)
+    going_around: GoingAround = field(init=False)
+    holding: Holding = field(init=False)
+    starting: Starting = field(init=False)
+    #: The last tasks that were done: a late word about one of them is no news.
+    _done: deque[Reference] = field(default_factory=lambda: deque(maxlen=16))
+    _begun: bool = False
+    _fault: Reason = Reason.NONE
+
+    def __post_init__(self) -> None:
+        self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
+        self.shuttle = ShuttleWork(self.fleet)
+        self.carriage.is_clear = lambda: self.shuttle.is_home
+        self.carriage.way_on = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
+        self.riding = Riding(self.fleet)
+        self.giving_way = GivingWay(self.fleet, self.program)
+        self.recovery = Recovery.read(self.fleet.node_id, self.fleet.entries)
+        custody.replay(self.fleet, self.recovery.cars.values())
+        self.fleet.tokens.before_grant = partial(custody.before_grant, self.fleet)
+        self.going_around = GoingAround(self.fleet, self.generation, self.carriage, self.shuttle, self._take_up)
+        self.holding = Holding(self.fleet, self.generation, self.carriage, self.shuttle)
+        machine = Body(self.carriage, self.shuttle, self.riding)
+        self.starting = Starting(
+            self.fleet, self.generation, machine, self.recovery, self._say_what_is_mine, self._started
+        )
+        if self.recovery.floor is not None:
+            self.carriage.track = self.recovery.floor
+
+    @property
+    def program(self) -> Program:
+        """The order program in hand."""
+        return self.generation.program
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        is_astray = self.starting.is_over and self.shuttle.is_astray
+        is_held_back = self.starting.stage is Stage.HELD or self.going_around.is_stuck or is_astray
+        if self._fault is not Reason.NONE or is_held_back:
+            return MachineState.STOPPED
+        if self.holding.is_at_rest:
+            return MachineState.OBSTACLE
+        if not self.starting.is_over:
+            return MachineState.STARTING
+        if self.program.step is None:
+            return MachineState.WAITING if self.program.unplanned else MachineState.IDLE
+        return MachineState.WAITING if self.carriage.blocked is not None else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """Version of the firm itinerary."""
+        return self.program.version
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Nothing moves before the position is sensed."""
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Drive and shuttle states."""
+        if isinstance(message, DriveState):
+            return self.carriage.sense(message, now_us, self.program.version, self.program.current)
+        if isinstance(message, ShuttleState):
+            effects = self.shuttle.sense(message, now_us)
+            if self.shuttle.fault and self._fault is Reason.NONE:
+                effects += self._fail(Reason.ACTUATOR_FAULT, now_us)
+            return effects
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Another machine's plan may mean that mine has to come later, or to take another way."""
+        self.going_around.hear(message)
+        if isinstance(message, Award):
+            forfeited = self.recovery.forfeit_unknown(self.fleet, message, self._works(), self._done)
+            return forfeited + self._yield_task(message, now_us)
+        if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
+            return self.holding.ordered(message)
+        lost = self.holding.loses(message)
+        if lost is not None and lost in self._untouched():
+            return self._lose(lost, now_us)
+        if not isinstance(message, Itinerary) or message.grade is not Grade.FIRM or not self.starting.is_over:
+            return []
+        # Nobody counts on the plan of a robot that is held: it is made anew once it is let go.
+        if self.holding.is_at_rest or self.fleet.mirror.itineraries.get(message.sender) is not message:
+            return []
+        answer = self.giving_way.heed(message.sender, now_us)
+        if answer is Answer.ANEW:
+            return self._reroute(message.sender, now_us)
+        return self._publish(now_us) if answer is Answer.LATER else []
+
+    def _yield_task(self, award: Award, now_us: int) -> list[Effect]:
+        """A task of mine is another's by a newer version, or its call is void: I was lost for its initiator."""
+        for call in [work.call for work in self._works()]:
+            if (call.task, call.sender) != (award.task, award.sender):
+                continue
+            newer = self.recovery.is_newer(award)
+            is_void = award.result is CallResult.WITHDRAWN or (
+                award.result is CallResult.REJECTED and award.call == call.call
+            )
+            others = award.result is CallResult.AWARDED and award.winner != self.fleet.node_id and newer
+            if (others or is_void) and call.task in self._untouched():
+                return self._lose(call.task, now_us)
+        return []
+
+    def _untouched(self) -> list[Reference]:
+        """Tasks in hand that can be given back, or be another's."""
+        return self.going_around.untouched() if self.starting.is_over else self.recovery.untouched()
+
+    def _lose(self, task: Reference, now_us: int) -> list[Effect]:
+        self.recovery.forget(task)
+        gone = self.going_around.lose(task)
+        return gone + (self.going_around.drop([task], now_us) if self.starting.is_over else [])
+
+    def _take_up(self, kept: int, steps: Sequence[Step], works: list[Work], now_us: int) -> list[Effect]:
+        """A program made anew for the same or fewer tasks, under the same stamp."""
+        rest = [*self.program.remaining[:kept], *steps]
+        if not kept:
+            self._begun = False
+        if not rest and self.carriage.standing_at is not None:
+            self.program.standing = self.carriage.standing_at
+            self.carriage.go(self.carriage.standing_at)
+        planned = [step.work for step in rest]
+        self.program.replace(rest, self.program.stamp, [work for work in works if work not in planned])
+        effects: list[Effect] = [Report("goes around: " + "; ".join(str(step) for step in steps))]
+        effects += self._publish(now_us)
+        return effects + (call_lifts(self.fleet, works[0].call, tuple(steps), now_us) if works else [])
+
+    def _reroute(self, sender: int, now_us: int) -> list[Effect]:
+        """Do the same work by another way, under the same stamp; where there is none, come behind on the old one."""
+        kept, origin, start_us = self.program.turning(now_us)
+        works = [step.work for step in self.program.remaining[kept:] if step.work is not None]
+        unplanned = self.program.unplanned
+        steps = self.generation.reroute(origin, start_us, [*works, *unplanned], now_us)
+        if steps is not None:
+            works, unplanned = [*works, *unplanned], []
+        elif unplanned:
+            # What finds no way now must not stand in the way of others either.
+            steps = self.generation.reroute(origin, start_us, works, now_us)
+        if steps is None:
+            return self._publish(now_us) if self.giving_way.fall_back(sender, now_us) is Answer.LATER else []
+        calls = [work.call for work in works]
+        if not kept:
+            self._begun = False
+        self.program.replace([*self.program.remaining[:kept], *steps], self.program.stamp, unplanned)
+        effects: list[Effect] = [Report(f"gives way to node {sender}: " + "; ".join(str(step) for step in steps))]
+        effects += self._publish(now_us)
+        return effects + (call_lifts(self.fleet, calls[0], steps, now_us) if calls else [])
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """Pre-assignment keeps a tentative solution, being outbid drops it, an award makes it firm (row P47)."""
+        match event:
+            case PreAssigned(call_key=key, proposal=proposal):
+                (solution,) = proposal.program
+                self.generation.tentative[key] = solution
+                return [Report(weighed(proposal.alternatives))]
+            case Released(call_key=key):
+                self.generation.tentative.pop(key, None)
+                return []
+            case Awarded(call_key=key, call=call, proposal=proposal, award=award, parts=parts):
+                self.generation.tentative.pop(key, None)
+                (solution,) = proposal.program
+                version = 1 if award is None else award.task_version
+                self.recovery.versions[call.task] = version
+                why = self._why_not()
+                if why is not Reason.NONE:
+                    return self.going_around.forfeit(call.task, why, now_us)
+                again = call.task in self.going_around.untouched()
+                dropped = self.going_around.drop([call.task], now_us) if again else []
+                return dropped + self._take_on(call, solution, parts, version, now_us)
+            case AwardedAgain(call=call):
+                return [self._tell_again(call.task)]
+        return []
+
+    def _why_not(self) -> Reason:
+        """Why a task that was won cannot be taken on; NONE where it can."""
+        if self._fault is not Reason.NONE:
+            return self._fault
+        if self.holding.is_held:
+            return Reason.OPERATOR
+        # A bid of before: of a life before, or of when there was still a way for all that is in hand.
+        return Reason.IMPOSSIBLE if self.program.unplanned or not self.starting.is_over else Reason.NONE
+
+    def _works(self) -> list[Work]:
+        """What is in hand, or what a restart has left to do."""
+        return self.program.works() if self.starting.is_over else self.recovery.works
+
+    def _tell_again(self, task: Reference) -> Effect:
+        """What became of a task whose award is said again."""
+        handlings = [work.handling for work in self._works() if work.call.task == task]
+        if Handling.TAKE in handlings or Handling.LEAVE in handlings:
+            return self._report(task, TaskPhase.AWARDED if Handling.TAKE in handlings else TaskPhase.LOADED, 0)
+        if task in self._done:
+            return self._report(task, TaskPhase.DONE, 0)
+        return Send(TaskReport(self.fleet.node_id, task, TaskPhase.FORFEITED, 0, Reason.CANCELLED))
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """A robot passes segments and stations back to their stewards by itself; until then it refuses."""
+        return Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Carry on with the step in hand."""
+        if self._fault is not Reason.NONE:
+            return self.going_around.say_again(now_us)
+        if self.holding.stops(self._begun):
+            return self.going_around.say_again(now_us) + self.holding.come_to_rest(now_us)
+        if not self.starting.is_over:
+            return self.starting.advance(now_us)
+        effects = self.going_around.watch_drive(now_us)
+        effects += self.going_around.advance(now_us)
+        # A step can end without a word on any bus, and the next is to begin in the same moment.
+        for _ in range(MAX_STEPS):
+            if self.holding.stops(self._begun):
+                return effects + self.holding.come_to_rest(now_us)
+            step = self.program.step
+            if step is None:
+                return effects + self.carriage.advance(now_us)
+            if not self._begun:
+                self._begun = True
+                effects += self._begin(step, now_us)
+            effects += self._carry_on(step, now_us)
+            if not self._is_done(step, now_us):
+                effects += self._tell_delay(step, now_us)
+                break
+            effects += self._end(step, now_us)
+        return effects
+
+    def next_wake(self) -> int | None:
+        """The drive's next order, the end of a planned wait, or of a pause after a restart.
+
+        Who has failed only says again what it gives back.
+        """
+        if self._fault is not Reason.NONE:
+            return self.going_around.next_word()
+        if self.holding.stops(self._begun):
+            return min((one for one in (self.carriage.next_wake(), self.going_around.next_word()) if one), default=None)
+        if not self.starting.is_over:
+            return min((one for one in (self.carriage.next_wake(), self.starting.next_wake()) if one), default=None)
+        times = [self.carriage.next_wake(), self.going_around.next_wake()]
+        step = self.program.step
+        if step is not None and self._begun:
+            times.append(step.end_us if step.action is LegAction.STAND else step.end_us + OVERDUE_US)
+        due = [time for time in times if time is not None]
+        return min(due) if due else None
+
+    def watches(self, now_us: int) -> bool:
+        """It looks often while it starts, waits for a slot or rides, and for a drive that got stuck, or goes again."""
+        step = self.program.step
+        waits = self.carriage.blocked is not None or (step is not None and step.action is LegAction.RIDE)
+        return waits or not self.starting.is_over or self.going_around.drive_changes(now_us)
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """My firm itinerary as I told it under its version, where I am in it, and the tokens that I hold."""
+        effects: list[Effect] = []
+        itinerary = self.fleet.mirror.itineraries.get(self.fleet.node_id)
+        if itinerary is not None:
+            effects += [Send(itinerary), *self.carriage.statement(self.program.version, self.program.current)]
+        # An initiator that was restarted learns that its task is in hand.
+        effects += self._taken_on(self.program.works())
+        effects += custody.statements(self.fleet) + self.holding.manual.statement()
+        return effects + self.fleet.tokens.statements()
+
+    def _taken_on(self, works: list[Work]) -> list[Effect]:
+        to_take = [work for work in works if work.handling is Handling.TAKE]
+        return [self._report(work.call.task, TaskPhase.AWARDED, work.station.number) for work in to_take]
+
+    # --- steps -------------------------------------------------------------------------------------------------
+
+    def _say_what_is_mine(self) -> list[Effect]:
+        """At a restart: tasks in hand, of which each initiator knows whether another has got it meanwhile."""
+        mine = self._taken_on(self.recovery.works)
+        if self.recovery.last_done is not None:
+            task, station = self.recovery.last_done
+            self._done.append(task)
+            if self.recovery.is_news:
+                # The power may have failed before this was said, or heard.
+                mine = [self._report(task, TaskPhase.DONE, station), *mine]
+        return mine
+
+    def _started(self, planned: tuple[Step, ...] | None, calls: list[CallForProposals], now_us: int) -> list[Effect]:
+        """The start is over, and the program taken up: tell the plan, and call for rides in what was planned now."""
+        # What a restart has left in hand is the first step, and was begun before.
+        self._begun = len(planned or ()) < len(self.program.steps)
+        effects: list[Effect] = []
+        if self.recovery.is_restart:
+            effects.append(Report("goes on after a restart: " + "; ".join(str(step) for step in self.program.steps)))
+        if planned is None:
+            # Somebody is in the way, of work or to a refuge: it is tried again, and what was not touched is given back.
+            self.going_around.turn_later(now_us)
+        effects += self._publish(now_us)
+        return effects + (call_lifts(self.fleet, calls[0], planned or (), now_us) if calls else [])
+
+    def _take_on(
+        self, call: CallForProposals, promised: Solution, parts: tuple[LiftAnswer, ...], version: int, now_us: int
+    ) -> list[Effect]:
+        """Second request of the task-generation function: the operating sequence that is really carried out."""
+        solution = self.generation.renewed(call, promised, now_us)
+        kept = self.program.remaining[: solution.kept]
+        if not kept:
+            self._begun = False
+        self.program.replace([*kept, *solution.steps], Stamp(call.deadline_ms, call.sender, call.call & 0xFF))
+        effects: list[Effect] = [
+            award_record(call, *self.generation.ends(call, solution.place), version),
+            Report("program: " + "; ".join(str(step) for step in solution.steps)),
+        ]
+        effects += self._publish(now_us)
+        effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
+        return effects + call_lifts(self.fleet, call, solution.steps, now_us, parts)
+
+    def _begin(self, step: Step, now_us: int) -> list[Effect]:
+        if step.action is LegAction.TRAVEL:
+            self.carriage.go(step.destination)
+            if self.fleet.site.tracks[step.track].kind is TrackKind.SPUR:
+                # Before the turn: the drive tells only that it is across, not in which spur.
+                return [floor_record(step.track)]
+        elif step.action is LegAction.RIDE:
+            told = self.carriage.statement(self.program.version, self.program.current)
+            return [ride_record(step), *told, *self.riding.begin(step.track, step.to_index)]
+        else:
+            # A way that was given up while its rights were awaited is not gone when they come.
+            self.carriage.go(step.destination)
+        return [] if step.work is None else self.shuttle.begin(step.work) + self._announce_start(step.work)
+
+    def _announce_start(self, work: Work) -> list[Effect]:
+        if work.handling is Handling.LEAVE:
+            return []
+        return [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
+
+    def _carry_on(self, step: Step, now_us: int) -> list[Effect]:
+        if step.action is LegAction.RIDE:
+            return self.riding.advance(now_us)
+        if step.work is not None:
+            return handle(self.carriage, self.shuttle, now_us)
+        if self.shuttle.is_out:
+            return [Halt("the carrier should move while its shuttle is out")]
+        return self.carriage.advance(now_us)
+
+    def _is_done(self, step: Step, now_us: int) -> bool:
+        if step.action is LegAction.TRAVEL:
+            return self.carriage.standing_at == step.destination
+        if step.action is LegAction.RIDE:
+            return self.riding.done
+        if step.work is not None:
+            return self.shuttle.phase is Phase.DONE
+        return now_us >= step.end_us
+
+    def _tell_delay(self, step: Step, now_us: int) -> list[Effect]:
+        """A step that takes longer than planned moves the rest of the plan while it still lasts, so others can plan."""
+        late_us = now_us - step.end_us
+        if late_us < OVERDUE_US:
+            return []
+        # The run in hand began where it began: only its end and what follows are later.
+        by_us = late_us + OVERDUE_US
+        self.program.shift(by_us)
+        first = self.program.steps[0]
+        self.program.steps[0] = first._replace(begin_us=first.begin_us - by_us)
+        # Whoever waits for rights in vain may have lost the task: its initiator answers then.
+        return self._publish(now_us) + ([] if step.work is None else self._announce_start(step.work))
+
+    def _end(self, step: Step, now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        if step.work is not None:
+            taken = step.work.handling is Handling.TAKE
+            phase = TaskPhase.LOADED if taken else TaskPhase.DONE
+            effects.append(handled_record(step.work))
+            if not taken:
+                self._done.append(step.work.call.task)
+                self.recovery.versions.pop(step.work.call.task, None)
+            effects.append(self._report(step.work.call.task, phase, step.work.station.number))
+        if step.action is LegAction.RIDE:
+            floor = sill(self.fleet.site, step.track, step.to_index).track
+            effects.append(floor_record(floor))
+            self.carriage.ride_to(floor)
+        self._begun = False
+        self.program.over()
+        following = self.program.step
+        late_us = now_us - (step.end_us if following is None else following.begin_us)
+        if following is not None and abs(late_us) > REPLAN_TOLERANCE_US:
+            self.program.shift(late_us)
+            effects += self._publish(now_us)
+        return effects
+
+    def _publish(self, now_us: int) -> list[Effect]:
+        itinerary = self.program.itinerary(self.fleet.node_id, now_us)
+        assert itinerary.grade is Grade.FIRM
+        self.fleet.mirror.on_itinerary(itinerary, now_us)
+        return [Send(itinerary)]
+
+    def _report(self, task: Reference, phase: TaskPhase, station: int) -> Effect:
+        return Send(TaskReport(self.fleet.node_id, task, phase, station, Reason.NONE))
+
+    def _fail(self, reason: Reason, now_us: int) -> list[Effect]:
+        """An actuator failed: stand still as an obstacle, give back what was not touched, and say so.
+
+        What follows is a person's decision: the controller is started anew once the machine is sound.
+        """
+        self._fault = reason
+        self.carriage.stopped = True
+        effects: list[Effect] = [Report(f"stopped: {reason.name}")]
+        lost = self._untouched()
+        for task in lost:
+            self.recovery.forget(task)
+            effects += self.going_around.forfeit(task, reason, now_us)
+        self.program.unplanned = [work for work in self.program.unplanned if work.call.task not in lost]
+        self.program.steps = [
+            step for step in self.program.steps if step.work is None or step.work.call.task not in lost
+        ]
+        return effects

@@ -1,0 +1,56 @@
+"""Two robots face to face, each in the slot that the other wants next: one of them has to go where it did not mean to.
+
+No plan leads there; but plans that were made while clocks were wrong, or mirrors differed, are followed in an order
+that leads nowhere. Both know it by rights alone: I wait for a slot whose token the other holds, and it asks for the one
+that I am in. The time that this may last decides nothing but how soon somebody turns.
+"""
+
+from dataclasses import dataclass
+
+from onboard.core.authority import segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import NOBODY, KindCode
+from onboard.systems.car_park.travel import Carriage
+
+#: Whoever ranks behind looks for another way after so long, and again after twice that; who ranks before, after twice
+#: that, us. Ours: longer than tokens take on a bus in trouble, and than a mirror takes to catch up.
+PATIENCE_US = 8_000_000
+
+
+@dataclass
+class Standoff:
+    """One robot's look at who stands in its way because it stands in theirs."""
+
+    fleet: Fleet
+    carriage: Carriage
+    due_us: int | None = None
+    _with: int = NOBODY
+
+    def look(self, now_us: int) -> int:
+        """The robot to turn away from, once that is due; NOBODY else."""
+        other = self._facing()
+        if other != self._with:
+            self._with = other
+            waits = 2 if other != NOBODY and self._ranks_before(other) else 1
+            self.due_us = None if other == NOBODY else now_us + waits * PATIENCE_US
+        if self.due_us is None or now_us < self.due_us:
+            return NOBODY
+        self.due_us = now_us + 2 * PATIENCE_US
+        return other
+
+    def _facing(self) -> int:
+        slot, tokens = self.carriage.blocked, self.fleet.tokens
+        if slot is None:
+            return NOBODY
+        other = tokens.holder_of(segment_token(slot))
+        machine = self.fleet.site.machines.get(other)
+        if machine is None or machine.kind is not KindCode.ROBOT or other == self.fleet.node_id:
+            return NOBODY
+        petitions = self.fleet.petitions
+        wants = any(petitions.claim(segment_token(here), other) is not None for here in self.carriage.occupied())
+        return other if wants else NOBODY
+
+    def _ranks_before(self, other: int) -> bool:
+        plans = self.fleet.mirror.itineraries
+        mine, theirs = plans.get(self.fleet.node_id), plans.get(other)
+        return mine is not None and theirs is not None and mine.stamp.ranks_before(theirs.stamp)

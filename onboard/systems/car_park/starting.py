@@ -1,0 +1,246 @@
+"""From power-up to the first step: while a robot starts, nothing but this touches its program, plan or drives.
+
+No plan that is heard, no award, no neighbour that asks for room: the program has no place before this is over, and
+refuses (design, section 6). Where the carrier stands and whether the shuttle is out come from the sensors, what is in
+hand from the journal; nothing else is remembered. Two ways lead out: the robot takes part, or it
+is held for a person, because sensors and journal contradict each other. A broken actuator is the robot's own business.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum, auto
+from typing import Final, NamedTuple
+
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import DriveMode, LegAction, ShuttleMode
+from onboard.core.effects import Effect, Report, Send
+from onboard.core.messages import CallForProposals, Stamp
+from onboard.core.serial import successor, to_bus_ms
+from onboard.core.site import Segment
+from onboard.systems.car_park.generation import CarParkGeneration
+from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.program import Step, ends_at, standing_itinerary
+from onboard.systems.car_park.recovery import Recovery, floor_record
+from onboard.systems.car_park.riding import Riding
+from onboard.systems.car_park.travel import Carriage
+from onboard.ways.lift_uses import ride_us
+
+#: From the first known position after a restart until plans are made: the others say meanwhile what they plan. Ours.
+SETTLING_US = 2_000_000
+#: Modes in which the shuttle has come to rest.
+AT_REST = (ShuttleMode.HOME, ShuttleMode.REACHED)
+
+
+class Stage(Enum):
+    """How far a robot has come since power-up."""
+
+    UNPLACED = "looks for its place"
+    SETTLING = "knows its place, and hears what the others plan"
+    HELD = "held for a person: sensors and journal contradict each other"
+    OVER = "takes part"
+
+
+class Found(Enum):
+    """What leads from one stage to the next."""
+
+    FIRST_PLACE = auto()
+    PLACE_AGAIN = auto()
+    PLACE_LOST = auto()
+    CONTRADICTION = auto()
+    AGREEMENT = auto()
+    PLAN = auto()
+
+
+TABLE: Final[dict[tuple[Stage, Found], Stage]] = {
+    (Stage.UNPLACED, Found.FIRST_PLACE): Stage.OVER,
+    (Stage.UNPLACED, Found.PLACE_AGAIN): Stage.SETTLING,
+    (Stage.UNPLACED, Found.CONTRADICTION): Stage.HELD,
+    (Stage.SETTLING, Found.PLACE_LOST): Stage.UNPLACED,
+    (Stage.SETTLING, Found.CONTRADICTION): Stage.HELD,
+    (Stage.SETTLING, Found.PLAN): Stage.OVER,
+    (Stage.HELD, Found.AGREEMENT): Stage.UNPLACED,
+}
+
+
+class Body(NamedTuple):
+    """What a robot senses and moves."""
+
+    carriage: Carriage
+    shuttle: ShuttleWork
+    riding: Riding
+
+
+@dataclass
+class Starting:
+    """One robot's start. ``announce()`` is called once it stands, ``started(planned, calls, now)`` once it is over.
+
+    ``planned`` are the steps behind what was in hand, None where there was no way; ``calls`` are those of the tasks.
+    """
+
+    fleet: Fleet
+    generation: CarParkGeneration
+    body: Body
+    recovery: Recovery
+    announce: Callable[[], list[Effect]]
+    started: Callable[[tuple[Step, ...] | None, list[CallForProposals], int], list[Effect]]
+    stage: Stage = Stage.UNPLACED
+    place: Segment | None = field(default=None, init=False)
+    _due_us: int | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the robot takes part."""
+        return self.stage is Stage.OVER
+
+    def next_wake(self) -> int | None:
+        """When the others have had their time; what else is waited for is told by sensors."""
+        return self._due_us
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """One step of the table, where what leads to it was found."""
+        if self.body.carriage.sensed is None:
+            return []
+        if self.stage is Stage.HELD:
+            return self._look_again(now_us)
+        if self.stage is Stage.UNPLACED:
+            return self._find_place(now_us)
+        return self._settle(now_us)
+
+    def _enter(self, found: Found) -> None:
+        self.stage = TABLE[self.stage, found]
+
+    # --- the place ---------------------------------------------------------------------------------------------
+
+    def _find_place(self, now_us: int) -> list[Effect]:
+        """Placed at a mark; between marks first to the nearest one, as far as rights allow, with the shuttle home.
+
+        In the mouth of a spur, turned towards it, it turns back first: no plan begins or ends there.
+        """
+        carriage, told = self.body.carriage, self.fleet.slots_told
+        effects: list[Effect] = []
+        if told:
+            # A journal that is lost knew the floor: who made the rights anew has seen where the carrier stands.
+            self.fleet.slots_told, carriage.track, self.recovery.is_restart = (), told[0].track, True
+            effects.append(floor_record(told[0].track))
+        here = carriage.standing_at
+        assert carriage.sensed is not None
+        if here is not None and here == carriage.nearest:
+            return effects + self._is_placed(here, now_us)
+        out = carriage.way_out
+        if out is not None and carriage.goal is not None and carriage.goal != out:
+            carriage.go(out)
+        shuttle = self.body.shuttle.sensed
+        rests = carriage.sensed.mode in (DriveMode.STANDING, DriveMode.FAULT)
+        if carriage.goal is None and rests and shuttle is not None and shuttle.mode in AT_REST:
+            if shuttle.mode is not ShuttleMode.HOME:
+                return effects + self._hold(self.recovery.contradiction(None, shuttle))
+            if not self.generation.is_held:
+                # It asks first for what it is in: it may have been pushed there while it was off.
+                carriage.go(out or carriage.nearest)
+        return effects + (carriage.advance(now_us) if carriage.goal is not None else [])
+
+    def _is_placed(self, here: Segment, now_us: int) -> list[Effect]:
+        """Stand here and tell everybody; after a restart go on a little later."""
+        self.place = here
+        self.body.carriage.go(here)
+        if not self.recovery.is_restart:
+            return self._start_first(here, now_us)
+        self._enter(Found.PLACE_AGAIN)
+        self._due_us = now_us + SETTLING_US
+        program, node = self.generation.program, self.fleet.node_id
+        program.version = successor(program.version, 8)
+        told = standing_itinerary(node, program.version, Stamp(to_bus_ms(now_us), node, 0), here, now_us)
+        self.fleet.mirror.on_itinerary(told, now_us)
+        return [Send(told), *self.announce()]
+
+    def _start_first(self, here: Segment, now_us: int) -> list[Effect]:
+        """A first life has nothing in hand: it takes part as soon as its shuttle is seen to be home."""
+        shuttle = self.body.shuttle.sensed
+        if shuttle is None or shuttle.mode not in AT_REST:
+            return []
+        why = self.recovery.contradiction(here, shuttle)
+        if why:
+            return self._hold(why)
+        self._enter(Found.FIRST_PLACE)
+        return self._go_on(here, (), now_us)
+
+    # --- what is in hand ---------------------------------------------------------------------------------------
+
+    def _settle(self, now_us: int) -> list[Effect]:
+        """Ask for what it is in; once the others were heard and the shuttle is at rest, go on where they agree."""
+        if self.body.carriage.standing_at != self.place:
+            # Pushed away meanwhile: what was said of the place is wrong.
+            self._enter(Found.PLACE_LOST)
+            self.body.carriage.stay()
+            self._due_us = None
+            return self._find_place(now_us)
+        effects = self.body.carriage.advance(now_us)
+        if self._due_us is not None and now_us < self._due_us:
+            return effects
+        self._due_us = None
+        shuttle = self.body.shuttle.sensed
+        if shuttle is None or shuttle.mode not in AT_REST:
+            return effects
+        why = self.recovery.contradiction(self.place, shuttle)
+        return effects + (self._hold(why) if why else self._take_part(now_us))
+
+    def _hold(self, why: str) -> list[Effect]:
+        self._enter(Found.CONTRADICTION)
+        self._due_us = None
+        self.body.carriage.stay()
+        return [Report(f"held for a person: {why}")]
+
+    def _look_again(self, now_us: int) -> list[Effect]:
+        """Whoever has put it right need not say so: the sensors do."""
+        shuttle = self.body.shuttle.sensed
+        if shuttle is None or shuttle.mode not in AT_REST:
+            return []
+        place = self.body.carriage.standing_at
+        if self.recovery.contradiction(place, shuttle):
+            return []
+        self._enter(Found.AGREEMENT)
+        return [Report("sensors and journal agree again"), *self._find_place(now_us)]
+
+    def _take_part(self, now_us: int) -> list[Effect]:
+        assert self.place is not None
+        self._enter(Found.PLAN)
+        return self._go_on(self.place, self._in_hand(self.place, now_us), now_us)
+
+    def _go_on(self, place: Segment, in_hand: tuple[Step, ...], now_us: int) -> list[Effect]:
+        """Go on from ``place`` with what the journal says is mine, by a way planned anew (rows P14, P20)."""
+        works, self.recovery.works = self.recovery.works, []
+        stamp = Stamp(to_bus_ms(now_us), self.fleet.node_id, 0)
+        if not self.recovery.is_restart:
+            self.generation.program.begin(place, [], stamp)
+            return self.started((), [], now_us)
+        origin, start_us, ahead = place, now_us, works
+        for step in in_hand:
+            self._resume(step)
+            origin, start_us = ends_at(self.fleet.site, step), step.end_us
+            ahead = ahead if step.work is None else ahead[1:]
+        more = self.generation.reroute(origin, start_us, ahead, now_us)
+        calls = [work.call for work in works]
+        if calls:
+            stamp = Stamp(calls[0].deadline_ms, calls[0].sender, calls[0].call & 0xFF)
+        self.generation.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
+        return self.started(more, calls, now_us)
+
+    def _resume(self, step: Step) -> None:
+        """The step in hand goes on from where the journal and the sensors say that it was."""
+        if step.work is not None and self.recovery.phase is not None:
+            self.body.shuttle.resume(step.work, self.recovery.phase)
+        elif step.action is LegAction.RIDE:
+            self.body.riding.begin(step.track, step.to_index)
+
+    def _in_hand(self, here: Segment, now_us: int) -> tuple[Step, ...]:
+        """The handling or the ride that the restart fell into, as the first step of the new program."""
+        ride = self.recovery.ride
+        if ride is not None:
+            lasts_us = ride_us(self.fleet.site, ride.track, ride.from_index, ride.to_index)
+            return (ride._replace(begin_us=now_us, end_us=now_us + lasts_us),)
+        assert self.body.shuttle.sensed is not None
+        if not self.recovery.is_under_way(here, self.body.shuttle.sensed):
+            return ()
+        work = self.recovery.works[0]
+        end_us = now_us + self.generation.handling_us(work.station)
+        return (Step(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)

@@ -1,0 +1,229 @@
+"""A fixed machine as steward of a track: grants segments in passing order, keeps stored cars and their places.
+
+As custodian of a car it alone may take the right to fetch it from a machine that won it and is lost: while it holds the
+car and its station, and the winner neither stands at that front nor holds its token (design, section 4). It forgets the
+winner, journals that, and then says FORFEITED; whoever wants the task done calls anew under a raised version.
+"""
+
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey, car_token, station_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import NOBODY, OUTSIDE, TASK_VERSION_BITS, CallResult, Operation, Reason, TaskPhase, TokenKind
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Award, CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
+from onboard.core.negotiation.winners import patience_us
+from onboard.core.petitions import UNORDERED
+from onboard.core.serial import is_newer
+from onboard.core.site import Segment, Station
+from onboard.systems.car_park import custody
+from onboard.systems.car_park.bay_memory import BayMemory, winner_record
+
+#: Calls remembered to know which car an award is about; older ones are long closed.
+MAX_CALLS = 64
+#: Cars that have left and are told still.
+MOST_GONE = 4
+#: A winner that has said nothing for so long since its award does not know of it, or does not act on it, us: a little
+#: longer than its initiator says the award again at a quick pace. Ours.
+UNHEARD_AFTER_US = 6_000_000
+#: FORFEITED is said again this often until the task is awarded anew, us. Ours.
+SAY_AGAIN_US = 2_000_000
+
+
+@dataclass
+class Stewardship:
+    """Grant rules and custody of one steward. ``winners`` names the machine that may fetch a car."""
+
+    fleet: Fleet
+    winners: dict[Reference, int] = field(default_factory=dict)
+    #: The task that each car's winner has won and its version.
+    tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
+    _cars_of_calls: dict[tuple[int, int], Reference] = field(default_factory=dict)
+    #: A car in my own bay, compartment, that I know nothing of but by others since my rights were made anew.
+    left: CarAt | None = None
+    _say_at_us: dict[Reference, int] = field(default_factory=dict)
+    #: Since when the winner of each car has said nothing that shows that it knows of its award.
+    _unheard_us: dict[Reference, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.fleet.tokens.before_taking = self._before_taking
+        self.fleet.mirror.on_forgotten.append(self._forget)
+
+    def replay(self, memory: BayMemory) -> None:
+        """Take up what the journal tells of the cars that are in my custody still."""
+        in_hand = memory.job[2] if memory.job is not None else None
+
+        def is_mine(car: Reference) -> bool:
+            # Of all others their custodians know who may fetch them.
+            return car == in_hand or car_token(*car) in self.fleet.tokens.held
+
+        self.winners.update({car: winner for car, winner in memory.winners.items() if is_mine(car)})
+        self.tasks.update({car: task for car, task in memory.tasks.items() if is_mine(car)})
+        custody.replay(self.fleet, memory.cars.values())
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Learn from calls and awards, and who acts on them; state a car anew when its token has come to me."""
+        match message:
+            case TaskReport() | Itinerary():
+                for won in [won for won in self._unheard_us if self.winners.get(won) == message.sender]:
+                    if isinstance(message, Itinerary) or self.tasks[won][0] == message.task:
+                        del self._unheard_us[won]
+            case CallForProposals() if self._is_for_a_car(message):
+                self._cars_of_calls[message.sender, message.call] = message.car
+                while len(self._cars_of_calls) > MAX_CALLS:
+                    del self._cars_of_calls[next(iter(self._cars_of_calls))]
+            case Award() if message.result is CallResult.AWARDED:
+                car = self._cars_of_calls.get((message.sender, message.call))
+                if car is not None and self._is_news(car, message):
+                    self._unheard_us[car] = now_us
+                    return self.won(car, message.winner, message.task, message.task_version)
+            case TokenGrant() if message.token_kind is TokenKind.CAR and message.holder == self.fleet.node_id:
+                return self._state_anew(custody.car_of(message), message.version)
+        return []
+
+    def _is_for_a_car(self, call: CallForProposals) -> bool:
+        """Whether its winner may fetch a stored car: only a compartment, or a person's station, calls for that."""
+        machine = self.fleet.site.machines.get(call.sender)
+        is_from_whom = machine is None or call.sender in self.fleet.site.compartments
+        return is_from_whom and call.operation in (Operation.PARK, Operation.RETRIEVE)
+
+    def won(self, car: Reference, winner: int, task: Reference, version: int) -> list[Effect]:
+        """``winner`` may fetch a car, or with 0 nobody may, for ``task`` under ``version``."""
+        if winner:
+            self.winners[car] = winner
+            self._say_at_us.pop(car, None)
+        else:
+            self.winners.pop(car, None)
+            self._unheard_us.pop(car, None)
+        self.tasks[car] = task, version
+        return [winner_record(car, winner, task, version)]
+
+    def _is_news(self, car: Reference, award: Award) -> bool:
+        """Whether an award says more than is known; an older version of the same task counts no more."""
+        task, version = self.tasks.get(car, (award.task, 0))
+        if task != award.task or is_newer(award.task_version, version, TASK_VERSION_BITS):
+            return True
+        return award.task_version == version and self.winners.get(car) not in (None, award.winner)
+
+    def review(self, now_us: int) -> list[Effect]:
+        """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
+        effects: list[Effect] = []
+        obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
+        if not (obstacles or forgetful or self._unheard_us or self.fleet.cars_told or self._say_at_us):
+            return effects
+        lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
+        deaf = {car for car, since_us in self._unheard_us.items() if now_us - since_us >= UNHEARD_AFTER_US}
+        of_lost = [car for car, winner in self.winners.items() if winner in lost or car in deaf]
+        for car in of_lost if lost or deaf else []:
+            if car in self.tasks and self._is_untouched(car):
+                task, version = self.tasks[car]
+                effects += self.won(car, NOBODY, task, version)
+                self._say_at_us[car] = now_us
+        forgetful &= set(obstacles)
+        for car, told in list(self.fleet.cars_told.items()):
+            if self.fleet.tokens.holds(car_token(*car)):
+                del self.fleet.cars_told[car]
+                effects += custody.state(self.fleet, car, told.station, told.wheelbase_mm)
+                own = self.fleet.site.compartments.get(self.fleet.node_id)
+                self.left = told if own is not None and told.station == own.number else self.left
+        for car in [car for car, due_us in self._say_at_us.items() if due_us <= now_us]:
+            record = self.fleet.mirror.cars.get(car)
+            gone = record is None or record.station == OUTSIDE
+            if record is None or gone or not self.fleet.tokens.holds(car_token(*car)):
+                del self._say_at_us[car]
+                continue
+            self._say_at_us[car] = now_us + SAY_AGAIN_US
+            given_back = TaskReport(
+                self.fleet.node_id, self.tasks[car][0], TaskPhase.FORFEITED, record.station, Reason.NODE_SILENT
+            )
+            effects.append(Send(given_back))
+        return effects
+
+    def is_given_back(self, car: Reference) -> bool:
+        """Whether the right to fetch a car was taken from a winner that is lost, and not given anew."""
+        return car in self._say_at_us
+
+    def next_wake(self) -> int | None:
+        """When ``review`` has something to do, bus time in us; None where nobody is lost."""
+        obstacles = self.fleet.mirror.obstacles.machines
+        times = list(self._say_at_us.values())
+        waited = [car for car in self._unheard_us if car in self.tasks and self._is_untouched(car)]
+        times += [self._unheard_us[car] + UNHEARD_AFTER_US for car in waited]
+        for car, winner in self.winners.items() if obstacles else ():
+            if winner in obstacles and car in self.tasks and self._is_untouched(car):
+                times.append(obstacles[winner].since_us + patience_us(obstacles[winner]))
+        return min(times, default=None)
+
+    def _is_lost(self, winner: int, now_us: int) -> bool:
+        obstacle = self.fleet.mirror.obstacles.machines.get(winner)
+        return obstacle is not None and now_us - obstacle.since_us >= patience_us(obstacle)
+
+    def _is_untouched(self, car: Reference) -> bool:
+        """Whether I hold the car and its station, and nobody has a right to the front as its winner."""
+        tokens, winner = self.fleet.tokens, self.winners.get(car)
+        station = self.fleet.mirror.car_station(car)
+        if station is None or not tokens.holds(car_token(*car)) or not tokens.holds(station_token(station)):
+            return False
+        obstacle = self.fleet.mirror.obstacles.machines.get(winner or NOBODY)
+        return obstacle is None or station.segment not in obstacle.slots
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """NONE where the token may go to ``requester`` now."""
+        if key.kind is TokenKind.SEGMENT:
+            return self._passing_order(Segment(key.number >> 8, key.number & 0xFF), key, requester, now_us)
+        if key.kind is TokenKind.CAR:
+            car = Reference(key.number >> 16, key.number & 0xFFFF)
+            return Reason.NONE if self.winners.get(car) == requester else Reason.TOKEN_NOT_GRANTABLE_YET
+        # Where a car stands nobody may bring another: only who is to fetch it has anything to do there.
+        cars = custody.others_in(self.fleet.mirror, Station.from_number(key.number))
+        may_enter = all(self.winners.get(car) == requester for car in cars)
+        return Reason.NONE if may_enter else Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def car_statements(self) -> list[Effect]:
+        """Where each car in my custody stands, and which of them have left last: somebody may have missed that."""
+        mine = [one for one in self.fleet.mirror.cars.items() if one[1].custodian == self.fleet.node_id]
+        gone = [one for one in mine if one[1].station == OUTSIDE][-MOST_GONE:]
+        return [
+            Send(CarAt(self.fleet.node_id, car, record.station, record.version, record.wheelbase_mm))
+            for car, record in mine
+            if record.station != OUTSIDE or (car, record) in gone
+        ]
+
+    def _before_taking(self, grant: TokenGrant) -> list[Effect] | None:
+        """A car's place goes to the journal before its token; who brings it has done what it had won.
+
+        Another may have won already to fetch it from there: where the car stands may be known before its token comes.
+        """
+        effects = custody.before_taking(self.fleet, grant)
+        if not effects or grant.token_kind is not TokenKind.CAR:
+            return effects
+        car = custody.car_of(grant)
+        winner = self.winners.get(car, grant.sender)
+        if winner != grant.sender and car in self.tasks:
+            # In the journal a new place stands for a new custody: who may fetch it then is noted behind it.
+            return [*effects, winner_record(car, winner, *self.tasks[car])]
+        self.winners.pop(car, None)
+        self.tasks.pop(car, None)
+        return effects
+
+    def _forget(self, car: Reference) -> None:
+        for table in (self.winners, self.tasks, self._say_at_us, self._unheard_us):
+            table.pop(car, None)
+
+    def _state_anew(self, car: Reference, version: int) -> list[Effect]:
+        """Say where a car stands that came into my custody; again with each repeated grant: my word was lost."""
+        record = self.fleet.mirror.cars.get(car)
+        if record is None or (record.custodian, record.version) != (self.fleet.node_id, version):
+            return []
+        return [Send(CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm))]
+
+    def _passing_order(self, segment: Segment, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Tokens go in the plan's order, as its holder and the requester both see it; without one to the oldest."""
+        claim = self.fleet.petitions.claim(key, requester)
+        if claim is None:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        if claim.itinerary_version == UNORDERED:
+            oldest = self.fleet.petitions.is_oldest_unordered(key, requester, now_us)
+            return Reason.NONE if oldest else Reason.TOKEN_NOT_GRANTABLE_YET
+        order = self.fleet.mirror.order
+        return order.verdict(requester, segment, claim.itinerary_version, claim.predecessor)

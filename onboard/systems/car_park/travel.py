@@ -1,0 +1,484 @@
+"""Driving along a track under authority: ask for segments ahead, order the drive as far as they are held, give back.
+
+The drive's target is always the centre of the last segment of an unbroken line of held ones, so the machine can stop
+inside its authority at any moment; orders are repeated only while ``authorised`` still agrees, and a drive that hears
+nothing brakes by itself.
+
+Into a spur a carrier turns in its mouth, and back into the alley there too. From the beginning of a leg into the spur
+until it is turned back its axis is the spur's, with the mouth at index 0; there it needs both slots before it turns.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from onboard.core.authority import TokenKey, segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import DriveMode, Reason, TokenKind
+from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
+from onboard.core.motion_authority import MotionState, authorised, needs_no_proof
+from onboard.core.serial import successor
+from onboard.core.site import Segment, TrackKind
+from onboard.systems.car_park.axis import TrackAxis
+from onboard.systems.car_park.sill import SillProof
+from onboard.systems.car_park.stall import Stall
+from onboard.ways.all_or_none import AllOrNone
+from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
+from onboard.ways.refuges import refuges
+
+#: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
+#: journal writes and frames. Ours.
+LOOKAHEAD_US = 3_000_000
+#: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us. Ours.
+ORDER_PATIENCE_US = 5_000_000
+#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
+OFF_LIMIT_MM = 20_000
+
+
+@dataclass
+class Carriage:
+    """The carrier of one robot: its sensed position, its drive orders and the segments around it."""
+
+    fleet: Fleet
+    track: int
+    #: As last told by the drive, its position on the axis in hand.
+    sensed: DriveState | None = None
+    goal: Segment | None = None
+    sequence: int = 0
+    target: Segment | None = None
+    refresh_at_us: int | None = None
+    blocked: Segment | None = None
+    stopped: bool = False
+    #: Where the drive was sent, by the order's sequence, since the one that it goes by: whatever the goal is by now.
+    _sent: dict[int, Segment] = field(default_factory=dict)
+    _reported: Segment | None = None
+    _axes: dict[int, TrackAxis] = field(default_factory=dict)
+    #: What ``advance`` looked at when it last found nothing to do.
+    _settled: tuple[object, ...] | None = None
+    #: Where the carrier stood by the last word of its sensors, on which track and after which order.
+    _stood: tuple[DriveState | None, tuple[int, int], Segment | None] | None = None
+    #: Slots behind the goal up to the next refuge, for a way without an agreed order; the robot knows its next legs.
+    way_on: Callable[[], list[Segment]] = list
+    #: Whether nothing stands out of the carrier, by its sensors: it gets no order to move else (row P32).
+    is_clear: Callable[[], bool] = lambda: True
+    whole: AllOrNone = field(init=False)
+    sill: SillProof = field(init=False)
+    stall: Stall = field(default_factory=Stall)
+
+    def __post_init__(self) -> None:
+        self.whole = AllOrNone(self.fleet.tokens)
+        self.sill = SillProof(self.fleet)
+
+    @property
+    def axis(self) -> TrackAxis:
+        """The alley that the carrier is on, or the spur that it is in, turns into or comes out of."""
+        return self._axes.get(self.track) or self._axis_of(self.track)
+
+    def _axis_of(self, track: int) -> TrackAxis:
+        axis = self._axes.get(track)
+        if axis is None:
+            axis = self._axes[track] = TrackAxis(self.fleet.site, track)
+        return axis
+
+    @property
+    def standing_at(self) -> Segment | None:
+        """The position at whose mark the carrier stands still, or None while it moves or stands between marks.
+
+        Both must say so: the measured way, which tells the marks apart, and the fine sensor, which sees one (row P34).
+
+        On a lift's platform it is index 0 or length + 1 of the alley, turned in a spur's mouth index 0 of the spur.
+        """
+        now = (self.track, self.sequence)
+        if self._stood is None or self._stood[0] is not self.sensed or self._stood[1] != now:
+            self._stood = (self.sensed, now, self._mark())
+        return self._stood[2]
+
+    def _mark(self) -> Segment | None:
+        state = self.sensed
+        if state is None or state.mode is not DriveMode.STANDING or not state.at_mark:
+            return None
+        if state.sequence != self.sequence:
+            # It has not taken up the last order yet, and may still go by it.
+            return None
+        index = self.axis.index_at(state.position_mm)
+        off_mm = abs(state.position_mm - self.axis.position_mm(index))
+        return Segment(self.track, index) if off_mm <= MARK_TOLERANCE_MM else None
+
+    @property
+    def nearest(self) -> Segment:
+        """The position with the nearest mark at which a plan can begin. Raises ``ValueError`` where none is known."""
+        if self.sensed is None:
+            raise ValueError("no position is known yet")
+        index = self.axis.index_at(self.sensed.position_mm)
+        return Segment(self.track, index) if index or self.axis.mouth is None else self.axis.mouth
+
+    @property
+    def way_out(self) -> Segment | None:
+        """The alley's position beside the sill that the body is across, where its lift is an obstacle; else None.
+
+        The gate in hand keeps the lift where the body came from: that way it can always leave, and aboard it cannot.
+        """
+        obstacles, site = self.fleet.mirror.obstacles.machines, self.fleet.site
+        here = self.occupied()
+        lifts = {slot.track for slot in here if slot.index == GATE_INDEX and slot.track in site.lifts}
+        if not any(site.stewards[lift] in obstacles for lift in lifts):
+            return None
+        return next((slot for slot in here if slot.track == self.track), None)
+
+    @property
+    def arrived(self) -> bool:
+        """Whether the carrier stands at its goal."""
+        return self.goal is not None and self.standing_at == self.goal
+
+    def ride_to(self, floor: int) -> None:
+        """The platform under the carrier has come to another floor: the same position on another alley."""
+        self.track = floor
+        self._sent.clear()
+        self.goal = None
+        self.target = None
+        self._reported = None
+
+    def occupied(self) -> list[Segment]:
+        """Slots that the body is in now, with the gate where it is across a sill; empty where it is unknown."""
+        if self.sensed is None:
+            return []
+        if self._in_mouth is not None:
+            return [self._in_mouth]
+        half_mm = self.fleet.site.carrier_length_mm // 2
+        position_mm = self.sensed.position_mm
+        return self.axis.overlapped(position_mm - half_mm, position_mm + half_mm)
+
+    @property
+    def _in_mouth(self) -> Segment | None:
+        """The mouth where the carrier stands before it turns, the spur's axis already in hand; else None."""
+        state = self.sensed
+        if state is None or state.across or state.mode is DriveMode.TURNING:
+            return None
+        return self.axis.mouth
+
+    def _placed(self, state: DriveState) -> DriveState | None:
+        """A drive's word on the axis in hand, which is the alley's once it has turned back; None where it fits none."""
+        mouth = self.axis.mouth
+        if mouth is None:
+            return None if state.across else state
+        if state.across:
+            return state
+        if state.mode is DriveMode.TURNING or (self.goal is not None and self.goal.track == self.track):
+            return self._moved_to(state, mouth, Segment(self.track, 0))
+        self.track = mouth.track
+        return state
+
+    def _moved_to(self, state: DriveState, here: Segment, there: Segment) -> DriveState:
+        """The same place, which is ``here`` on one axis, as ``there`` on another."""
+        site = self.fleet.site
+        by_mm = site.position_mm(there) - site.position_mm(here)
+        return replace(state, position_mm=state.position_mm + by_mm)
+
+    def _told_at(self, state: DriveState) -> tuple[Segment, int]:
+        """Position and offset in mm as the fleet is told; index 0 of a spur is turned, or turning, in its mouth."""
+        index = self.axis.index_at(state.position_mm)
+        offset_mm = state.position_mm - self.axis.position_mm(index)
+        return self._in_mouth or Segment(self.track, index), offset_mm
+
+    def sense(self, state: DriveState, now_us: int, itinerary_version: int, leg: int) -> list[Effect]:
+        """Take up the drive's state: tell the fleet when the body is in another segment, starts or stops."""
+        if self._is_far_off(state):
+            self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
+        self.stall.sensed(state.position_mm, now_us)
+        before = self.sensed
+        if before is None:
+            self.sequence = state.sequence
+        self.sensed = placed = self._placed(state)
+        if placed is None:
+            # Turned into some spur, but nobody remembers which.
+            return []
+        here, _ = self._told_at(placed)
+        started_or_stopped = before is None or before.mode is not state.mode
+        if here == self._reported and not started_or_stopped:
+            return []
+        return self.statement(itinerary_version, leg)
+
+    def _is_far_off(self, state: DriveState) -> bool:
+        # One that has turned back out of a spur speaks of the alley's marks already.
+        mouth = self.axis.mouth
+        axis = self.axis if mouth is None or state.across else self._axis_of(mouth.track)
+        return abs(state.position_mm - axis.position_mm(axis.index_at(state.position_mm))) > OFF_LIMIT_MM
+
+    def statement(self, itinerary_version: int, leg: int) -> list[Effect]:
+        """Where the body is, in leg ``leg`` of the itinerary as told; nothing where no position is known.
+
+        A journal that is lost knew the track; the drive alone knows only where on it.
+        """
+        if self.sensed is None or self.fleet.has_no_rights:
+            return []
+        here, offset_mm = self._told_at(self.sensed)
+        self._reported = here
+        progress = Progress(
+            self.fleet.node_id, itinerary_version, leg, here.track, here.index, offset_mm, self.sensed.speed_mm_s
+        )
+        self.fleet.mirror.on_progress(progress)
+        return [Send(progress)]
+
+    def go(self, goal: Segment) -> None:
+        """Set the goal; ``advance`` does the rest."""
+        if goal != self.goal:
+            self.goal = goal
+            self.target = None
+            self.blocked = None
+            if goal not in self.whole.slots:
+                self.whole.end()
+            self._face(goal)
+
+    def stay(self) -> None:
+        """Drop the goal: the drive gets no more orders, and brakes by itself where it moves."""
+        self.goal = self.target = self.blocked = self.refresh_at_us = None
+        self.stall.rests()
+        self.whole.end()
+
+    def _face(self, goal: Segment) -> None:
+        """Take the axis of a goal in hand where that is another one and the carrier is not turned away from it."""
+        if self.sensed is None or goal.track == self.track:
+            return
+        mouth = TrackAxis(self.fleet.site, goal.track).mouth
+        if mouth is not None and mouth.track == self.track:
+            self.sensed = self._moved_to(self.sensed, mouth, Segment(goal.track, 0))
+            self.track = goal.track
+        elif self._in_mouth is not None:
+            self.sensed = self._moved_to(self.sensed, Segment(self.track, 0), self._in_mouth)
+            self.track = goal.track
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Ask for the segments ahead, extend the drive's target as far as they are held, and repeat its order."""
+        due_us = self.next_wake()
+        due = due_us is not None and due_us <= now_us
+        if not due and self._settled == self._outlook():
+            return []
+        effects = self._go_on(now_us)
+        self._settled = None if effects else self._outlook()
+        return effects
+
+    def _outlook(self) -> tuple[object, ...]:
+        """All that decides what is to be done, but the time: each message on the bus asks, and few change anything."""
+        words = [self.sill.word(lift) for lift in self.axis.lifts]
+        clear = self.is_clear()
+        return self.fleet.tokens.changes, self.sensed, self.goal, self.target, self.track, self.stopped, clear, *words
+
+    def _go_on(self, now_us: int) -> list[Effect]:
+        if self.goal is None or self.sensed is None or self.arrived:
+            return self._rest(now_us)
+        if not self.is_clear():
+            self.refresh_at_us = self.target = None
+            self.stall.rests()
+            return []
+        ahead = self._ahead()
+        effects: list[Effect] = []
+        for slot in self.occupied():
+            # Pushed there by hand, or found there after a restart: a body asks for what it is in.
+            effects += self.fleet.tokens.want(segment_token(slot), now_us)
+        effects += self._ask(ahead, now_us) + self._ask_lifts(ahead, now_us)
+        reach, reason = self._reach(ahead)
+        if self.whole.slots and not self.whole.is_complete:
+            reach, reason = None, Reason.NOT_AUTHORISED
+        if reach is None:
+            return effects + self._hold(ahead, reason)
+        if reach != self.target:
+            self.target = reach
+            self.sequence = successor(self.sequence, 8)
+            return [*effects, self._order(now_us)]
+        if self.refresh_at_us is not None and self.refresh_at_us <= now_us:
+            effects.append(self._order(now_us))
+        return effects + self._give_back(now_us)
+
+    def next_wake(self) -> int | None:
+        """When the drive's order is to be repeated, or something is to be done about missing tokens."""
+        asks = self.goal is not None and self.sensed is not None and not self.arrived and self.is_clear()
+        asking = [self.whole.due_us, self._patience_over_us(), self.sill.next_wake()]
+        times = [self.refresh_at_us, *(asking if asks else [])]
+        due = [time for time in times if time is not None]
+        return min(due) if due else None
+
+    def _ask(self, ahead: list[int], now_us: int) -> list[Effect]:
+        """Ask for the segments ahead; all of them to the next refuge where the order of passing cannot be agreed."""
+        over_us = self._patience_over_us()
+        if over_us is not None and over_us <= now_us:
+            self.whole.begin(self._way_to_refuge(ahead), now_us)
+        self.whole.passed(self.occupied())
+        if self.whole.slots:
+            return self.whole.advance(self.occupied(), now_us)
+        effects: list[Effect] = []
+        for slots in self.axis.rights(ahead)[: self._lookahead_segments()]:
+            for slot in slots:
+                effects += self.fleet.tokens.want(segment_token(slot), now_us)
+        return effects
+
+    def _ask_lifts(self, ahead: list[int], now_us: int) -> list[Effect]:
+        """Have the word of the lift at the end of this way while its gate is held; one that is elsewhere waits for us.
+
+        Whoever is on the sill or the platform keeps them: it stands until the lift says that it may go on.
+        """
+        line = {slot for slots in self.axis.rights(ahead) for slot in slots}
+        lifts = [lift for lift in self.axis.lifts if gate(lift) in line]
+        effects = self.sill.ask(lifts, now_us)
+        for lift in lifts:
+            if platform(lift) not in self.occupied():
+                effects += self.sill.refuse(lift, self.track, now_us)
+        return effects
+
+    def _patience_over_us(self) -> int | None:
+        """When to give up agreeing on an order with the holder of a wanted token, or None."""
+        behind = self.fleet.tokens.behind_since_us
+        return min(behind.values()) + ORDER_PATIENCE_US if behind and not self.whole.slots else None
+
+    def _way_to_refuge(self, ahead: list[int]) -> tuple[Segment, ...]:
+        places = refuges(self.fleet.site)
+        way: list[Segment] = []
+        for index in ahead:
+            way.append(self.axis.slot(index))
+            if way[-1] in places and len(way) > 1:
+                return tuple(way)
+        return (*way, *self.way_on())
+
+    def _rest(self, now_us: int) -> list[Effect]:
+        self.refresh_at_us = None
+        if self.sensed is None or self.sensed.mode is not DriveMode.STANDING:
+            return []
+        self.target = None
+        self.stall.rests()
+        self.blocked = None
+        effects: list[Effect] = []
+        for segment in self.occupied():
+            effects += self.fleet.tokens.want(segment_token(segment), now_us)
+        return effects + self._give_back(now_us)
+
+    def _ahead(self) -> list[int]:
+        """Indices from where the body is to the goal, the goal included, in the order of travel."""
+        assert self.goal is not None and self.sensed is not None
+        here = self.axis.index_at(self.sensed.position_mm)
+        # Out of a spur the way on this axis ends in the mouth.
+        there = self.goal.index if self.goal.track == self.track else 0
+        step = 1 if there >= here else -1
+        return list(range(here, there + step, step))
+
+    def _lookahead_segments(self) -> int:
+        axis = self.fleet.site.carrier
+        braking_mm = axis.speed_mm_s**2 // (2 * axis.acceleration_mm_s2)
+        ahead_mm = braking_mm + axis.speed_mm_s * LOOKAHEAD_US // 1_000_000
+        return 2 + -(-ahead_mm // self.fleet.site.tracks[self.track].pitch_mm)
+
+    def _reach(self, ahead: list[int]) -> tuple[Segment | None, Reason]:
+        """The last position of the unbroken authorised line, or None and why not even the first step is allowed."""
+        # Out of a sill, to the side from where the body came, nothing need be proved.
+        is_out = self.goal is not None and self.goal == self.way_out
+        proof = needs_no_proof if is_out else lambda slot: self.sill.lacks(slot, self.track)
+        state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped, proof)
+        for slot in self.occupied():
+            allowed, reason = authorised(state, slot)
+            if not allowed:
+                return None, reason
+        reach = None
+        reason = Reason.NONE
+        blocked = self.fleet.mirror.obstacles.blocked
+        for index, slots in zip(ahead, self.axis.rights(ahead), strict=True):
+            if reach is not None and any(slot in blocked for slot in slots):
+                reason = Reason.IMPOSSIBLE
+                break
+            verdicts = [authorised(state, slot) for slot in slots]
+            reason = next((why for allowed, why in verdicts if not allowed), Reason.NONE)
+            if reason is not Reason.NONE:
+                break
+            reach = Segment(self.track, index)
+        if reach is not None and self._turns_back:
+            return self.goal, reason
+        if reach is None or (reach == self.standing_at and reach != self.goal):
+            return None, reason
+        return reach, reason
+
+    @property
+    def _turns_back(self) -> bool:
+        """Whether the carrier is out of a spur in its mouth, and all that is left is to turn into the alley."""
+        state = self.sensed
+        if state is None or self.goal is None or self.goal.track == self.track:
+            return False
+        off_mm = abs(state.position_mm - self.axis.position_mm(0))
+        return state.mode in (DriveMode.STANDING, DriveMode.TURNING) and off_mm <= MARK_TOLERANCE_MM
+
+    def _hold(self, ahead: list[int], reason: Reason) -> list[Effect]:
+        """Say once for what the machine waits, for whom and why; no order is repeated, so the drive brakes."""
+        self.refresh_at_us = None
+        self.target = None
+        self.stall.rests()
+        tokens = self.fleet.tokens
+        line = [slot for slots in self.axis.rights(ahead) for slot in slots]
+        waits_for = next((slot for slot in line if not tokens.holds(segment_token(slot))), line[0])
+        refused = segment_token(waits_for) in tokens.refused
+        if self.blocked == waits_for or not refused:
+            return []
+        self.blocked = waits_for
+        blocker = tokens.holder_of(segment_token(waits_for))
+        return [Send(Waiting(self.fleet.node_id, waits_for.track, waits_for.index, blocker, reason))]
+
+    def _order(self, now_us: int) -> Effect:
+        assert self.target is not None
+        self._sent[self.sequence] = self.target
+        self.stall.ordered(now_us)
+        self.refresh_at_us = now_us + self.fleet.site.timing.drive_refresh_us
+        site = self.fleet.site
+        position_mm, across = site.position_mm(self.target), site.tracks[self.target.track].kind is TrackKind.SPUR
+        order = DriveOrder(self.fleet.node_id, self.sequence, position_mm, site.carrier.speed_mm_s, across)
+        return Actuate(order)
+
+    def _give_back(self, now_us: int) -> list[Effect]:
+        """Return segments that the body has left and does not need again before its goal.
+
+        Aboard a lift the gate stays: returned, it lets the platform move, and that only a ride may ask for. Else a
+        controller that starts again aboard would take the floor of its journal for the one where it is.
+        """
+        here = self.occupied()
+        tracks = self.fleet.site.tracks
+        gates = [gate(slot.track) for slot in here if tracks[slot.track].kind is TrackKind.LIFT]
+        needed = {*here, *gates, *self.whole.slots, *self._may_come_to()}
+        if self.goal is not None and not self.arrived:
+            needed.update(slot for slots in self.axis.rights(self._ahead()) for slot in slots)
+        effects: list[Effect] = []
+        tokens = self.fleet.tokens
+        for key in [key for key in tokens.wanted if key.kind is TokenKind.SEGMENT]:
+            if _segment(key) not in needed:
+                tokens.forget(key)
+        for key in self._held_segments():
+            segment = _segment(key)
+            steward = self.fleet.site.stewards[segment.track]
+            if segment not in needed and steward != self.fleet.node_id:
+                effects += tokens.give(key, steward, now_us)
+                self.fleet.mirror.order.on_return(self.fleet.node_id, segment)
+        return effects
+
+    def _may_come_to(self) -> set[Segment]:
+        """Slots up to where the drive may still be on its way, and those in which it brakes; none where it stands."""
+        state = self.sensed
+        if state is None or (state.mode is DriveMode.STANDING and state.sequence == self.sequence):
+            self._sent.clear()
+            return set()
+        while state.sequence in self._sent and next(iter(self._sent)) != state.sequence:
+            del self._sent[next(iter(self._sent))]
+        speed_mm_s, limits = state.speed_mm_s, self.fleet.site.carrier
+        braking_mm = speed_mm_s * abs(speed_mm_s) // (2 * limits.acceleration_mm_s2)
+        here, ends = self.axis.index_at(state.position_mm), [self.axis.index_at(state.position_mm + braking_mm)]
+        ends += [sent.index for sent in self._sent.values() if sent.track == self.track]
+        slots: set[Segment] = set()
+        for end in ends:
+            step = 1 if end >= here else -1
+            slots.update(*self.axis.rights(list(range(here, end + step, step))))
+        return slots
+
+    def _held_segments(self) -> list[TokenKey]:
+        tokens = self.fleet.tokens
+        keys = [key for key in tokens.mine() if key.kind is TokenKind.SEGMENT]
+        home = segment_token(self.fleet.machine.home)
+        if home not in tokens.held and tokens.holds(home):
+            keys.append(home)
+        return keys
+
+
+def _segment(key: TokenKey) -> Segment:
+    return Segment(key.number >> 8, key.number & 0xFF)

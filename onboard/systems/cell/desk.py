@@ -1,0 +1,167 @@
+"""The goal manager: turns orders at its counter into goals, calls for each, and hears of completion only.
+
+Rows C03, C05 and C18. It names the parts and is their first custodian: a part's token goes to the main contractor of
+its goal and to nobody else, and comes back when the part lies where it was wanted.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from onboard.core.authority import TokenKey, car_token
+from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.codes import Reason, TaskPhase, TokenKind
+from onboard.core.effects import Effect, Record, Send
+from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import CallTerms, Estimator
+from onboard.core.serial import to_bus_ms
+from onboard.core.site import Machine, Site
+from onboard.systems.cell.contracts import Goal
+from onboard.systems.cell.generation import call_terms
+from onboard.systems.cell.geometry import Point
+from onboard.systems.cell.goal_frames import Hearsay
+from onboard.systems.cell.messages import ArmProgress, OrderAnswer, OrderFrom, OrderResult, OrderTo, PartAt
+from onboard.work.counter import Counter, CounterOrder, OrderState
+
+
+@dataclass
+class Order(CounterOrder):
+    """An order and its goal; the winner is its main contractor."""
+
+    goal: Goal
+    cost: float = field(default=0.0, kw_only=True)
+
+
+@dataclass(frozen=True)
+class DeskFactory:
+    """Makes goal managers."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
+        """Nothing to offer."""
+        return NoEstimator()
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "GoalManager":
+        """The desk's steps."""
+        return GoalManager(fleet)
+
+
+@dataclass
+class GoalManager(Counter[Order]):
+    """One desk of a cell."""
+
+    #: A main contractor is asked how it stands this often, us. Ours.
+    ask_us: ClassVar[int] = 20_000_000
+    #: A goal that nobody can achieve is refused after so many calls of several attempts each. Ours.
+    max_calls: ClassVar[int] = 3
+
+    hearsay: Hearsay = field(default_factory=Hearsay)
+    _half_told: dict[int, OrderFrom] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.fleet.negotiation.is_sound = self.hearsay.is_sound
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Orders at the counter; one that was heard before is only answered."""
+        match message:
+            case OrderFrom():
+                self._half_told[message.order] = message
+            case OrderTo():
+                return self._on_order(message, now_us)
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Offers, and main contractors' reports."""
+        self.hearsay.hear(message)
+        if isinstance(message, CallForProposals):
+            # Who looks for somebody for the rest of a goal does all that it can.
+            self.fleet.winners.works(message.sender, message.call, now_us)
+        if isinstance(message, ArmProgress):
+            self.fleet.winners.works(message.sender, (message.x_mm, message.y_mm, message.arm_phase), now_us)
+        return super().hear(message, now_us)
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """A part goes to the main contractor of its goal."""
+        if key.kind is not TokenKind.CAR:
+            return Reason.NOT_AUTHORISED
+        part = Reference(key.number >> 16, key.number & 0xFFFF)
+        order = next((one for one in self.orders.values() if one.goal.part == part), None)
+        mine = order is not None and order.state is OrderState.IN_HAND and order.winner == requester
+        return Reason.NONE if mine else Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Parts in my custody, and tokens."""
+        effects: list[Effect] = []
+        for order in self.orders.values():
+            if self.fleet.tokens.holds(car_token(*order.goal.part)):
+                place = order.goal.end if order.state is OrderState.DONE else order.goal.start
+                effects.append(Send(PartAt(self.fleet.node_id, order.goal.part, *place, False)))
+        return effects + self.fleet.tokens.statements()
+
+    def _on_order(self, wanted: OrderTo, now_us: int) -> list[Effect]:
+        task = Reference(self.fleet.node_id, wanted.order)
+        if task in self.orders:
+            return self.say(self.orders[task], now_us)
+        begin = self._half_told.pop(wanted.order, None)
+        if begin is None:
+            # The counter says both again until it is answered.
+            return []
+        limit_ms = to_bus_ms(now_us + wanted.within_ms * 1000) if wanted.within_ms else 0
+        start, end = Point(begin.x_mm, begin.y_mm), Point(wanted.x_mm, wanted.y_mm)
+        order = self.orders[task] = Order(task, Goal(task, task, start, end, (), limit_ms))
+        entry: dict[str, str | int] = {"record": "order", "number": task.number, "limit": limit_ms}
+        entry |= {"from_x": start.x_mm, "from_y": start.y_mm, "to_x": end.x_mm, "to_y": end.y_mm}
+        said = Send(PartAt(self.fleet.node_id, task, *start, False))
+        return [Record(entry), *self.say(order, now_us), said]
+
+    # --- the Counter -------------------------------------------------------------------------------------------
+
+    def terms(self, order: Order) -> CallTerms:
+        """A call to robots."""
+        return call_terms(order.goal)
+
+    def may_take_back(self, order: Order) -> bool:
+        """While the part has never left my custody; one that has come back lies where it was wanted."""
+        key = car_token(*order.goal.part)
+        return self.fleet.tokens.holds(key) and key not in self.fleet.tokens.given
+
+    def in_turn(self, waiting: Iterable[Order]) -> Iterable[Order]:
+        """In the order of their deadlines (row C15)."""
+        return sorted(waiting, key=lambda one: one.goal.urgency)
+
+    def on_report(self, order: Order, report: TaskReport, now_us: int) -> list[Effect]:
+        """The main contractor tells that the goal is achieved; all else is between it and its sub-contractors (C18)."""
+        if report.phase is TaskPhase.FORFEITED:
+            return []
+        effects: list[Effect] = []
+        if order.state is not OrderState.IN_HAND and report.phase is not TaskPhase.REFUSED:
+            effects += self.won_unheard(order, report.sender, now_us)
+        if report.phase is TaskPhase.DONE and report.sender == order.winner:
+            effects += self.put(order, OrderState.DONE, now_us)
+        return effects
+
+    def price(self, order: Order) -> None:
+        """As the main contractor offered."""
+        offer = self.hearsay.offer(order.winner, order.goal.task)
+        order.cost = offer.cost if offer is not None else 0.0
+
+    def price_entry(self, order: Order) -> Mapping[str, str | int]:
+        """To the last bit."""
+        return {"cost": order.cost.hex()}
+
+    def noted_price(self, order: Order, entry: Mapping[str, str | int]) -> None:
+        """To the last bit."""
+        order.cost = float.fromhex(str(entry["cost"]))
+
+    def noted_order(self, entry: Mapping[str, str | int]) -> Order:
+        """As it was noted when it came."""
+        task = Reference(self.fleet.node_id, int(entry["number"]))
+        start = Point(int(entry["from_x"]), int(entry["from_y"]))
+        end = Point(int(entry["to_x"]), int(entry["to_y"]))
+        return Order(task, Goal(task, task, start, end, (), int(entry["limit"])))
+
+    def answer(self, order: Order) -> Message:
+        """With the cost."""
+        number, result = order.task.number, OrderResult[order.told]
+        return OrderAnswer(self.fleet.node_id, number, result, round(1000 * order.cost))

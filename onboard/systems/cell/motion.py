@@ -1,0 +1,86 @@
+"""How a robot of the cell goes along a way, and where it may go at all."""
+
+from dataclasses import dataclass
+
+from onboard.core.codes import Reason
+from onboard.core.effects import Actuate, Effect
+from onboard.core.serial import successor
+from onboard.systems.cell.contracts import Arm
+from onboard.systems.cell.geometry import Area, Point, crosses, shortest_way
+from onboard.systems.cell.messages import ArmMode, ArmOrder, ArmState
+
+#: The position sensor tells whole millimetres: a robot on an obstacle's border may seem so far inside.
+ROUNDING_MM = 1
+
+
+def may_go(here: Point, there: Point, arm: Arm, obstacles: tuple[Area, ...]) -> tuple[bool, Reason]:
+    """Whether a straight line may be driven: inside the own area, through no obstacle. Asked before every order."""
+    if not arm.area.contains(there):
+        return False, Reason.NOT_AUTHORISED
+    if any(crosses(here, there, obstacle) for obstacle in obstacles):
+        return False, Reason.NOT_AUTHORISED
+    return True, Reason.NONE
+
+
+def _shrunk(area: Area) -> Area:
+    return Area(area.x0_mm + ROUNDING_MM, area.y0_mm + ROUNDING_MM, area.x1_mm - ROUNDING_MM, area.y1_mm - ROUNDING_MM)
+
+
+@dataclass
+class Driver:
+    """One robot's drive. ``state`` is what its sensor said last; None before it has said anything."""
+
+    arm: Arm
+    obstacles: tuple[Area, ...]
+    refresh_us: int
+    state: ArmState | None = None
+    refresh_at_us: int | None = None
+    _sequence: int = 0
+    _target: Point | None = None
+
+    @property
+    def position(self) -> Point | None:
+        """Where the robot is by its sensor."""
+        return Point(self.state.x_mm, self.state.y_mm) if self.state is not None else None
+
+    def sense(self, state: ArmState) -> None:
+        """What the drive says."""
+        if self.state is None:
+            self._sequence = state.sequence
+        self.state = state
+
+    def stands_at(self, place: Point) -> bool:
+        """Whether the robot has come to rest exactly there."""
+        return self.state is not None and self.state.arm_mode is ArmMode.RESTING and self.position == place
+
+    def go(self, end: Point, now_us: int) -> list[Effect]:
+        """Order the next stretch of the shortest way to ``end`` and keep the order fresh; none where it is closed."""
+        here = self.position
+        if here is None or self.stands_at(end):
+            return self.rest()
+        target = self._target
+        if target is None or self.stands_at(target):
+            way = shortest_way(here, end, self.arm.area, self._obstacles_around(here))
+            if way is None or len(way) < 2:
+                return self.rest()
+            target = way[1]
+        allowed, _ = may_go(here, target, self.arm, self._obstacles_around(here))
+        if not allowed:
+            return self.rest()
+        if target != self._target:
+            self._target = target
+            self._sequence = successor(self._sequence, 8)
+        elif self.refresh_at_us is not None and self.refresh_at_us > now_us:
+            return []
+        self.refresh_at_us = now_us + self.refresh_us
+        return [Actuate(ArmOrder(self.arm.node_id, self._sequence, *target))]
+
+    def _obstacles_around(self, here: Point) -> tuple[Area, ...]:
+        """The obstacles; one on whose border the robot stopped and the sensor's millimetre says inside, a bit less."""
+        return tuple(_shrunk(one) if one.hides(here) else one for one in self.obstacles)
+
+    def rest(self) -> list[Effect]:
+        """No more orders: a drive that hears none stops."""
+        self.refresh_at_us = None
+        self._target = None
+        return []

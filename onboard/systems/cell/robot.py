@@ -1,0 +1,498 @@
+"""A robot of the cell: carries its part of a goal, and is manager of the rest (rows C05 to C07, C15 to C18).
+
+Custody of a part is a token with one holder: who holds it may take the part up, and gives it on when the part lies
+where the contract says, to the sub-contractor and nobody else. A contract in hand is an ``Undertaking``; at most one of
+them is ``active``, the most urgent whose part this robot may take (row C15).
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey, car_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.serial import last_boot, successor
+from onboard.core.site import Machine, Site
+from onboard.systems.cell.contracts import Contract
+from onboard.systems.cell.generation import ArmGeneration, call_terms
+from onboard.systems.cell.geometry import Point
+from onboard.systems.cell.goal_frames import contract_messages
+from onboard.systems.cell.memory import Stage, Undertaking, lost_record, stage_record, undertakings, won_record
+from onboard.systems.cell.messages import (
+    ArmMode,
+    ArmPhase,
+    ArmProgress,
+    ArmState,
+    GripAction,
+    GripMode,
+    GripOrder,
+    GripState,
+    PartAt,
+)
+from onboard.systems.cell.motion import Driver
+from onboard.systems.cell.site import Cell
+
+#: Where a robot is, is told this often while it moves, us (dbc/cell.dbc).
+PROGRESS_US = 2_000_000
+#: A sub-goal that found nobody is called for again after this, us. Ours.
+CALL_AGAIN_US = 5_000_000
+#: A sub-contractor that has the part is asked this often how it stands, us; so a lost word costs time only. Ours.
+ASK_AGAIN_US = 20_000_000
+#: Contracts carried out that are remembered, to say again that they are over.
+MAX_OVER = 32
+
+
+@dataclass(frozen=True)
+class ArmFactory:
+    """Makes robots of a cell."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> ArmGeneration:
+        """The robot's task-generation function."""
+        if not isinstance(site, Cell):
+            raise TypeError("a robot of a cell needs a cell")
+        return ArmGeneration(site, machine, site.arms[machine.node_id].home)
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "ArmRobot":
+        """The robot's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, ArmGeneration):
+            raise TypeError("a robot needs its own task-generation function")
+        return ArmRobot(fleet, estimator)
+
+
+@dataclass
+class ArmRobot:
+    """One robot. ``in_hand`` are its contracts by task, in the order in which it won them."""
+
+    fleet: Fleet
+    generation: ArmGeneration
+    kind: KindCode = KindCode.ARM
+    in_hand: dict[Reference, Undertaking] = field(default_factory=dict)
+    active: Reference | None = None
+    phase: ArmPhase = ArmPhase.IDLE
+    grip: GripState | None = None
+    driver: Driver = field(init=False)
+    over: dict[Reference, int] = field(default_factory=dict)
+    _grip_sequence: int = 0
+    _ordered: GripOrder | None = None
+    _order_again_us: int | None = None
+    _call_at_us: dict[Reference, int] = field(default_factory=dict)
+    _ask_at_us: dict[Reference, int] = field(default_factory=dict)
+    #: Rests of goals whose calls an earlier life made: somebody may have won one.
+    _unsure: set[Reference] = field(default_factory=set)
+    _progress_at_us: int | None = None
+    _told: tuple[ArmPhase, ArmMode] | None = None
+    _table: dict[ArmPhase, Callable[[Undertaking, int], list[Effect]]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        site = self.generation.site
+        self.driver = Driver(self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
+        self.fleet.negotiation.is_sound = self.generation.hearsay.is_sound
+        # Names of goals of an earlier life may still be about.
+        self.generation.number = last_boot(self.fleet.entries) << 8
+        for one in undertakings(self.fleet.entries).values():
+            if one.stage is Stage.OVER:
+                self.over[one.task] = one.manager
+            else:
+                self.in_hand[one.task] = one
+                if one.sub_goal is not None and not one.successor:
+                    self._call_at_us[one.task] = 0
+                    self._unsure.add(one.task)
+        self._engage()
+        self._table = {
+            ArmPhase.TO_PART: self._when_going_there,
+            ArmPhase.TAKING: self._when_taking,
+            ArmPhase.CARRYING: self._when_carrying,
+            ArmPhase.PUTTING: self._when_putting,
+        }
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        if self.driver.state is None or self.grip is None:
+            return MachineState.STARTING
+        return MachineState.IDLE if self.active is None else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """A robot of a cell has no itinerary along tracks."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Nothing moves before the position is sensed."""
+        for one in self.in_hand.values():
+            if one.sub_goal is not None and one.successor:
+                self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Drive and gripper; a change of what the robot does is told."""
+        match message:
+            case ArmState():
+                self.driver.sense(message)
+                if self.driver.position is not None:
+                    self.generation.position = self.driver.position
+            case GripState():
+                if self.grip is None:
+                    self._grip_sequence = message.sequence
+                self.grip = message
+        return self._progress(now_us)
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Goals and offers; sub-contractors' reports; calls and awards for what is in hand already."""
+        self.generation.hearsay.hear(message)
+        match message:
+            case TaskReport():
+                return self._on_report(message, now_us)
+            case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
+                return self._on_award(message)
+            case Award(result=CallResult.AWARDED | CallResult.REJECTED) if message.task in self.in_hand:
+                return self._yield(self.in_hand[message.task], message)
+            case ArmProgress():
+                self.fleet.winners.works(message.sender, (message.x_mm, message.y_mm, message.arm_phase), now_us)
+            case CallForProposals() if message.task in self.in_hand or message.task in self.over:
+                return [self._report(message.task)]
+        return []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """Bids of my own are kept in mind; a contract that is won is journalled before it is told."""
+        match event:
+            case PreAssigned(call_key=key, proposal=proposal):
+                self.generation.promised[key] = proposal.program[0]
+            case Released(call_key=key):
+                self.generation.promised.pop(key, None)
+            case Awarded(call_key=key, proposal=proposal, parts=parts):
+                self.generation.promised.pop(key, None)
+                return self._take_on(proposal.program[0], parts[0].winner if parts else 0, now_us)
+            case Closed():
+                return self._on_closed(event, now_us)
+        return []
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """A part's custody goes to the sub-contractor, once the part lies where it takes over."""
+        if key.kind is not TokenKind.CAR:
+            return Reason.NOT_AUTHORISED
+        one = self._undertaking_of(Reference(key.number >> 16, key.number & 0xFFFF))
+        if one is None or one.stage is not Stage.PUT or one.successor != requester:
+            return Reason.TOKEN_NOT_GRANTABLE_YET
+        return Reason.NONE
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Ask for custody, choose the most urgent part, and take one step for it."""
+        if self.driver.state is None or self.grip is None:
+            return []
+        effects = self._want_parts(now_us) + self._manage(now_us) + self._give_back(now_us)
+        if self.active is None:
+            effects += self._choose(now_us)
+        if self.active is not None:
+            effects += self._table[self.phase](self.in_hand[self.active], now_us)
+        if self._progress_at_us is not None and self._progress_at_us <= now_us:
+            self._told = None
+            effects += self._progress(now_us)
+        return effects
+
+    def next_wake(self) -> int | None:
+        """When an order, a call, a question or a word is due; nothing is before the devices have told how they are."""
+        if self.driver.state is None or self.grip is None:
+            return None
+        times = [self.driver.refresh_at_us, self._order_again_us, self._progress_at_us]
+        times += [*self._call_at_us.values(), *self._ask_at_us.values()]
+        return min((time for time in times if time is not None), default=None)
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """What is in hand and what is over, where I am, parts in my custody, and tokens."""
+        effects: list[Effect] = [self._report(task) for task in (*self.in_hand, *self.over)]
+        self._told = None
+        return effects + self._progress(now_us) + self._parts() + self.fleet.tokens.statements()
+
+    # --- contracts ---------------------------------------------------------------------------------------------
+
+    def _take_on(self, contract: Contract, successor_node: int, now_us: int) -> list[Effect]:
+        goal, via = contract.goal, contract.move.via
+        sub_goal = None if via == goal.end else self.generation.sub_goal(goal, via)
+        one = Undertaking(contract, goal.task.origin, sub_goal, successor=successor_node)
+        self.in_hand[one.task] = one
+        self._engage()
+        if sub_goal is not None and not successor_node:
+            # The option has lapsed: the rest of the goal is called for anew.
+            self._call_at_us[one.task] = now_us
+        said = [Send(message) for message in contract_messages(contract)]
+        return [won_record(one), self._report(one.task), *said]
+
+    def _engage(self) -> None:
+        waiting = (one for one in self.in_hand.values() if one.stage in (Stage.WON, Stage.TAKEN))
+        self.generation.engaged = {one.task: one.contract for one in waiting}
+        self.generation.known = {*self.in_hand, *self.over}
+
+    def _on_award(self, award: Award) -> list[Effect]:
+        """Said again: my word was lost. For a bid that I have forgotten: it is given back."""
+        if award.task in self.in_hand or award.task in self.over:
+            return [self._report(award.task)]
+        if self.fleet.negotiation.knows(award.sender, award.call):
+            return []
+        return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
+
+    def _yield(self, one: Undertaking, award: Award) -> list[Effect]:
+        """Its manager gave to another, or to nobody, what I have not begun: whose part I have not got."""
+        is_mine = one.stage is not Stage.WON or self.fleet.tokens.holds(car_token(*one.contract.goal.part))
+        if is_mine or award.sender != one.manager:
+            return []
+        self.fleet.tokens.forget(car_token(*one.contract.goal.part))
+        effects: list[Effect] = [lost_record(one)]
+        if one.sub_goal is not None and one.successor:
+            effects += self.fleet.winners.let_go(one.sub_goal.task)
+        self._drop(one)
+        return effects
+
+    def _drop(self, one: Undertaking) -> None:
+        del self.in_hand[one.task]
+        for times in (self._ask_at_us, self._call_at_us):
+            times.pop(one.task, None)
+        if one.sub_goal is not None:
+            self.fleet.winners.over(one.sub_goal.task)
+        self._engage()
+
+    def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
+        """A sub-contractor has the goal in hand, or has achieved it: then mine is achieved too (row C18)."""
+        one = next((one for one in self.in_hand.values() if one.sub_goal and one.sub_goal.task == report.task), None)
+        if one is None:
+            return []
+        assert one.sub_goal is not None
+        effects: list[Effect] = []
+        if not one.successor and self._may_claim(one, report, now_us):
+            # It has won a call that I do not remember.
+            one.successor, one.was_heard = report.sender, True
+            self._unsure.discard(one.task)
+            self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
+            effects.append(stage_record(one))
+            self._call_at_us.pop(one.task, None)
+            effects += self._withdraw_call(one, now_us)
+        if report.sender != one.successor:
+            is_claim = report.phase is TaskPhase.AWARDED
+            return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
+        self._ask_at_us.pop(one.task, None)
+        if report.phase is TaskPhase.DONE and report.sender == one.successor and one.stage is Stage.PUT:
+            return [*effects, *self._achieve(one)]
+        return effects
+
+    def _may_claim(self, one: Undertaking, report: TaskReport, now_us: int) -> bool:
+        may_claim = one.task in self._unsure and report.phase is not TaskPhase.FORFEITED
+        return may_claim and self.fleet.winners.may_claim(report.task, report.sender, now_us)
+
+    def _withdraw_call(self, one: Undertaking, now_us: int) -> list[Effect]:
+        """Close the call for the rest of a goal, where one is open."""
+        assert one.sub_goal is not None
+        said = self.fleet.negotiation.withdraw(call_terms(one.sub_goal), now_us)
+        return [item for item in said if not isinstance(item, NegotiationEvent)]
+
+    def _on_closed(self, event: Closed, now_us: int) -> list[Effect]:
+        """A call of mine is over: for an option that rests on no contract nothing follows."""
+        task = event.call.task
+        one = next((one for one in self.in_hand.values() if one.sub_goal and one.sub_goal.task == task), None)
+        if one is None or one.stage is Stage.OVER:
+            return []
+        if event.winner:
+            one.successor, one.was_heard = event.winner, True
+            self._unsure.discard(one.task)
+            self.fleet.winners.takes(task, event.winner, now_us, event.call.call)
+            return [stage_record(one)]
+        if one.successor and event.result is not CallResult.REJECTED:
+            return []
+        one.successor, one.was_heard = 0, False
+        self._call_at_us[one.task] = now_us + CALL_AGAIN_US
+        return [stage_record(one)]
+
+    def _achieve(self, one: Undertaking) -> list[Effect]:
+        one.stage = Stage.OVER
+        self.over[one.task] = one.manager
+        if len(self.over) > MAX_OVER:
+            del self.over[next(iter(self.over))]
+        self._drop(one)
+        return [stage_record(one), self._report(one.task)]
+
+    def _report(self, task: Reference) -> Send:
+        # The manager is told of completion and of nothing before (row C18).
+        phase = TaskPhase.AWARDED if task in self.in_hand else TaskPhase.DONE
+        return Send(TaskReport(self.fleet.node_id, task, phase, 0, Reason.NONE))
+
+    # --- manager of the rest -----------------------------------------------------------------------------------
+
+    def _manage(self, now_us: int) -> list[Effect]:
+        """Call for rests that nobody has, and ask sub-contractors that have had the part for long (row C17)."""
+        effects: list[Effect] = []
+        for task, due_us in list(self._call_at_us.items()):
+            one = self.in_hand.get(task)
+            if one is None or one.sub_goal is None:
+                del self._call_at_us[task]
+            elif due_us <= now_us:
+                del self._call_at_us[task]
+                effects += self.fleet.negotiation.open(call_terms(one.sub_goal), now_us)
+        for task, one in list(self.in_hand.items()):
+            effects += self._take_back(one, now_us)
+            if one.stage is Stage.PUT and one.sub_goal is None:
+                # The controller stopped between putting the part down and saying so.
+                effects += self._achieve(one)
+            if one.stage is not Stage.PUT or not one.successor:
+                self._ask_at_us.pop(task, None)
+                continue
+            due_us = self._ask_at_us.setdefault(task, now_us + ASK_AGAIN_US)
+            if due_us <= now_us:
+                self._ask_at_us[task] = now_us + ASK_AGAIN_US
+                effects.append(Send(SyncRequest(self.fleet.node_id, one.successor)))
+        return effects
+
+    def _take_back(self, one: Undertaking, now_us: int) -> list[Effect]:
+        """A sub-contractor that is lost while its part is in my custody: the rest is called for anew, without it."""
+        if one.sub_goal is None or not self.fleet.tokens.holds(car_token(*one.sub_goal.part)):
+            return []
+        reason = self.fleet.winners.lost(one.sub_goal.task, now_us)
+        # Before the part lies where it is to be taken it has nothing to do but to wait.
+        if reason is Reason.NONE or (reason is Reason.FALSE_STATEMENT and one.stage is not Stage.PUT):
+            return []
+        one.successor, one.was_heard = 0, False
+        self._call_at_us[one.task] = now_us + CALL_AGAIN_US
+        if one.stage is not Stage.WON:
+            self.fleet.winners.blame(one.sub_goal.task, now_us)
+        return [*self.fleet.winners.take_back(one.sub_goal.task, reason, now_us), stage_record(one)]
+
+    # --- custody -----------------------------------------------------------------------------------------------
+
+    def _want_parts(self, now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        for one in self.in_hand.values():
+            if one.stage is Stage.WON:
+                effects += self.fleet.tokens.want(car_token(*one.contract.goal.part), now_us)
+        return effects
+
+    def _give_back(self, now_us: int) -> list[Effect]:
+        """A part that lies at its goal goes back into the custody of the goal manager that named it."""
+        effects: list[Effect] = []
+        wanted = {one.contract.goal.part for one in self.in_hand.values()}
+        for key in self.fleet.tokens.mine():
+            part = Reference(key.number >> 16, key.number & 0xFFFF)
+            if key.kind is TokenKind.CAR and part not in wanted:
+                effects += self.fleet.tokens.give(key, part.origin, now_us)
+        return effects
+
+    def _undertaking_of(self, part: Reference) -> Undertaking | None:
+        return next((one for one in self.in_hand.values() if one.contract.goal.part == part), None)
+
+    def _parts(self) -> list[Effect]:
+        """Where the parts in my custody are."""
+        tokens = self.fleet.tokens
+        mine = (one for one in self.in_hand.values() if tokens.holds(car_token(*one.contract.goal.part)))
+        return [self._part_at(one) for one in mine if one.stage in (Stage.TAKEN, Stage.PUT)]
+
+    def _part_at(self, one: Undertaking) -> Send:
+        aboard = one.stage is Stage.TAKEN
+        place = one.contract.goal.start if aboard else one.contract.move.via
+        return Send(PartAt(self.fleet.node_id, one.contract.goal.part, place.x_mm, place.y_mm, aboard))
+
+    # --- steps -------------------------------------------------------------------------------------------------
+
+    def _choose(self, now_us: int) -> list[Effect]:
+        """The part that is aboard, else the most urgent of those that I may take (row C15)."""
+        ready = [
+            one
+            for one in self.in_hand.values()
+            if one.stage in (Stage.WON, Stage.TAKEN) and self.fleet.tokens.holds(car_token(*one.contract.goal.part))
+        ]
+        if not ready:
+            return self._to(ArmPhase.WAITING if self.in_hand else ArmPhase.IDLE, now_us)
+        one = min(ready, key=lambda one: (one.stage is not Stage.TAKEN, one.contract.goal.urgency))
+        self.active = one.task
+        return self._to(ArmPhase.TO_PART if one.stage is Stage.WON else ArmPhase.TAKING, now_us)
+
+    def _when_going_there(self, one: Undertaking, now_us: int) -> list[Effect]:
+        if not self.driver.stands_at(one.contract.goal.start):
+            return self.driver.go(one.contract.goal.start, now_us)
+        one.stage = Stage.TAKEN
+        self._engage()
+        return [*self.driver.rest(), stage_record(one), *self._to(ArmPhase.TAKING, now_us)]
+
+    def _when_taking(self, one: Undertaking, now_us: int) -> list[Effect]:
+        """The step is journalled before the order: whoever starts again looks into the gripper first."""
+        assert self.grip is not None
+        part = one.contract.goal.part
+        if self.grip.grip_mode is GripMode.HOLDING and self.grip.part == part:
+            return [*self._grip_over(), self._part_at(one), *self._to(ArmPhase.CARRYING, now_us)]
+        if self.grip.grip_mode is GripMode.BUSY:
+            self._order_again_us = None
+            return []
+        if self.driver.stands_at(one.contract.move.via) and self._lies_here():
+            return self._put(one, now_us)
+        if not self.driver.stands_at(one.contract.goal.start):
+            return self.driver.go(one.contract.goal.start, now_us)
+        return self._order(GripAction.TAKE, part, now_us)
+
+    def _when_carrying(self, one: Undertaking, now_us: int) -> list[Effect]:
+        if not self.driver.stands_at(one.contract.move.via):
+            return self.driver.go(one.contract.move.via, now_us)
+        return [*self.driver.rest(), *self._to(ArmPhase.PUTTING, now_us)]
+
+    def _when_putting(self, one: Undertaking, now_us: int) -> list[Effect]:
+        assert self.grip is not None
+        if self.grip.grip_mode is GripMode.OPEN:
+            return self._put(one, now_us)
+        return self._order(GripAction.PUT, one.contract.goal.part, now_us)
+
+    def _lies_here(self) -> bool:
+        """After a restart before the put-down was journalled: the gripper is open where the part is to lie."""
+        return self.grip is not None and self.grip.grip_mode is GripMode.OPEN and self._ordered is None
+
+    def _put(self, one: Undertaking, now_us: int) -> list[Effect]:
+        one.stage = Stage.PUT
+        self.active = None
+        if one.sub_goal is not None and one.successor and one.was_heard:
+            self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
+        self._engage()
+        effects: list[Effect] = [*self._grip_over(), stage_record(one), self._part_at(one)]
+        if one.sub_goal is None:
+            effects += self._achieve(one)
+        return effects
+
+    def _order(self, action: GripAction, part: Reference, now_us: int) -> list[Effect]:
+        """One order, said again every second while it is not obeyed; NOTHING_THERE is tried anew."""
+        assert self.grip is not None
+        failed = self.grip.grip_mode is GripMode.NOTHING_THERE and self.grip.sequence == self._grip_sequence
+        if self._ordered is None or self._ordered.grip_action is not action:
+            self._grip_sequence = successor(self._grip_sequence, 8)
+        elif self._order_again_us is not None and self._order_again_us > now_us:
+            return []
+        elif failed:
+            self._grip_sequence = successor(self._grip_sequence, 8)
+        self._ordered = GripOrder(self.fleet.node_id, self._grip_sequence, action, part)
+        self._order_again_us = now_us + 1_000_000
+        return [Actuate(self._ordered)]
+
+    def _grip_over(self) -> list[Effect]:
+        self._ordered = None
+        self._order_again_us = None
+        return []
+
+    # --- words -------------------------------------------------------------------------------------------------
+
+    def _to(self, phase: ArmPhase, now_us: int) -> list[Effect]:
+        if phase is self.phase:
+            return []
+        self.phase = phase
+        return self._progress(now_us)
+
+    def _progress(self, now_us: int) -> list[Effect]:
+        state = self.driver.state
+        if state is None:
+            return []
+        here = Point(state.x_mm, state.y_mm)
+        told = (self.phase, state.arm_mode)
+        moving = state.arm_mode is ArmMode.GOING
+        due = self._told != told
+        if due:
+            self._told = told
+            self._progress_at_us = now_us + PROGRESS_US if moving else None
+        goal = self.active.number if self.active is not None else 0
+        return [Send(ArmProgress(self.fleet.node_id, *here, self.phase, goal))] if due else []

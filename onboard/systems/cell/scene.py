@@ -1,0 +1,177 @@
+"""The cell's plan: working areas, obstacles, robots and parts, contracts as the ways that their winners will go."""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from typing import TypeVar
+
+from onboard.core.codes import ANY_STATION, TaskPhase
+from onboard.core.messages import Message, Reference, TaskReport
+from onboard.systems.cell.messages import ArmPhase, ArmProgress, GoalEnd, GoalStart, MoveFrom, MoveTo, PartAt
+from onboard.systems.cell.site import Area, Cell
+from onboard.trace.scene.scene import Json, Spot, shape, still
+from onboard.trace.view import SiteView
+
+#: Plan units across the cell, and around it.
+WIDTH, MARGIN = 1000.0, 20.0
+#: Goals and parts that are remembered: the newest.
+MOST_KEPT = 256
+_Key = TypeVar("_Key")
+_Value = TypeVar("_Value")
+_MOVING = (ArmPhase.TO_PART, ArmPhase.CARRYING)
+
+
+@dataclass
+class _Robot:
+    """One robot's last two words on where it is, in mm and us."""
+
+    at: Spot
+    since_us: int = 0
+    phase: ArmPhase = ArmPhase.IDLE
+    speed: Spot = (0.0, 0.0)
+    path: list[list[float]] | None = None
+
+
+class CellScene:
+    """Fed beside ``view``, which knows the calls."""
+
+    noun = "part"
+
+    def __init__(self, site: Cell, view: SiteView) -> None:
+        self.site = site
+        self.view = view
+        areas = [arm.area for arm in site.arms.values()] + list(site.obstacles)
+        self._x0, self._y1 = min(one.x0_mm for one in areas), max(one.y1_mm for one in areas)
+        span_mm = max(one.x1_mm for one in areas) - self._x0
+        self._scale = (WIDTH - 2 * MARGIN) / max(1, span_mm)
+        self._height = 2 * MARGIN + (self._y1 - min(one.y0_mm for one in areas)) * self._scale
+        self._robots = {node: _Robot((float(arm.home.x_mm), float(arm.home.y_mm))) for node, arm in site.arms.items()}
+        self._starts: OrderedDict[tuple[int, int], Spot] = OrderedDict()
+        self._ends: OrderedDict[tuple[int, int], Spot] = OrderedDict()
+        #: What each robot has undertaken: from where, and to where it brings the part, by goal.
+        self._moves: dict[int, dict[tuple[int, int], tuple[Spot, Spot | None]]] = {}
+        self._parts: OrderedDict[Reference, tuple[Spot, int]] = OrderedDict()
+
+    def _spot(self, at: Spot) -> Spot:
+        return MARGIN + (at[0] - self._x0) * self._scale, MARGIN + (self._y1 - at[1]) * self._scale
+
+    def _corners(self, area: Area) -> list[Spot]:
+        return [self._spot((area.x0_mm, area.y1_mm)), self._spot((area.x1_mm, area.y0_mm))]
+
+    def layout(self) -> Json:
+        """Areas by their robots' names, and obstacles."""
+        shapes = [shape(f"a{node}", "area", arm.name, self._corners(arm.area)) for node, arm in self.site.arms.items()]
+        shapes += [
+            shape(f"o{number}", "obstacle", "", self._corners(area)) for number, area in enumerate(self.site.obstacles)
+        ]
+        return {"plan": {"width": WIDTH, "height": self._height, "shapes": shapes}}
+
+    def feed(self, message: Message, time_us: int) -> None:
+        """As in the port."""
+        match message:
+            case ArmProgress() if message.sender in self._robots:
+                self._on_progress(message, time_us)
+            case GoalStart():
+                _keep(self._starts, (message.sender, message.goal), (message.x_mm, message.y_mm))
+            case GoalEnd():
+                _keep(self._ends, (message.sender, message.goal), (message.x_mm, message.y_mm))
+            case PartAt():
+                carrier = message.sender if message.aboard else 0
+                known = self._parts.get(message.part)
+                if known is None or known[1] != carrier:
+                    words = "has taken up" if carrier else "has put down" if known is not None else "has"
+                    self.view.say(time_us, f"{self.view.name(message.sender)} {words} {self.thing(message.part)}")
+                _keep(self._parts, message.part, ((message.x_mm, message.y_mm), carrier))
+            case MoveFrom():
+                moves = self._moves.setdefault(message.sender, {})
+                moves[message.manager, message.goal] = ((message.x_mm, message.y_mm), None)
+            case MoveTo():
+                moves = self._moves.setdefault(message.sender, {})
+                key = (message.manager, message.goal)
+                moves[key] = (moves.get(key, ((message.x_mm, message.y_mm), None))[0], (message.x_mm, message.y_mm))
+            case TaskReport() if message.phase in (TaskPhase.DONE, TaskPhase.REFUSED, TaskPhase.FORFEITED):
+                self._moves.get(message.sender, {}).pop((message.task.origin, message.task.number), None)
+
+    def feed_device(self, node: int, message: Message, time_us: int) -> None:
+        """The fleet bus tells all that is drawn."""
+
+    def _on_progress(self, at: ArmProgress, time_us: int) -> None:
+        """On the way it is taken to go on as from its last word to this one, for as long."""
+        robot, here = self._robots[at.sender], (float(at.x_mm), float(at.y_mm))
+        passed_us = time_us - robot.since_us
+        was_moving, robot.phase = robot.phase in _MOVING, at.arm_phase
+        if here == robot.at and at.arm_phase in _MOVING:
+            robot.path = None
+            robot.since_us = time_us if not was_moving else robot.since_us
+            return
+        step = (here[0] - robot.at[0], here[1] - robot.at[1])
+        robot.at, robot.since_us = here, time_us
+        robot.path = None
+        if at.arm_phase in _MOVING and was_moving and passed_us > 0:
+            ahead = (here[0] + step[0], here[1] + step[1])
+            robot.path = [[*self._whole(here), time_us], [*self._whole(ahead), time_us + passed_us]]
+
+    def _whole(self, at: Spot) -> Spot:
+        x, y = self._spot(at)
+        return round(x, 1), round(y, 1)
+
+    def machine(self, node: int, now_us: int) -> Json:
+        """As in the port."""
+        robot = self._robots.get(node)
+        if robot is None:
+            return {"where": "", "car": None}
+        carried = next((part for part, (_, carrier) in self._parts.items() if carrier == node), None)
+        doing = robot.phase.name.lower().replace("_", " ")
+        told, ahead = [], []
+        for (manager, goal), (start, end) in self._moves.get(node, {}).items():
+            begin = self._starts.get((manager, goal), start)
+            if end is not None:
+                ahead += [list(self._whole(begin)), list(self._whole(end))]
+                told.append([None, f"carries from {_metres(begin)} to {_metres(end)} for {self.view.name(manager)}"])
+        return {
+            "where": f"{_metres(robot.at)}, {doing}",
+            "car": str(carried.number) if carried is not None else None,
+            "path": robot.path if robot.path is not None else still(self._spot(robot.at)),
+            "ahead": ahead,
+            "held": [],
+            "told": told,
+        }
+
+    def marks(self, now_us: int) -> Json:
+        """Parts where they lie, and where those goals end that are no sub-goals."""
+        things: list[Json] = []
+        for part, (at, carrier) in self._parts.items():
+            if not carrier:
+                things.append({"kind": "part", "name": str(part.number), "at": list(self._whole(at))})
+        for (manager, goal), end in self._ends.items():
+            task = self.view.tasks.get(Reference(manager, goal))
+            if (
+                manager in self.site.desks
+                and task is not None
+                and task.phase not in (TaskPhase.DONE, TaskPhase.REFUSED)
+            ):
+                things.append({"kind": "goal", "name": str(goal), "at": list(self._whole(end))})
+        return {"marks": {}, "things": things}
+
+    def thing(self, reference: Reference) -> str:
+        """As in the port."""
+        return f"part {reference.number}"
+
+    def place(self, number: int) -> str:
+        """Goals have points, which calls do not hold."""
+        return "anywhere" if number == ANY_STATION else "its goal"
+
+    def task_end(self, reference: Reference, station: int) -> str:
+        """As in the port."""
+        return f"has brought the part of goal {reference.number}"
+
+
+def _keep(kept: OrderedDict[_Key, _Value], key: _Key, value: _Value) -> None:
+    """The newest at the end; the oldest goes when there are too many."""
+    kept[key] = value
+    kept.move_to_end(key)
+    if len(kept) > MOST_KEPT:
+        kept.popitem(last=False)
+
+
+def _metres(at: Spot) -> str:
+    return f"({at[0] / 1000:.1f}, {at[1] / 1000:.1f}) m"

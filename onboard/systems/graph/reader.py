@@ -1,0 +1,154 @@
+"""The site file of a factory graph; docs/graph.md describes every key."""
+
+from dataclasses import replace
+from itertools import count, pairwise
+from typing import TYPE_CHECKING, Any
+
+from onboard.config.constants import read_timing
+from onboard.config.machines import Fleet
+from onboard.config.reader import Table
+from onboard.core.codes import KindCode, Side
+from onboard.core.site import Segment, Station
+from onboard.systems.graph.site import MAX_CAPACITY, MAX_NODE, MAX_STOPS, FactoryGraph, Graph, Order, Rules, edge
+
+if TYPE_CHECKING:
+    from onboard.config.systems import Common
+
+_NOWHERE = Segment(0, 0)
+#: Longest edge, mm.
+MAX_LENGTH_MM = 60_000
+
+
+def read_graph(root: Table, common: "Common") -> FactoryGraph:
+    """Edges, rules, hosts of node agents, robots, desks, and the orders that a run of the site brings."""
+    table = root.table("graph", required=True)
+    edges = _edges(table)
+    graph = Graph({edge(one, other): length for one, other, length in edges})
+    rules = Rules(table.choice("rules", [one.value for one in Rules], Rules.EDGE_AND_NODE.value))
+    capacity = table.integer("capacity", 1, MAX_CAPACITY, 4)
+    speed_mm_s = table.integer("speed_mm_s", 50, 5_000, 1_000)
+    approach_mm = table.integer("approach_mm", 100, 20_000, 1_500)
+    if edges and approach_mm >= min(length for _, _, length in edges):
+        table.bad("approach_mm", approach_mm, "not shorter than every edge", "put the sensor nearer to the node")
+    fleet = Fleet()
+    hosts = _read_hosts(root, fleet, graph)
+    for one in root.tables("desks"):
+        fleet.add(one, KindCode.DESK, _NOWHERE)
+    _read_robots(root, fleet, graph, capacity)
+    for name, words in (("robots", "robot"), ("desks", "order desk"), ("hosts", "host of node agents")):
+        if not root.values.get(name):
+            root.bad(name, None, f"no {words}", f"add at least one [[{name}]] table")
+    orders = tuple(order for one in root.tables("orders") if (order := _order(one, fleet, graph)) is not None)
+    robots = sum(1 for one in fleet.by_node.values() if one.kind is KindCode.VEHICLE)
+    timing = read_timing(root.table("timing"), max(1, robots), len(fleet.by_node), common.bitrate)
+    return FactoryGraph(
+        name=common.name,
+        digest=0,
+        bitrate=common.bitrate,
+        machines=dict(sorted(fleet.by_node.items())),
+        timing=replace(timing),
+        stewards=hosts,
+        edges=edges,
+        rules=rules,
+        capacity=capacity,
+        hosts=hosts,
+        speed_mm_s=speed_mm_s,
+        approach_mm=approach_mm,
+        load_ms=table.integer("load_ms", 0, 600_000, 5_000),
+        orders=orders,
+    )
+
+
+def _edges(table: Table) -> tuple[tuple[int, int, int], ...]:
+    form = f"[node, node, length in mm], nodes 0 to {MAX_NODE}, lengths 200 to {MAX_LENGTH_MM}"
+    found: dict[tuple[int, int], int] = {}
+    for number, value in enumerate(table.items("edges", f"a list of {form}") or ()):
+        good = isinstance(value, list) and len(value) == 3 and all(type(one) is int for one in value)
+        if not good or not (min(value[:2]) >= 0 and max(value[:2]) <= MAX_NODE and 200 <= value[2] <= MAX_LENGTH_MM):
+            table.bad("edges", value, "not an edge", f"write {form}", item=number)
+        elif value[0] == value[1]:
+            table.bad("edges", value, "from a node to itself", "join two different nodes", item=number)
+        elif edge(value[0], value[1]) in found:
+            table.bad("edges", value, "joined already", "write each edge once", item=number)
+        else:
+            found[edge(value[0], value[1])] = value[2]
+    if not found and "edges" not in table.wrong:
+        table.bad("edges", None, "missing", f"write a list of {form}")
+    _check_edges(table, Graph(found))
+    return tuple((*ends, length) for ends, length in sorted(found.items()))
+
+
+def _check_edges(table: Table, graph: Graph) -> None:
+    """That no node is a dead end (row G02), and that every node can be reached from every other."""
+    if not graph.lengths_mm or "edges" in table.wrong:
+        return
+    for node in graph.dead_ends:
+        table.bad("edges", node, "a node with one edge", "give it another: robots do not reverse, so none comes out")
+    reached, left = set(graph.nodes[:1]), [graph.nodes[0]]
+    while left:
+        news = [after for after in graph.neighbours[left.pop()] if after not in reached]
+        reached.update(news)
+        left += news
+    if lost := sorted(set(graph.nodes) - reached):
+        table.bad("edges", lost[0], f"cannot be reached from node {graph.nodes[0]}", "join them by an edge")
+
+
+def _read_hosts(root: Table, fleet: Fleet, graph: Graph) -> dict[int, int]:
+    """Which machine hosts the agent of which node; one may host many, and each node has one."""
+    hosts: dict[int, int] = {}
+    for table in root.tables("hosts"):
+        before = set(fleet.by_node)
+        fleet.add(table, KindCode.NODE, _NOWHERE)
+        added = set(fleet.by_node) - before
+        for number, node in enumerate(table.items("nodes", "a list of nodes of the graph") or ()):
+            if not _is_node(node, graph):
+                table.bad("nodes", node, "no node of the graph", _some_nodes(graph), item=number)
+            elif node in hosts:
+                table.bad("nodes", node, "hosted already", "name each node at one host", item=number)
+            elif added:
+                hosts[node] = min(added)
+    homeless = [node for node in graph.nodes if node not in hosts]
+    if homeless and root.values.get("hosts") and not root.problems.found:
+        root.bad("hosts", homeless[0], "a node without host", "name it in the nodes of one of the [[hosts]]")
+    return hosts
+
+
+def _read_robots(root: Table, fleet: Fleet, graph: Graph, capacity: int) -> None:
+    slots = {node: count(1) for node in graph.nodes}
+    for table in root.tables("robots"):
+        at = table.integer("at", 0, MAX_NODE)
+        if "at" not in table.wrong and graph.nodes and not _is_node(at, graph):
+            table.bad("at", at, "no node of the graph", _some_nodes(graph))
+        slot = next(slots[at]) if at in slots else 1
+        if slot > capacity:
+            table.bad("at", at, f"node with {capacity} robots already", "let it start elsewhere, or raise capacity")
+        fleet.add(table, KindCode.VEHICLE, Segment(at, slot), Station(at, slot, Side.NEAR))
+
+
+def _order(table: Table, fleet: Fleet, graph: Graph) -> Order | None:
+    at_ms = table.integer("at_s", 0, 86_400, 0) * 1000
+    stops = table.items("visit", "a list of nodes of the graph")
+    name = table.text("robot", "any")
+    robot = fleet.by_name.get(name)
+    if name != "any" and (robot is None or robot.kind is not KindCode.VEHICLE):
+        table.bad("robot", name, "no robot of this name", 'write the name of a robot, or "any"')
+    words = f"write 1 to {MAX_STOPS} nodes of the graph, no two alike in a row"
+    if stops is None or not 1 <= len(stops) <= MAX_STOPS:
+        table.bad("visit", stops, "not a list of stops", words)
+        return None
+    for number, node in enumerate(stops):
+        if not _is_node(node, graph):
+            table.bad("visit", node, "no node of the graph", _some_nodes(graph), item=number)
+    if any(one == other for one, other in pairwise(stops)):
+        table.bad("visit", stops, "a stop twice in a row", words)
+    if name == "any" and len(stops) != 2:
+        table.bad("visit", stops, "not from where and to where", "an order for any robot has two stops")
+    return Order(at_ms, 0 if robot is None else robot.node_id, tuple(stops))
+
+
+def _is_node(value: Any, graph: Graph) -> bool:
+    return type(value) is int and value in graph.neighbours
+
+
+def _some_nodes(graph: Graph) -> str:
+    return f"nodes of this graph are {', '.join(str(node) for node in graph.nodes[:12])}"

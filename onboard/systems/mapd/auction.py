@@ -1,0 +1,81 @@
+"""What a task costs a robot, and who wins which: the rule that all robots share, and no central step.
+
+Every robot bids for every task that nobody has picked up yet, also for what another was awarded (re-auction of
+untouched tasks) and also while it still carries something (it then counts from where and when it will be free). The
+lowest bid of all wins first: it is the one that speaks soonest (design, section 4), and its robot then falls silent.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from onboard.systems.mapd.floor import FAR, Floor
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Take what is in cell ``pickup`` to cell ``delivery``; known from step ``release`` on."""
+
+    number: int
+    release: int
+    pickup: int
+    delivery: int
+
+
+@dataclass(frozen=True, slots=True)
+class Offer:
+    """Where a robot will be free, and in how many steps from now."""
+
+    robot: int
+    cell: int
+    steps: int
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """Weights of a bid, in hundredths of a step for each step; the bid is an integer and ties go to lower numbers."""
+
+    wait: int = 100
+    empty: int = 100
+    loaded: int = 50
+
+
+def cost(floor: Floor, rule: Rule, offer: Offer, task: Task) -> int | None:
+    """The bid for one task; None where no way leads.
+
+    Steps until the robot is free, steps to the pick-up and steps with the load: by the added service time of all who
+    wait, the shortest work goes first (Smith's rule, 1956).
+    """
+    empty = floor.steps_to(task.pickup)[offer.cell]
+    loaded = floor.steps_to(task.delivery)[task.pickup]
+    if empty >= FAR or loaded >= FAR:
+        return None
+    return rule.wait * offer.steps + rule.empty * empty + rule.loaded * loaded
+
+
+def winners(floor: Floor, rule: Rule, offers: Sequence[Offer], tasks: Sequence[Task]) -> dict[int, tuple[Task, int]]:
+    """Task and bid that each robot wins, by robot: lowest bid first, then lower robot, then lower task."""
+    bids: dict[int, list[tuple[int, int, int]]] = {}
+    by_number: Mapping[int, Task] = {task.number: task for task in tasks}
+    for offer in offers:
+        own = []
+        for task in tasks:
+            bid = cost(floor, rule, offer, task)
+            if bid is not None:
+                own.append((bid, task.number))
+        own.sort(reverse=True)
+        bids[offer.robot] = [(bid, offer.robot, number) for bid, number in own]
+    won: dict[int, tuple[Task, int]] = {}
+    gone: set[int] = set()
+    while bids:
+        for robot in list(bids):
+            while bids[robot] and bids[robot][-1][2] in gone:
+                bids[robot].pop()
+            if not bids[robot]:
+                del bids[robot]
+        if not bids:
+            break
+        bid, robot, number = min(left[-1] for left in bids.values())
+        won[robot] = (by_number[number], bid)
+        gone.add(number)
+        del bids[robot]
+    return won

@@ -1,0 +1,252 @@
+"""The order desk: calls for tasks, opens a round when all have come to a step, and closes it with one award a change.
+
+It decides nothing: of two bids for a task the lower one counts, and who bids what is each robot's own affair. What it
+told of a step it has written down before, so that a desk that starts again tells the same.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Plain
+from onboard.core.codes import KindCode, MachineState, Reason
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.messages import Message, SyncRequest
+from onboard.core.negotiation.winners import STANDS_AFTER_US
+from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.bidding import Tally
+from onboard.systems.mapd.knowledge import Knowledge
+from onboard.systems.mapd.messages import (
+    NO_TASK,
+    PathHead,
+    PathMoves,
+    StepAward,
+    StepRound,
+    StepState,
+    TransportAnswer,
+    TransportBid,
+    TransportCall,
+    TransportKey,
+    TransportResult,
+)
+from onboard.systems.mapd.rights import resource_of
+from onboard.systems.mapd.site import Mapd
+
+#: Robots that are missed are asked this long after the step could have begun, and again after as long, us. Ours.
+ASK_US = 500_000
+ASK_AT_ONCE = 3
+#: What was just said is not said again for another who asks, us. Ours.
+SAID_US = 100_000
+_LOW = 1 << 16
+
+
+@dataclass
+class OrderDesk(Plain):
+    """One desk. ``step`` is the next to be opened, or the one whose round is open (``tally``)."""
+
+    kind: KindCode = KindCode.DESK
+    step: int = 0
+    round: StepRound | None = None
+    awards: list[StepAward] = field(default_factory=list)
+    tally: Tally | None = None
+    #: Tasks that were ordered and not served, by number, with the step from which on they are to be called for.
+    orders: dict[int, Task] = field(default_factory=dict)
+    served: set[int] = field(default_factory=set)
+    _attempt: int = 0
+    _due_us: int = 0
+    _changed: bool = True
+    _told_us: int | None = None
+    #: Since when robots are missed at the step to which all have to come.
+    _missed_us: int | None = None
+    _close_us: int | None = None
+
+    def __post_init__(self) -> None:
+        site = self.fleet.site
+        assert isinstance(site, Mapd)
+        self.site = site
+        self.knowledge = Knowledge(site.floor, site.robots, 0)
+        self._replay(self.fleet.entries)
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Orders at the counter."""
+        return self._on_key(message) if isinstance(message, TransportKey) else []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Where robots are and what they carry, what they bid, and their paths: a right is given by those."""
+        match message:
+            case TransportBid() if not self.knowledge.is_possible(message):
+                # Nobody is nearer than where it is.
+                self.fleet.drops[Reason.FALSE_STATEMENT] += 1
+            case TransportBid() if message.sender in self.site.homes:
+                if self.tally is not None:
+                    self.tally.hear(message)
+            case StepState():
+                self.fleet.winners.works(message.sender, message.step, now_us)
+                return self._on_state(message)
+            case PathHead():
+                self.knowledge.on_head(message)
+            case PathMoves():
+                self.knowledge.on_moves(message)
+        return []
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """A cell that no robot has had yet goes to whoever is there first by the paths."""
+        user = self.knowledge.next_user(resource_of(key))
+        if user == requester:
+            return Reason.NONE
+        return Reason.MIRROR_BEHIND if user is None else Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Close the round that is over, open the step to which all have come."""
+        self.state = MachineState.WORKING if self.orders else MachineState.IDLE
+        if self.tally is not None:
+            if self._close_us is None or now_us < self._close_us:
+                return []
+            return self._close(self.tally)
+        if now_us < self._due_us:
+            return []
+        missing = self.knowledge.behind(self.step)
+        if missing:
+            self._missed_us = now_us if self._missed_us is None else self._missed_us
+            if now_us - self._missed_us >= STANDS_AFTER_US:
+                # All go in step: who comes to none stops the whole floor, and only a person can help.
+                for node in missing:
+                    self.fleet.winners.blame_node(node, now_us)
+            self._due_us = now_us + ASK_US
+            asked = dict.fromkeys([*self.knowledge.pathless(), *missing])
+            return [Send(SyncRequest(self.fleet.node_id, node)) for node in list(asked)[:ASK_AT_ONCE]]
+        self._missed_us = None
+        return self._open(now_us)
+
+    def next_wake(self) -> int | None:
+        """The end of a round, the next step, or the next question."""
+        return self._close_us if self.tally is not None else self._due_us
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """All calls that stand or are under way, and the last round with its awards."""
+        if self._told_us is not None and now_us < self._told_us + SAID_US:
+            return []
+        self._told_us = now_us
+        effects: list[Effect] = [self._call(task) for _, task in sorted(self.knowledge.tasks.items())]
+        if self.round is not None:
+            effects.append(Send(self.round))
+        return effects + [Send(award) for award in self.awards]
+
+    # --- orders ------------------------------------------------------------------------------------------------
+
+    def _on_key(self, key: TransportKey) -> list[Effect]:
+        if key.task in self.served:
+            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.DONE))]
+        answer = Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.RECEIVED))
+        if key.task in self.orders:
+            return [answer]
+        floor = self.site.floor
+        if max(key.pickup, key.delivery) >= floor.size:
+            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.REFUSED))]
+        release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
+        task = Task(key.task, release, key.pickup, key.delivery)
+        self.orders[key.task] = task
+        cells = {"pickup": task.pickup, "delivery": task.delivery, "release": task.release}
+        return [Record({"record": "transport", "task": key.task, **cells}), answer]
+
+    def _on_state(self, state: StepState) -> list[Effect]:
+        before = self.knowledge.loads.get(state.sender)
+        if not self.knowledge.on_state(state):
+            return []
+        self._changed |= state.served or self.knowledge.loads.get(state.sender) != before
+        return self._serve(state.task) if state.served and state.task in self.orders else []
+
+    def _serve(self, task: int) -> list[Effect]:
+        """A robot had it aboard and has it no more."""
+        self.orders.pop(task, None)
+        self.served.add(task)
+        answer = Actuate(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
+        return [Record({"record": "served", "task": task}), answer]
+
+    def _call(self, task: Task) -> Effect:
+        return Send(TransportCall(self.fleet.node_id, task.number, task.pickup, task.delivery))
+
+    # --- rounds ------------------------------------------------------------------------------------------------
+
+    def _open(self, now_us: int) -> list[Effect]:
+        """Call for what is due, and for bids where anything has changed or somebody has nothing to do."""
+        fresh = [task for task in self.orders.values() if task.release <= self.step]
+        fresh = [task for task in fresh if task.number not in self.knowledge.tasks]
+        for task in fresh:
+            self.knowledge.tasks[task.number] = task
+        idle = any(self.knowledge.task_of(robot) == NO_TASK for robot in self.site.robots)
+        bidding = bool(fresh) or self._changed or idle
+        self._changed = False
+        me, step, count = self.fleet.node_id, self.step, len(self.knowledge.open_tasks)
+        self.round = StepRound(me, step, count, self._attempt, bidding)
+        self.awards = []
+        self._due_us = now_us + self.site.step_us
+        record = Record({"record": "round", "step": step, "bidding": int(bidding), "open": count})
+        if bidding:
+            self.tally = Tally(step, self._attempt)
+            self._close_us = now_us + self.site.bid_window_us
+        else:
+            self.step += 1
+        return [record, *(self._call(task) for task in sorted(fresh, key=lambda one: one.number)), Send(self.round)]
+
+    def _close(self, tally: Tally) -> list[Effect]:
+        """Everybody keeps what it bid best for; those for whom that is a change are told, and plan in this order.
+
+        First who lost its task or must make room, then who won, lower bids first.
+        """
+        won = tally.winners()
+        changed = []
+        idle = []
+        for robot in self.site.robots:
+            if robot in self.knowledge.loads:
+                continue
+            before = self.knowledge.task_of(robot)
+            task, bid = won.get(robot, (NO_TASK, 0))
+            if task not in (NO_TASK, before):
+                changed.append((bid, robot, task))
+            elif task == NO_TASK and (before != NO_TASK or robot in tally.yielding):
+                idle.append((robot, NO_TASK))
+        order = idle + [(robot, task) for _, robot, task in sorted(changed)]
+        me, step = self.fleet.node_id, self.step
+        self.awards = [
+            StepAward(me, step, index, len(order), robot, task) for index, (robot, task) in enumerate(order)
+        ] or [StepAward(me, step, 0, 0, 0, NO_TASK)]
+        self.tally = self._close_us = None
+        self.step += 1
+        told = " ".join(f"{robot}:{task}" for robot, task in order)
+        return [Record({"record": "awards", "step": step, "changes": told}), *(Send(award) for award in self.awards)]
+
+    # --- power-up ----------------------------------------------------------------------------------------------
+
+    def _replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+        """What was ordered, served and told, oldest entry first."""
+        me, told = self.fleet.node_id, None
+        for entry in entries:
+            match entry.get("record"):
+                case "boot":
+                    self._attempt = int(entry["boot"])
+                case "transport":
+                    number = int(entry["task"])
+                    cells = int(entry["pickup"]), int(entry["delivery"])
+                    self.orders[number] = Task(number, int(entry["release"]), *cells)
+                case "served":
+                    self.orders.pop(int(entry["task"]), None)
+                    self.served.add(int(entry["task"]))
+                case "round":
+                    step, bidding = int(entry["step"]), bool(entry["bidding"])
+                    self.round, told = StepRound(me, step, int(entry["open"]), self._attempt, bidding), None
+                    self.step = step + (not bidding)
+                case "awards":
+                    told, self.step = entry, int(entry["step"]) + 1
+        if self.round is not None and self.step > self.round.step and told is not None:
+            pairs = [tuple(map(int, one.split(":"))) for one in str(told["changes"]).split()]
+            self.awards = [
+                StepAward(me, self.round.step, index, len(pairs), robot, task)
+                for index, (robot, task) in enumerate(pairs)
+            ] or [StepAward(me, self.round.step, 0, 0, 0, NO_TASK)]
+        # Tasks that were called for before are known from their release; the next round brings those of its own step.
+        for number, task in self.orders.items():
+            if self.round is not None and task.release <= self.round.step:
+                self.knowledge.tasks[number] = task

@@ -1,0 +1,187 @@
+"""What every machine of the site knows: tasks not yet served, where each robot is, its task, its path.
+
+Made of frames alone, so that all have the same once all have heard all frames of a step.
+"""
+
+from dataclasses import dataclass, field
+
+from onboard.core.serial import is_newer
+from onboard.systems.mapd.auction import Rule, Task
+from onboard.systems.mapd.floor import Floor
+from onboard.systems.mapd.messages import NO_TASK, PathHead, PathMoves, StepState, TransportBid, TransportCall
+from onboard.systems.mapd.moves import Assembly
+from onboard.systems.mapd.paths import Path, Paths
+
+#: The weights that all robots bid by, unless they are told others.
+PLAIN = Rule()
+
+
+@dataclass
+class Knowledge:
+    """``robots`` are the node-IDs of all robots; ``me`` is left out of what is asked for, 0 for a desk.
+
+    ``states`` is the last word of each robot on its step; ``loads`` the tasks aboard, by robot.
+    """
+
+    floor: Floor
+    robots: tuple[int, ...]
+    me: int
+    states: dict[int, StepState] = field(default_factory=dict)
+    tasks: dict[int, Task] = field(default_factory=dict)
+    loads: dict[int, int] = field(default_factory=dict)
+    #: Tasks that their robots stand beside with their new paths: theirs before they have come to another step.
+    taken: dict[int, int] = field(default_factory=dict)
+    paths: Paths = field(init=False)
+    #: Step at which each robot's path as known begins, its version, and whether it said that it kept its former one.
+    heads: dict[int, PathHead] = field(default_factory=dict)
+    #: Complete paths that do not go with another's as known: mine or the other's is old.
+    unfit: dict[int, tuple[PathHead, Path]] = field(default_factory=dict)
+    _parts: dict[int, Assembly] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.paths = Paths(self.floor.resources)
+
+    # --- tasks and steps ---------------------------------------------------------------------------------------
+
+    def on_call(self, call: TransportCall) -> None:
+        """A task is called for, or told again."""
+        if call.task not in self.tasks and max(call.pickup, call.delivery) < self.floor.size:
+            self.tasks[call.task] = Task(call.task, 0, call.pickup, call.delivery)
+
+    def on_state(self, state: StepState) -> bool:
+        """A robot's word; True where it is news."""
+        known = self.states.get(state.sender)
+        if state.sender not in self.robots or (known is not None and (state.step < known.step or state == known)):
+            return False
+        if known is not None and state.step > known.step:
+            self.taken.pop(state.sender, None)
+        self.states[state.sender] = state
+        self.loads.pop(state.sender, None)
+        if state.served:
+            self.tasks.pop(state.task, None)
+        elif state.loaded:
+            self.loads[state.sender] = state.task
+        return True
+
+    def is_possible(self, bid: TransportBid, rule: Rule = PLAIN) -> bool:
+        """Whether a bid is no lower than the way from where its robot is; of what is not known yet any is."""
+        state, task = self.states.get(bid.sender), self.tasks.get(bid.task)
+        if state is None or task is None:
+            return True
+        if state.cell >= self.floor.size:
+            return False
+        empty, loaded = self.floor.steps_to(task.pickup)[state.cell], self.floor.steps_to(task.delivery)[task.pickup]
+        return bid.cost >= min(rule.wait, rule.empty) * empty + rule.loaded * loaded
+
+    def task_of(self, robot: int) -> int:
+        """The task that a robot has by its last word, ``NO_TASK`` for none."""
+        state = self.states.get(robot)
+        return NO_TASK if state is None or state.served else state.task
+
+    @property
+    def open_tasks(self) -> list[Task]:
+        """Tasks that nobody has picked up, lowest number first."""
+        gone = {*self.loads.values(), *self.taken.values()}
+        return [task for number, task in sorted(self.tasks.items()) if number not in gone]
+
+    @property
+    def wanted_cells(self) -> set[int]:
+        """Where somebody has to pick up or deliver."""
+        cells = {task.delivery for task in self.tasks.values()}
+        return cells | {task.pickup for task in self.open_tasks}
+
+    def forget_open(self) -> None:
+        """Forget tasks that nobody has aboard: the desk says again which there are."""
+        aboard = set(self.loads.values())
+        self.tasks = {number: task for number, task in self.tasks.items() if number in aboard}
+
+    def behind(self, step: int) -> list[int]:
+        """Robots that have not been heard to have come to a step."""
+        states = self.states
+        return [
+            robot for robot in self.robots if robot != self.me and (robot not in states or states[robot].step < step)
+        ]
+
+    # --- paths -------------------------------------------------------------------------------------------------
+
+    def on_head(self, head: PathHead) -> bool:
+        """A path begins to be told; True where it is complete already and new."""
+        known = self.heads.get(head.sender)
+        if head.sender not in self.robots or (known is not None and not _is_newer_path(head, known)):
+            return False
+        begun = self._parts.get(head.sender)
+        if begun is None or begun.head != head:
+            self._parts[head.sender] = Assembly(head)
+        return self._complete(head.sender)
+
+    def on_moves(self, moves: PathMoves) -> bool:
+        """A part of it; True where the path is complete now."""
+        begun = self._parts.get(moves.sender)
+        if begun is None:
+            return False
+        begun.take(moves)
+        return self._complete(moves.sender)
+
+    def put(self, head: PathHead, path: Path) -> None:
+        """Take a path up in place of the robot's former one; one that does not fit waits until others are known."""
+        before = self.paths.take(head.sender)
+        self.heads[head.sender] = head
+        self.unfit.pop(head.sender, None)
+        try:
+            self.paths.put(head.sender, path)
+        except ValueError:
+            self.unfit[head.sender] = (head, path)
+        if before is not None or self.unfit:
+            self._fit_again()
+
+    def _complete(self, robot: int) -> bool:
+        begun = self._parts[robot]
+        path = begun.path(self.floor)
+        if path is None:
+            return False
+        del self._parts[robot]
+        self.put(begun.head, path)
+        return True
+
+    def _fit_again(self) -> None:
+        for robot, (_, path) in list(self.unfit.items()):
+            try:
+                self.paths.put(robot, path)
+            except ValueError:
+                continue
+            del self.unfit[robot]
+
+    def pathless(self) -> list[int]:
+        """Robots to ask for their path: first those that leave no room for one that was told, whose own may be old.
+
+        Then those whose path is not known, or does not fit to the others'.
+        """
+        in_the_way: set[int | None] = set()
+        for _, path in self.unfit.values():
+            in_the_way |= {self.paths.holder(cell, step) for step, cell in path.steps()}
+            in_the_way |= {self.paths.holder(path.rest, step) for step in range(path.end, self.paths.horizon + 1)}
+        others = [robot for robot in self.robots if robot in in_the_way and robot != self.me]
+        return [*others, *(robot for robot in self.robots if robot not in self.paths.by_robot)]
+
+    def next_user(self, resource: int, leaving: int = 0) -> int | None:
+        """Who is to be in a cell or zone first, from each robot's own step on; None for nobody.
+
+        ``leaving`` is a robot whose present step does not count any more.
+        """
+        best: tuple[int, int] | None = None
+        resources = self.floor.resources
+        for robot, path in self.paths.by_robot.items():
+            state = self.states.get(robot)
+            first = path.start if state is None else max(path.start, state.step + (robot == leaving))
+            if best is not None and first >= best[0]:
+                continue
+            for step in range(first, max(first, path.end) + 1):
+                if resources[path.at(step)] == resource:
+                    if best is None or step < best[0]:
+                        best = (step, robot)
+                    break
+        return None if best is None else best[1]
+
+
+def _is_newer_path(head: PathHead, known: PathHead) -> bool:
+    return head.step > known.step or (head.step == known.step and is_newer(head.version, known.version, 8))

@@ -1,0 +1,384 @@
+"""A robot of a pick-up and delivery site: comes to a step, bids, plans in its turn, and moves when all have planned.
+
+It waits for everybody in every step, so that all know the same when they plan: a lost frame costs all of them time,
+and no plan is ever late. What it may enter is a matter of tokens all the same: a wrong belief about others' paths holds
+robots up and brings no two into one cell.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Plain
+from onboard.core.codes import KindCode, MachineState, Reason
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Message, SyncRequest, TokenGrant
+from onboard.core.serial import successor
+from onboard.systems.mapd.auction import Offer, Rule, cost
+from onboard.systems.mapd.bidding import Round, bid_timing
+from onboard.systems.mapd.driving import Driving
+from onboard.systems.mapd.knowledge import Knowledge
+from onboard.systems.mapd.memory import path_record, read_past
+from onboard.systems.mapd.messages import (
+    NO_TASK,
+    CartState,
+    PathHead,
+    PathMoves,
+    StepAward,
+    StepRound,
+    StepState,
+    TransportBid,
+    TransportCall,
+)
+from onboard.systems.mapd.moves import path_frames
+from onboard.systems.mapd.paths import Path
+from onboard.systems.mapd.search import find_path
+from onboard.systems.mapd.site import Mapd
+from onboard.systems.mapd.turns import Turns
+
+#: Whoever is missed is asked this long after everything else was there, and again after as long, us. Ours.
+ASK_US = 500_000
+#: So many are asked at once.
+ASK_AT_ONCE = 3
+#: What was just said is not said again for another who asks, us: all have heard it. Ours.
+SAID_US = 100_000
+#: Tokens are said again for whoever asks at most this often, us. Ours.
+TOKENS_SAID_US = 1_000_000
+
+
+#: What may let a robot go on; all else, such as others' heartbeats, changes nothing for it.
+_OF_INTEREST = (
+    TransportBid,
+    StepState,
+    PathMoves,
+    PathHead,
+    StepAward,
+    TransportCall,
+    StepRound,
+    TokenGrant,
+)
+
+
+#: What only the desk says.
+_OF_DESK = (StepAward, TransportCall, StepRound)
+
+
+class Phase(Enum):
+    """Where a robot stands within a step."""
+
+    GATHER = "waits for all robots to come to this step, and for its round"
+    BID = "the round is open"
+    TURNS = "those who have won or lost plan, one after the other"
+    MOVE = "goes to where its path is in the next step"
+
+
+@dataclass
+class UnitRobot(Plain):
+    """One robot. ``task`` is what it has won or carries, ``NO_TASK`` for none; ``step`` the step that it is in."""
+
+    kind: KindCode = KindCode.VEHICLE
+    state: MachineState = MachineState.STARTING
+    rule: Rule = field(default_factory=Rule)
+    phase: Phase = Phase.GATHER
+    step: int = 0
+    task: int = NO_TASK
+    round: StepRound | None = None
+    #: Searches made, and those that found nothing better than the former path.
+    searches: int = 0
+    failures: int = 0
+    _bids: Round | None = None
+    #: Bids of this step, also those that came before all that is needed to bid oneself.
+    _heard_bids: list[TransportBid] = field(default_factory=list)
+    _head: PathHead | None = None
+    _said: StepState | None = None
+    _ask_us: int | None = None
+    _told_us: int | None = None
+    _tokens_us: int | None = None
+    #: The task that was delivered last, and the step from which it was on its way then.
+    _served: tuple[int, int] = (NO_TASK, -1)
+    _is_new: bool = True
+
+    def __post_init__(self) -> None:
+        site = self.fleet.site
+        assert isinstance(site, Mapd)
+        self.site = site
+        self.knowledge = Knowledge(site.floor, site.robots, self.fleet.node_id)
+        self.driving = Driving(self.fleet, site, self.knowledge)
+        self.turns = Turns(0)
+        self._home = site.homes[self.fleet.node_id]
+        self._timing = bid_timing(site.timing, site.bid_window_us)
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """The body."""
+        if isinstance(message, CartState):
+            if message.cell >= len(self.site.floor.ways):
+                self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+                return []
+            first = self.driving.cart.state is None
+            self.driving.cart.sense(message)
+            self._is_new = True
+            return self._begin(message) if first else []
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Everything that others say of tasks, steps, bids and paths."""
+        self._is_new |= isinstance(message, _OF_INTEREST)
+        if isinstance(message, _OF_DESK) and message.sender != self.site.desk:
+            self.fleet.drops[Reason.NOT_AUTHORISED] += 1
+            return []
+        match message:
+            case TransportBid() if not self.knowledge.is_possible(message, self.rule):
+                self.fleet.drops[Reason.FALSE_STATEMENT] += 1
+            case TransportBid() if message.sender in self.site.homes:
+                self._heard_bids.append(message)
+                if self._bids is not None:
+                    self._bids.hear(message)
+            case StepState():
+                self.knowledge.on_state(message)
+            case PathMoves() | PathHead():
+                self._on_path(message)
+            case StepAward():
+                self.turns.hear(message)
+            case TransportCall():
+                self.knowledge.on_call(message)
+            case StepRound():
+                self._on_round(message)
+        return []
+
+    def _on_path(self, message: PathHead | PathMoves) -> None:
+        known = self.knowledge
+        if known.on_head(message) if isinstance(message, PathHead) else known.on_moves(message):
+            self._note_taken(message.sender)
+
+    def _on_round(self, message: StepRound) -> None:
+        if message.step == self.step and message != self.round:
+            self.round, self._bids = message, None
+            self._heard_bids = [bid for bid in self._heard_bids if bid.attempt == message.attempt]
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """A cell that it is not in goes to whoever is there first by everybody's paths."""
+        return self.driving.may_grant(key, requester, self.step)
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """From phase to phase, as far as what was heard allows."""
+        if self.driving.cart.state is None or not (self._is_new or self._is_due(now_us)):
+            return []
+        self._is_new = False
+        self.state = MachineState.IDLE if self.task == NO_TASK else MachineState.WORKING
+        effects: list[Effect] = []
+        before = None
+        while before != (self.phase, self.step):
+            before = self.phase, self.step
+            effects += _STEPS[self.phase](self, now_us)
+        return effects
+
+    def next_wake(self) -> int | None:
+        """When a bid, a question or an order to the body is due."""
+        times = [self._ask_us, self.driving.next_wake()]
+        if self.phase is Phase.BID and self._bids is not None:
+            times.append(self._bids.due_us())
+        return min((time for time in times if time is not None), default=None)
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Where it is, its path, and its rights."""
+        if self._head is None or (self._told_us is not None and now_us < self._told_us + SAID_US):
+            return []
+        self._told_us = now_us
+        effects: list[Effect] = [Send(self._said)] if self._said is not None else []
+        path = self.knowledge.paths.by_robot.get(self.fleet.node_id)
+        if path is not None:
+            head = self._head
+            effects += path_frames(self.fleet.node_id, self.site.floor, path, head.version, kept=head.kept)
+        if self._tokens_us is None or now_us >= self._tokens_us + TOKENS_SAID_US:
+            self._tokens_us = now_us
+            effects += self.fleet.tokens.statements()
+        return effects
+
+    def _is_due(self, now_us: int) -> bool:
+        due_us = self.next_wake()
+        return due_us is not None and due_us <= now_us
+
+    # --- power-up ----------------------------------------------------------------------------------------------
+
+    def _begin(self, body: CartState) -> list[Effect]:
+        """From the journal and the body: which step this is, and what the path is."""
+        past = read_past(self.fleet.entries)
+        path = past.path or Path(0, (body.cell,))
+        self.task, self.step = past.task, past.step
+        if past.step > 0 and past.step > path.start:
+            # It had set out for that step: it goes there (again), and tells when it is there.
+            self.step, self.phase = past.step - 1, Phase.MOVE
+        if past.served[0] == past.task:
+            # Unloading had begun: on the way to this step, or before.
+            self.driving.unloaded = past.task
+            if past.served[1] != self.step or self.phase is not Phase.MOVE:
+                self.task = NO_TASK
+        self._served = past.served if self.phase is not Phase.MOVE else (NO_TASK, -1)
+        self.turns = Turns(self.step)
+        head = self._head_of(path, past.version, kept=False)
+        self.knowledge.put(head, path)
+        return path_frames(self.fleet.node_id, self.site.floor, path, past.version, kept=False)
+
+    def _head_of(self, path: Path, version: int, *, kept: bool) -> PathHead:
+        self._head = PathHead(self.fleet.node_id, path.start, path.cells[0], len(path.cells) - 1, version, kept)
+        return self._head
+
+    # --- phases ------------------------------------------------------------------------------------------------
+
+    def gather(self, now_us: int) -> list[Effect]:
+        """Tell that it has come, and wait for the others and for the round."""
+        effects: list[Effect] = []
+        if self._said is None or self._said.step != self.step:
+            body = self.driving.cart.state
+            assert body is not None
+            served = self._served[1] == self.step - 1 and self._served[0] != NO_TASK
+            task = self._served[0] if served else self.task
+            self._said = StepState(self.fleet.node_id, self.step, body.cell, task, body.task != NO_TASK, served)
+            self.knowledge.on_state(self._said)
+            # The others may still be on their way, and the desk keeps to its pace.
+            self._ask_us = now_us + self.site.step_us + ASK_US
+            effects.append(Send(self._said))
+        has_round = self.round is not None and self.round.step == self.step
+        if not has_round and self._ask_us is not None and now_us < self._ask_us:
+            return effects
+        missing = [*self.knowledge.behind(self.step), *self.knowledge.pathless()]
+        if not missing and self.round is not None and has_round:
+            same = len(self.knowledge.open_tasks) == self.round.open_tasks
+            # Once the round is closed others may have gone on and picked up: the number is of no use any more.
+            if same or self.turns.is_complete or not self.round.bidding:
+                return effects + self._enter(Phase.BID if self.round.bidding else Phase.MOVE)
+            asked = self._ask([self.site.desk], now_us)
+            if asked:
+                self.knowledge.forget_open()
+            return effects + asked
+        return effects + self._ask(missing or [self.site.desk], now_us)
+
+    def bid(self, now_us: int) -> list[Effect]:
+        """Bid until the desk closes the round."""
+        if self.turns.is_complete:
+            return self._enter(Phase.TURNS)
+        assert self.round is not None
+        effects: list[Effect] = []
+        if self._bids is None:
+            self._bids = Round(self.fleet.node_id, self.step, self.round.attempt, now_us, self._timing, self._wishes())
+            for heard in self._heard_bids:
+                self._bids.hear(heard)
+            if self._must_yield():
+                wish = TransportBid(self.fleet.node_id, self.step & 0xFFFF, self.round.attempt, NO_TASK, 0)
+                effects.append(Send(wish))
+            self._ask_us = now_us + self.site.bid_window_us + ASK_US
+        effects += [Send(bid) for bid in self._bids.speak(now_us)]
+        return effects + self._ask([self.site.desk], now_us)
+
+    def take_turns(self, now_us: int) -> list[Effect]:
+        """Wait for the paths of those before me, plan if it is my turn, wait for those after me."""
+        me, effects = self.fleet.node_id, list[Effect]()
+        if self._ask_us is None:
+            self._ask_us = now_us + ASK_US
+        for robot in self.turns.order:
+            head = self.knowledge.heads.get(robot)
+            if head is not None and head.step == self.step and head.version:
+                continue
+            if robot != me:
+                return effects + self._ask([robot], now_us)
+            won = self.turns.takes(me)
+            missing = self.knowledge.pathless()
+            if won not in (NO_TASK, *self.knowledge.tasks):
+                missing.append(self.site.desk)
+            if missing:
+                return effects + self._ask(missing, now_us)
+            effects += self._plan(won)
+        return effects + self._enter(Phase.MOVE)
+
+    def move(self, now_us: int) -> list[Effect]:
+        """Go on by the path, and begin the next step."""
+        path = self.knowledge.paths.by_robot.get(self.fleet.node_id)
+        if path is None:
+            return self._ask(self.knowledge.pathless(), now_us)
+        effects, served, is_there = self.driving.go(path, self.step, self.task, now_us)
+        if served:
+            self._served, self.task = (self.task, self.step), NO_TASK
+        if not is_there:
+            return effects
+        self.step += 1
+        self.turns, self.round, self._bids, self._heard_bids = Turns(self.step), None, None, []
+        return effects + self._enter(Phase.GATHER)
+
+    def _enter(self, phase: Phase) -> list[Effect]:
+        self.phase, self._ask_us = phase, None
+        return []
+
+    def _ask(self, nodes: list[int], now_us: int) -> list[Effect]:
+        """Ask those who are missed, once everything else has been there for a while."""
+        if self._ask_us is None or now_us < self._ask_us:
+            return []
+        self._ask_us = now_us + ASK_US
+        others = [node for node in dict.fromkeys(nodes) if node != self.fleet.node_id]
+        return [Send(SyncRequest(self.fleet.node_id, node)) for node in others[:ASK_AT_ONCE]]
+
+    # --- decisions ---------------------------------------------------------------------------------------------
+
+    @property
+    def _is_loaded(self) -> bool:
+        body = self.driving.cart.state
+        return body is not None and body.task != NO_TASK
+
+    def _wishes(self) -> list[tuple[int, int]]:
+        """What each open task would cost, cheapest first: the task-generation function of this system."""
+        offer = self._offer()
+        bids = ((cost(self.site.floor, self.rule, offer, task), task.number) for task in self.knowledge.open_tasks)
+        return sorted((bid, number) for bid, number in bids if bid is not None)
+
+    def _offer(self) -> Offer:
+        """Where and when it will be free: at once, or where it delivers what it carries."""
+        path, me = self.knowledge.paths.by_robot[self.fleet.node_id], self.fleet.node_id
+        carried = self.knowledge.tasks.get(self.task)
+        if not self._is_loaded or carried is None:
+            return Offer(me, path.at(self.step), 0)
+        steps = range(self.step, max(self.step, path.end) + 1)
+        free_at = next((step for step in steps if path.at(step) == carried.delivery), path.end)
+        return Offer(me, carried.delivery, free_at - self.step)
+
+    def _rests(self) -> frozenset[int]:
+        """Where it may end: not in others' homes, nor where somebody has to pick up or deliver; its home always."""
+        others = self.knowledge.wanted_cells | set(self.site.homes.values())
+        return (self.site.rests - others) | {self._home}
+
+    def _must_yield(self) -> bool:
+        path = self.knowledge.paths.by_robot[self.fleet.node_id]
+        return self.task == NO_TASK and path.rest not in self._rests()
+
+    def _plan(self, number: int) -> list[Effect]:
+        """A path for a task, or to a rest; where there is none the former path stays, and it has no task."""
+        me, paths = self.fleet.node_id, self.knowledge.paths
+        old, task = paths.by_robot[me], self.knowledge.tasks.get(number)
+        paths.take(me)
+        goals = () if task is None else (task.pickup, task.delivery)
+        self.searches += 1
+        found = find_path(self.site.floor, paths, old.at(self.step), self.step, goals, self._rests())
+        self.failures += found is None
+        path = found or Path(self.step, tuple(old.at(step) for step in range(self.step, max(old.end, self.step) + 1)))
+        self.task = NO_TASK if found is None or task is None else number
+        version = successor(self._head.version if self._head is not None else 0, 8)
+        self.knowledge.put(self._head_of(path, version, kept=found is None), path)
+        self._note_taken(me)
+        frames = path_frames(me, self.site.floor, path, version, kept=found is None)
+        return [path_record(path, version, self.task), *frames]
+
+    def _note_taken(self, robot: int) -> None:
+        """Who plans anew right where its task is will have it aboard before it moves."""
+        head = self.knowledge.heads[robot]
+        task = self.knowledge.tasks.get(self.turns.takes(robot))
+        if head.step == self.step and not head.kept and task is not None and task.pickup == head.cell:
+            self.knowledge.taken[robot] = task.number
+
+
+_STEPS: dict[Phase, Callable[[UnitRobot, int], list[Effect]]] = {
+    Phase.GATHER: UnitRobot.gather,
+    Phase.BID: UnitRobot.bid,
+    Phase.TURNS: UnitRobot.take_turns,
+    Phase.MOVE: UnitRobot.move,
+}

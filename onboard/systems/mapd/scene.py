@@ -1,0 +1,230 @@
+"""The pick-up and delivery site's plan: its floor, robots from cell to cell along their paths, tasks that wait.
+
+Its calls are not those of the other systems: each stands until somebody has picked its task up, so tasks, bids and
+awards are told to the view from here.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from onboard.core.codes import Operation
+from onboard.core.messages import Message, Reference
+from onboard.systems.mapd.messages import (
+    MOVE_BITS,
+    MOVES_A_FRAME,
+    NO_TASK,
+    CartState,
+    PathHead,
+    PathMoves,
+    StepAward,
+    StepState,
+    TransportBid,
+    TransportCall,
+)
+from onboard.systems.mapd.site import FREE, Mapd
+from onboard.trace.scene.arrange import arrange
+from onboard.trace.scene.scene import Json, Spot, along, shape, still
+from onboard.trace.view import SiteView
+
+#: Plan units of a cell, and around all.
+CELL, MARGIN = 40.0, 30.0
+#: Tasks whose cells are remembered: the newest.
+MOST_TASKS = 1024
+
+
+@dataclass
+class _Robot:
+    """Where a robot is, by step, and the path that it told; incomplete, a path is not shown."""
+
+    cell: int
+    step: int = 0
+    task: int = NO_TASK
+    won: int = NO_TASK
+    loaded: bool = False
+    bound_for: int = -1
+    path: list[list[float]] = field(default_factory=list)
+    head: PathHead | None = None
+    parts: dict[int, int] = field(default_factory=dict)
+
+
+class MapdScene:
+    """Fed beside ``view``, which is told of tasks here."""
+
+    noun = "task"
+
+    def __init__(self, site: Mapd, view: SiteView) -> None:
+        self.site = site
+        self.view = view
+        self._spots = _spots(site)
+        self._robots = {node: _Robot(cell, bound_for=cell) for node, cell in site.homes.items()}
+        self._tasks: dict[int, TransportCall] = {}
+        for robot in self._robots.values():
+            robot.path = still(self._spots[robot.cell])
+
+    def layout(self) -> Json:
+        """Of a map its free cells, blocked ones left out; of a network its cells as nodes and its ways as edges."""
+        floor, shapes = self.site.floor, []
+        if self.site.rows:
+            half = CELL * 0.46
+            for cell, (x, y) in self._spots.items():
+                corners = [(x - half, y - half), (x + half, y + half)]
+                kind = "endpoint" if cell in self.site.endpoints else "cell"
+                shapes.append(shape(f"c{cell}", kind, floor.names[cell], corners))
+        else:
+            shapes += [
+                shape(f"w{one}-{other}", "link", "", [self._spots[one], self._spots[other]])
+                for one, ways in enumerate(floor.ways)
+                for other in ways
+                if one < other or one not in floor.ways[other]
+            ]
+            for cell, spot in self._spots.items():
+                name = floor.names[cell] if cell in self.site.endpoints else ""
+                shapes.append(shape(f"c{cell}", "node" if name else "point", name, [spot]))
+        width = max(x for x, _ in self._spots.values()) + MARGIN
+        height = max(y for _, y in self._spots.values()) + MARGIN
+        return {"plan": {"width": width, "height": height, "shapes": shapes}}
+
+    def feed(self, message: Message, time_us: int) -> None:
+        """As in the port."""
+        robot = self._robots.get(message.sender)
+        match message:
+            case TransportCall():
+                self._on_call(message, time_us)
+            case TransportBid() if message.task != NO_TASK:
+                self.view.bids += 1
+            case StepAward() if message.robot in self._robots:
+                self._on_award(message, time_us)
+            case PathHead() if robot is not None:
+                robot.head, robot.parts = message, {}
+            case PathMoves() if robot is not None and robot.head is not None:
+                if message.version == robot.head.version:
+                    robot.parts[message.part] = message.codes
+            case StepState() if robot is not None:
+                self._on_state(robot, message, time_us)
+
+    def _on_call(self, call: TransportCall, time_us: int) -> None:
+        if call.task in self._tasks:
+            return
+        self._tasks[call.task] = call
+        if len(self._tasks) > MOST_TASKS:
+            del self._tasks[next(iter(self._tasks))]
+        self.view.calls_opened += 1
+        if self.view.open_task(self._reference(call.task), Operation.TRANSPORT, time_us):
+            ways = f"from {self.place(call.pickup)} to {self.place(call.delivery)}"
+            self.view.say(time_us, f"{self.view.name(call.sender)} calls: {self._thing(call.task)}, {ways}")
+
+    def _on_award(self, award: StepAward, time_us: int) -> None:
+        """What a robot had and has not picked up is anybody's again, unless another has won it in the same round."""
+        robot, name = self._robots[award.robot], self.view.name(award.robot)
+        if robot.won not in (NO_TASK, award.task) and not (robot.loaded and robot.task == robot.won):
+            before = self.view.tasks.get(self._reference(robot.won))
+            if before is not None and before.is_waiting and before.owner == award.robot:
+                self.view.own(self._reference(robot.won), 0)
+        robot.won = award.task
+        if award.task != NO_TASK:
+            self.view.own(self._reference(award.task), award.robot)
+            self.view.say(time_us, f"{name} wins {self._thing(award.task)}")
+
+    def _on_state(self, robot: _Robot, state: StepState, time_us: int) -> None:
+        if state.cell not in self._spots:
+            return
+        if state.loaded and not robot.loaded:
+            self.view.say(time_us, f"{self.view.name(state.sender)} has picked up {self._thing(state.task)}")
+        if state.served and robot.task != NO_TASK:
+            self.view.end(self._reference(robot.task), time_us)
+            self.view.say(time_us, f"{self.view.name(state.sender)} has delivered {self._thing(robot.task)}")
+        self._go(robot, state.cell, time_us)
+        robot.cell, robot.step, robot.task, robot.loaded = state.cell, state.step, state.task, state.loaded
+
+    def feed_device(self, node: int, message: Message, time_us: int) -> None:
+        """A body says where it is going before its controller says that it has come."""
+        robot = self._robots.get(node)
+        if robot is not None and isinstance(message, CartState) and message.cell in self._spots:
+            self._go(robot, message.cell, time_us)
+
+    def _go(self, robot: _Robot, cell: int, time_us: int) -> None:
+        """To the next cell, unless it is on its way there already."""
+        if cell == robot.bound_for:
+            return
+        ends = [self._spots[robot.bound_for], self._spots[cell]]
+        robot.path = along(ends, time_us, time_us + self.site.travel_us)
+        robot.bound_for = cell
+
+    def machine(self, node: int, now_us: int) -> Json:
+        """As in the port."""
+        robot = self._robots.get(node)
+        if robot is None:
+            return {"where": "", "car": None}
+        told = [] if robot.task == NO_TASK else [[None, f"{self._thing(robot.task)}, {self._ways(robot.task)}"]]
+        return {
+            "where": f"{self.place(robot.cell)}, step {robot.step}",
+            "car": str(robot.task) if robot.loaded else None,
+            "path": robot.path,
+            "ahead": [[round(x, 1), round(y, 1)] for x, y in (self._spots[cell] for cell in self._ahead(robot))],
+            "held": [],
+            "told": told,
+        }
+
+    def _ahead(self, robot: _Robot) -> Iterator[int]:
+        """The cells of its path that it has not come to yet."""
+        head = robot.head
+        if head is None or head.cell not in self._spots:
+            return
+        if any(part not in robot.parts for part in range(-(-head.moves // MOVES_A_FRAME))):
+            return
+        cell = head.cell
+        for number in range(head.moves):
+            code = robot.parts[number // MOVES_A_FRAME] >> MOVE_BITS * (number % MOVES_A_FRAME) & (1 << MOVE_BITS) - 1
+            ways = self.site.floor.ways[cell]
+            cell = ways[code - 1] if 0 < code <= len(ways) else cell
+            if head.step + number + 1 > robot.step and code:
+                yield cell
+
+    def marks(self, now_us: int) -> Json:
+        """Where tasks wait to be picked up."""
+        aboard = {robot.task for robot in self._robots.values() if robot.loaded}
+        things: list[Json] = []
+        for number, call in self._tasks.items():
+            record = self.view.tasks.get(self._reference(number))
+            if record is not None and record.is_waiting and number not in aboard and call.pickup in self._spots:
+                x, y = self._spots[call.pickup]
+                things.append({"kind": "part", "name": str(number), "at": [round(x, 1), round(y, 1)]})
+        return {"marks": {}, "things": things}
+
+    def _reference(self, task: int) -> Reference:
+        return Reference(self.site.desk, task)
+
+    def _thing(self, task: int) -> str:
+        return f"task {task}"
+
+    def _ways(self, task: int) -> str:
+        call = self._tasks.get(task)
+        return f"from {self.place(call.pickup)} to {self.place(call.delivery)}" if call is not None else "long called"
+
+    def thing(self, reference: Reference) -> str:
+        """As in the port."""
+        return self._thing(reference.number)
+
+    def place(self, number: int) -> str:
+        """A cell by its name on the map."""
+        names = self.site.floor.names
+        return names[number] if number < len(names) else f"cell {number}"
+
+    def task_end(self, reference: Reference, station: int) -> str:
+        """As in the port."""
+        return f"has delivered {self.thing(reference)}"
+
+
+def _spots(site: Mapd) -> dict[int, Spot]:
+    """Of a map its free cells, row by row; of a network its cells by the steps between them."""
+    if site.rows:
+        wide = len(site.rows[0])
+        free = [mark in FREE for row in site.rows for mark in row]
+        return {
+            cell: (MARGIN + cell % wide * CELL, MARGIN + cell // wide * CELL)
+            for cell, is_free in enumerate(free)
+            if is_free
+        }
+    lengths = {(one, other): 1.0 for one, ways in enumerate(site.floor.ways) for other in ways}
+    spots = arrange(lengths, list(range(site.floor.size)), CELL)
+    return {cell: (x + MARGIN, y + MARGIN) for cell, (x, y) in spots.items()}

@@ -1,0 +1,80 @@
+"""What the machines of a pick-up and delivery site know beforehand."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+from onboard.core.codes import KindCode
+from onboard.core.site import Site
+from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.floor import FAR, FREE, Floor, Line, grid_floor, lasting_rests, network_floor
+from onboard.systems.mapd.rights import cell_station
+
+__all__ = [
+    "FAR",
+    "FREE",
+    "Floor",
+    "Line",
+    "Mapd",
+    "Task",
+    "cell_station",
+    "grid_floor",
+    "lasting_rests",
+    "network_floor",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mapd(Site):
+    """A floor, given by ``rows`` of a map or by ``points``, ``lines`` and ``zones``; robots, endpoints and tasks.
+
+    ``homes`` maps each robot's node-ID to its cell; ``endpoints`` are cells where tasks begin and end; ``step_ms`` is
+    how long a step takes. ``tasks`` are what a run of the site asks for, numbered from 0.
+    """
+
+    system: ClassVar[str] = "mapd"
+    demand: ClassVar[frozenset[str]] = frozenset({"tasks"})
+
+    rows: tuple[str, ...] = ()
+    points: tuple[str, ...] = ()
+    lines: tuple[Line, ...] = ()
+    zones: tuple[tuple[str, ...], ...] = ()
+    homes: dict[int, int]
+    endpoints: tuple[int, ...]
+    tasks: tuple[Task, ...]
+    step_ms: int
+
+    @cached_property
+    def floor(self) -> Floor:
+        """The cells and the ways between them."""
+        return grid_floor(self.rows) if self.rows else network_floor(self.points, self.lines, self.zones)
+
+    @cached_property
+    def rests(self) -> frozenset[int]:
+        """Where robots may stand for ever: homes first, then endpoints, as many as shut nobody in."""
+        return lasting_rests(self.floor, [*self.homes.values(), *self.endpoints], self.endpoints)
+
+    @property
+    def step_us(self) -> int:
+        """How long a step takes at least, in us."""
+        return self.step_ms * 1000
+
+    @property
+    def bid_window_us(self) -> int:
+        """How long bids for a step may come, in us: two fifths of it. Ours."""
+        return self.step_us * 2 // 5
+
+    @property
+    def travel_us(self) -> int:
+        """How long a body takes to the next cell, in us: half a step. Ours."""
+        return self.step_us // 2
+
+    @cached_property
+    def desk(self) -> int:
+        """Node-ID of the order desk."""
+        return min(node for node, one in self.machines.items() if one.kind is KindCode.DESK)
+
+    @cached_property
+    def robots(self) -> tuple[int, ...]:
+        """Node-IDs of the robots, lowest first."""
+        return tuple(node for node, one in sorted(self.machines.items()) if one.kind is KindCode.VEHICLE)

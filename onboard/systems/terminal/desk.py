@@ -1,0 +1,465 @@
+"""The mission desk: one more holon (row M39). It turns missions into calls, has boxes in its books and keeps rights.
+
+It plans for nobody. As steward it grants the right to a slot in the order in which the plans pass there, and a box to
+whoever plans to carry it.
+"""
+
+from dataclasses import dataclass, field
+from functools import partial
+
+from onboard.core.authority import TokenKey, car_token
+from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.codes import (
+    CallResult,
+    Criterion,
+    KindCode,
+    MachineState,
+    ManualMode,
+    Operation,
+    Reason,
+    TaskPhase,
+    TokenKind,
+)
+from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
+from onboard.core.messages import (
+    CallForProposals,
+    CarAt,
+    Heartbeat,
+    ManualOrder,
+    ManualState,
+    Message,
+    Reference,
+    TaskReport,
+    TokenGrant,
+)
+from onboard.core.mirror import Mirror
+from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent
+from onboard.core.serial import to_bus_ms
+from onboard.core.site import Machine, Site
+from onboard.systems.terminal.memory import box_record, read_boxes
+from onboard.systems.terminal.messages import (
+    BoxOrder,
+    LaneSensor,
+    LaneState,
+    ManualKey,
+    MissionAnswer,
+    MissionKey,
+    PlanHead,
+    StepReport,
+    TaskTerms,
+)
+from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.missions import Orders, Transport
+from onboard.systems.terminal.routes import least_end_ms
+from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.terminal.vehicle import terminal
+
+#: After a refusal, and while no robot is about to be free, the desk looks again after this, us. Ours.
+LOOK_US = 5_000_000
+#: A lane that is blocked is told again so often, us (dbc/terminal.dbc).
+LANE_REPEAT_US = 5_000_000
+#: An order by hand that its vehicle has not answered is said again after this, us (dbc/terminal.dbc).
+MANUAL_AGAIN_US = 1_000_000
+#: A task that was won and is in no plan for so long is called anew, us: its winner gave it up or lost it. Ours.
+LOST_US = 120_000_000
+
+
+class DeskGeneration(NoEstimator):
+    """A desk does no transports; it holds the picture of the terminal."""
+
+    def __init__(self, mirror: TerminalMirror) -> None:
+        self.mirror = mirror
+
+
+@dataclass(frozen=True)
+class DeskFactory:
+    """Makes desks."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> DeskGeneration:
+        """The desk's picture."""
+        return DeskGeneration(TerminalMirror(terminal(site), machine.node_id, mirror))
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Desk":
+        """The desk's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, DeskGeneration):
+            raise TypeError("a desk needs its own picture")
+        return Desk(fleet, estimator)
+
+
+@dataclass
+class Desk:
+    """One desk. ``calls`` are the terms of its open calls by task; ``taken`` boxes that another desk calls for."""
+
+    fleet: Fleet
+    generation: DeskGeneration
+    kind: KindCode = KindCode.DESK
+    orders: Orders = field(init=False)
+    calls: dict[Reference, CallTerms] = field(default_factory=dict)
+    taken: dict[int, int] = field(default_factory=dict)
+    interrupted: int = 0
+    _look_at_us: int | None = None
+    _repeat_at_us: int | None = None
+    _won_at_us: dict[Reference, int] = field(default_factory=dict)
+    _lanes: dict[int, LaneState] = field(default_factory=dict)
+    _is_new: bool = False
+    _is_moved: bool = False
+    #: Vehicles in which a person has a hand, and orders to vehicles that were not heard to have come.
+    held: set[int] = field(default_factory=set)
+    _manual: dict[int, ManualOrder] = field(default_factory=dict)
+    _manual_at_us: int | None = None
+    _told_buried: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        self.orders = Orders(self.site, self.fleet.node_id)
+        self.orders.replay(self.fleet.entries)
+
+    @property
+    def site(self) -> Terminal:
+        """The site."""
+        return self.mirror.site
+
+    @property
+    def mirror(self) -> TerminalMirror:
+        """The desk's picture of the terminal."""
+        return self.generation.mirror
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        return MachineState.WORKING if self.orders.open or self.orders.missions else MachineState.IDLE
+
+    @property
+    def itinerary_version(self) -> int:
+        """A desk goes nowhere."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Tasks that were called for and not won are called for again; those that were won go on."""
+        for task in [one for one in self.orders.open if one not in self.orders.won]:
+            self.orders.give_back(task)
+        self._won_at_us = dict.fromkeys(self.orders.won, now_us)
+        self._look_at_us = now_us + LOOK_US
+        self.mirror.remember(read_boxes(self.fleet.node_id, self.fleet.node_id, self.fleet.entries))
+        for task, winner in self.orders.won.items():
+            self.fleet.winners.takes(task, winner, now_us)
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Keyboard and cameras."""
+        match message:
+            case MissionKey():
+                return self._typed(message, now_us)
+            case LaneSensor():
+                return self._seen(message, now_us)
+            case ManualKey() if message.vehicle in self.site.vehicles:
+                order = ManualOrder(self.fleet.node_id, message.vehicle, message.number, message.manual_mode)
+                self._manual[message.vehicle], self._manual_at_us = order, now_us + MANUAL_AGAIN_US
+                return [Send(order)]
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Plans, reports, boxes; what another desk calls for; what became of my tasks."""
+        self.mirror.hear(message, now_us)
+        match message:
+            case CallForProposals(operation=Operation.TRANSPORT):
+                self.taken[message.car.number] = now_us + self.site.timing.call_window_us + LOOK_US
+            case TaskReport():
+                return self._reported(message, now_us)
+            case Heartbeat():
+                return self.mirror.ask(message)
+            case PlanHead():
+                self._is_new = True
+            case StepReport():
+                self.fleet.winners.works(message.sender, (message.version, message.step), now_us)
+            case CarAt() | TokenGrant():
+                self._is_moved = True
+            case ManualState():
+                self._on_manual(message)
+            case BoxOrder() if message.desk == self.fleet.node_id:
+                return self._ordered(message, now_us)
+        return []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """An own call is over."""
+        if not isinstance(event, Closed):
+            return []
+        task = event.call.task
+        self.calls.pop(task, None)
+        if event.result is CallResult.AWARDED:
+            return self.won(task, event.winner, now_us, event.call.call)
+        self.orders.give_back(task)
+        self._look_at_us = now_us + (LOOK_US if event.result is CallResult.REFUSED else 1)
+        return [Record(self.orders.record())]
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Slots in the plans' order; a box to the machine whose plan carries it."""
+        if key.kind is TokenKind.SEGMENT:
+            return self._may_enter(key.number >> 8, key.number & 0xFF, requester)
+        if key.kind is TokenKind.CAR:
+            carries = self.mirror.in_plans(key.number & 0xFFFF) == requester
+            return Reason.NONE if carries else Reason.MIRROR_BEHIND
+        return Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Open the next call where a robot is about to be free; tell blocked lanes again; look after won tasks."""
+        effects = self._take_over() if self._is_moved else []
+        if self._repeat_at_us is not None and self._repeat_at_us <= now_us:
+            self._repeat_at_us = now_us + LANE_REPEAT_US
+            effects += self._lanes_told()
+        if self._manual_at_us is not None and self._manual_at_us <= now_us:
+            self._manual_at_us = now_us + MANUAL_AGAIN_US if self._manual else None
+            effects += [Send(order) for order in self._manual.values()]
+        if self._is_new or (self._look_at_us is not None and self._look_at_us <= now_us):
+            self._is_new = False
+            self._look_at_us = now_us + LOOK_US if self.orders.missions or self.orders.open else None
+            effects += self._look_after(now_us) + self.call_next(now_us) + self._tell_buried()
+        return effects
+
+    def next_wake(self) -> int | None:
+        """The next look."""
+        return min(
+            (one for one in (self._look_at_us, self._repeat_at_us, self._manual_at_us) if one is not None), default=None
+        )
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """Lanes, the boxes that are not where they were at first, and the rights that I hold."""
+        boxes = [Send(one) for one in self.mirror.kept_by(self.fleet.node_id)]
+        return [*self._lanes_told(), *boxes, *self.fleet.tokens.statements()]
+
+    def _take_over(self) -> list[Effect]:
+        """A box in my books was put down, and its right came back: from now on I vouch for where it stands.
+
+        The vehicle that put it down may be switched off at any time; without this nobody could tell a machine that
+        was off meanwhile (campaign terminal, all, seed 11).
+        """
+        self._is_moved = False
+        effects: list[Effect] = []
+        for car, record in list(self.fleet.mirror.cars.items()):
+            key = car_token(*car)
+            stands = record.station in self.site.entities and record.custodian != self.fleet.node_id
+            if stands and car.origin == self.fleet.node_id and self.fleet.tokens.holds(key):
+                version = self.fleet.tokens.version_of(key)
+                statement = CarAt(self.fleet.node_id, car, record.station, version, record.wheelbase_mm)
+                self.fleet.mirror.on_car(statement)
+                effects += [Record(box_record(statement)), Send(statement)]
+        return effects
+
+    # --- missions ----------------------------------------------------------------------------------------------
+
+    def _typed(self, key: MissionKey, now_us: int) -> list[Effect]:
+        """A mission; an urgent one interrupts: what was called for and not awarded waits (row M29)."""
+        order = self.orders.key(key)
+        is_taken = self.orders.answer(key)
+        if order is None:
+            return [] if is_taken is None else [Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
+        taken = Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True))
+        return [*self._ranked(order.urgent, now_us), taken]
+
+    def _ordered(self, wanted: BoxOrder, now_us: int) -> list[Effect]:
+        """A box that is wanted from outside; who asks again is told how it stands."""
+        task, reason = Reference(wanted.sender, wanted.number), Reason.NONE
+        phase, effects = self.orders.phase_of(task), list[Effect]()
+        if phase is None and self.mirror.station_of(wanted.box) == wanted.target:
+            phase = TaskPhase.DONE
+        elif phase is None and not self.orders.may_order(wanted.box, wanted.target):
+            phase, reason = TaskPhase.REFUSED, Reason.IMPOSSIBLE
+        elif phase is None:
+            before_us = now_us + wanted.within_s * 1_000_000 if wanted.within_s else 0
+            self.orders.order(task, wanted.box, wanted.target, before_us, urgent=wanted.urgent)
+            phase, effects = TaskPhase.OPEN, self._ranked(wanted.urgent, now_us)
+        return [*effects, Send(TaskReport(self.fleet.node_id, task, phase, wanted.target, reason))]
+
+    def _ranked(self, urgent: bool, now_us: int) -> list[Effect]:
+        """A new mission is journalled, and finds its place among the others."""
+        effects: list[Effect] = [Record(self.orders.record())]
+        if urgent:
+            for task, terms in list(self.calls.items()):
+                transport = self.orders.open.get(task)
+                if transport is not None and not transport.urgent:
+                    effects += self._withdraw(terms, now_us)
+        return effects + self.call_next(now_us)
+
+    def _on_manual(self, state: ManualState) -> None:
+        (self.held.discard if state.manual_mode is ManualMode.AUTOMATIC else self.held.add)(state.sender)
+        order = self._manual.get(state.sender)
+        if order is not None and order.number == state.number:
+            del self._manual[state.sender]
+
+    def _tell_buried(self) -> list[Effect]:
+        """Nobody clears a stack by itself (row M08): the operator is told once what waits for what."""
+        found = [pair for pair in self.orders.buried(self.mirror) if pair[0] not in self._told_buried]
+        self._told_buried.update(box for box, _ in found)
+        names = self.site.boxes
+        return [
+            Report(
+                f"box {names[box - 1].name} waits: {names[upper - 1].name} is above it, and nobody ordered that away"
+            )
+            for box, upper in found
+        ]
+
+    def _withdraw(self, terms: CallTerms, now_us: int) -> list[Effect]:
+        self.interrupted += 1
+        effects: list[Effect] = []
+        for item in self.fleet.negotiation.withdraw(terms, now_us):
+            if isinstance(item, EVENT_TYPES):
+                effects += self.negotiated(item, now_us)
+            elif not isinstance(item, Halt):
+                effects.append(item)
+        return effects
+
+    def candidates(self, now_us: int) -> list[int]:
+        """Robots that have no plan, or one that ends before T + delta T (M24), and are alive."""
+        alive = self.fleet.mirror.alive(now_us)
+        busy = set(self.orders.won.values()) - set(self.mirror.traffic.plans) | self.held
+        limit_us = now_us + self.site.horizon_us
+        ends = {node: self.mirror.traffic.end_of(node, now_us) for node in self.site.vehicles}
+        return [node for node, end in ends.items() if end <= limit_us and node in alive and node not in busy]
+
+    def call_next(self, now_us: int) -> list[Effect]:
+        """As many calls as robots are about to be free: never all boxes at once (M27)."""
+        effects: list[Effect] = []
+        free = len(self.candidates(now_us))
+        taken = {box for box, until_us in self.taken.items() if until_us > now_us}
+        taken |= {transport.box for transport in self.orders.open.values()}
+        while len(self.calls) < free:
+            transport = self.orders.next(self.mirror, taken)
+            if transport is None:
+                break
+            taken.add(transport.box)
+            effects += [Record(self.orders.record()), *self.call(transport, now_us)]
+        if self.orders.missions or self.orders.open:
+            self._look_at_us = self._look_at_us or now_us + LOOK_US
+        return effects
+
+    def call(self, transport: Transport, now_us: int) -> list[Effect]:
+        """Call all robots for one transport."""
+        date = TaskTerms(self.fleet.node_id, transport.task, to_bus_ms(transport.before_us))
+        self.mirror.hear(date, now_us)
+        terms = CallTerms(
+            task=transport.task,
+            operation=Operation.TRANSPORT,
+            kind=KindCode.VEHICLE,
+            criterion=Criterion.FINISH_TIME,
+            from_station=self.mirror.station_of(transport.box),
+            to_station=transport.target,
+            car=self.site.box(transport.box),
+            wheelbase_mm=0,
+            detail=(date,),
+            floor=partial(least_end_ms, self.site),
+        )
+        self.calls[transport.task] = terms
+        return list(self.fleet.negotiation.open(terms, now_us))
+
+    def won(self, task: Reference, winner: int, now_us: int, call: int = 0) -> list[Effect]:
+        """A robot has the task, by ``call`` where it is known."""
+        if task not in self.orders.open:
+            return []
+        self.orders.won[task] = winner
+        self.fleet.winners.takes(task, winner, now_us, call)
+        self._won_at_us[task] = now_us
+        self._look_at_us = now_us + 1
+        return [Record(self.orders.record())]
+
+    def _reported(self, report: TaskReport, now_us: int) -> list[Effect]:
+        if report.task not in self.orders.open:
+            return []
+        if report.sender not in self.site.vehicles:
+            self.fleet.drops[Reason.NOT_OF_KIND] += 1
+            return []
+        if self.orders.won.get(report.task) != report.sender:
+            # Who has lost a task, or never won it, says nothing that counts: where its box stands tells whether it is
+            # done.
+            is_claim = report.phase is TaskPhase.AWARDED and report.task not in self.calls
+            return self.fleet.winners.remind(report.task, report.sender) if is_claim else []
+        if report.phase is TaskPhase.DONE and self.orders.finish(report.task):
+            self.fleet.winners.over(report.task)
+            self._won_at_us.pop(report.task, None)
+            self._look_at_us = now_us
+            return [Record(self.orders.record()), Report(f"task {report.task.number} is done")]
+        if report.phase is TaskPhase.FORFEITED:
+            self.fleet.winners.over(report.task)
+            self.orders.give_back(report.task)
+            self._look_at_us = now_us + LOOK_US
+            return [Record(self.orders.record())]
+        if report.phase is TaskPhase.AWARDED:
+            self._won_at_us[report.task] = now_us
+        return []
+
+    def _take_back(self, task: Reference, transport: Transport, now_us: int) -> list[Effect]:
+        """A task whose winner is lost goes to another, while its box stands and is in nobody's plan.
+
+        Nobody gets the right to a box but who plans to carry it; who plans it later than another gives it back.
+        """
+        reason = self.fleet.winners.lost(task, now_us)
+        if reason is Reason.NONE:
+            return []
+        if not self.mirror.station_of(transport.box) or self.mirror.in_plans(transport.box) is not None:
+            self.fleet.winners.keeps(task)
+            return []
+        self._won_at_us.pop(task, None)
+        self.calls.pop(task, None)
+        self.orders.give_back(task)
+        return [*self.fleet.winners.take_back(task, reason, now_us), Record(self.orders.record())]
+
+    def _look_after(self, now_us: int) -> list[Effect]:
+        """A won task whose box is at its target is done, though nobody was heard saying so; one in no plan is lost."""
+        effects: list[Effect] = []
+        for task, one in list(self.orders.open.items()):
+            effects += self._take_back(task, one, now_us)
+        for task, winner in list(self.orders.won.items()):
+            transport = self.orders.open.get(task)
+            if transport is None:
+                del self.orders.won[task]
+                continue
+            if self.mirror.station_of(transport.box) == transport.target:
+                self.orders.finish(task)
+                self.fleet.winners.over(task)
+                effects.append(Record(self.orders.record()))
+            elif self.mirror.in_plans(transport.box) is not None:
+                self._won_at_us[task] = now_us
+            elif now_us - self._won_at_us.get(task, now_us) >= LOST_US and self.mirror.station_of(transport.box):
+                self._won_at_us.pop(task, None)
+                self.orders.give_back(task)
+                effects += self.fleet.winners.take_back(task, Reason.FALSE_STATEMENT, now_us)
+                effects += [Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
+        return effects
+
+    # --- lanes and rights --------------------------------------------------------------------------------------
+
+    def _seen(self, sensor: LaneSensor, now_us: int) -> list[Effect]:
+        """A change on a lane is told to all robots (row M36)."""
+        known = self._lanes.get(sensor.lane)
+        entity = self.site.entities.get(sensor.lane)
+        if entity is None or entity.kind is not EntityKind.LANE or (known is None and not sensor.blocked):
+            return []
+        if known is not None and known.blocked == sensor.blocked:
+            return []
+        state = LaneState(self.fleet.node_id, sensor.lane, sensor.blocked, to_bus_ms(now_us))
+        self._lanes[sensor.lane] = state
+        self.mirror.on_lane(state, now_us)
+        self._repeat_at_us = now_us + LANE_REPEAT_US
+        return [Send(state)]
+
+    def _lanes_told(self) -> list[Effect]:
+        return [Send(state) for state in self._lanes.values()]
+
+    def _may_enter(self, entity: int, slot: int, requester: int) -> Reason:
+        """The first in the entity's list that is not there yet, unless the slot is one further on along a lane."""
+        place = self.site.entities.get(entity)
+        if place is None or requester not in self.site.vehicles:
+            return Reason.NOT_AUTHORISED
+        if place.kind is EntityKind.LANE and slot > 1:
+            return Reason.NONE
+        traffic = self.mirror.traffic
+        row = traffic.lists.get(entity, [])
+        mine = next((n for n, one in enumerate(row) if one.owner == requester and not traffic.is_inside(one)), None)
+        if mine is None:
+            return Reason.MIRROR_BEHIND
+        before = row[:mine]
+        waiting = [one for one in before if not traffic.is_inside(one)]
+        if place.kind is EntityKind.CROSSING and place.capacity > 1:
+            same = [one for one in before if self.mirror.entry_slot(entity, one.owner) == slot]
+            return Reason.TOKEN_NOT_GRANTABLE_YET if same or len(before) >= place.capacity else Reason.NONE
+        return Reason.TOKEN_NOT_GRANTABLE_YET if waiting else Reason.NONE

@@ -1,0 +1,132 @@
+"""The vehicle's task-generation function: what a transport would cost me around all plans (rows M23 to M27)."""
+
+from dataclasses import dataclass, field, replace
+
+from onboard.core.codes import Operation
+from onboard.core.messages import CallForProposals
+from onboard.core.negotiation import CallKey, Proposal
+from onboard.core.serial import to_bus_ms
+from onboard.core.site import Machine
+from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.plan import Load, Plan
+from onboard.systems.terminal.routes import carry_us, free_flow_us, least_end_ms
+from onboard.systems.terminal.search import Found, Job, Search, remaining
+from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.terminal.traffic import Traffic, copy_of
+
+
+@dataclass
+class VehicleGeneration:
+    """An ``Estimator``. ``has_queue`` is true while a task was won that is in no plan yet: nothing more is bid for.
+
+    ``promised`` are the calls in which this machine's bid stands best.
+    """
+
+    site: Terminal
+    machine: Machine
+    mirror: TerminalMirror
+    has_queue: bool = False
+    promised: set[CallKey] = field(default_factory=set)
+    #: Whether a person has a hand in the vehicle: it bids for nothing then (row M38).
+    is_held: bool = False
+    searches: int = 0
+
+    # --- the Estimator -----------------------------------------------------------------------------------------
+
+    def floor(self, call: CallForProposals, now_us: int) -> int:
+        """Picked up when it is called for, as plans begin before a call is decided, and carried straight."""
+        return least_end_ms(self.site, call, now_us)
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """Alone on all ways; None for a machine whose plan ends after T + delta T (M24), and for what nobody can do."""
+        if call.operation is not Operation.TRANSPORT or not self.is_candidate(now_us):
+            return None
+        stations = (call.from_station, call.to_station)
+        known = [self.site.entities.get(number) for number in stations]
+        if any(one is None or one.kind is not EntityKind.STATION for one in known):
+            return None
+        here, free_us = self.start(now_us)
+        way_us, loaded_us = free_flow_us(self.site, here, call.from_station), carry_us(self.site, call)
+        return None if way_us is None or loaded_us is None else to_bus_ms(free_us + way_us + loaded_us)
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        """The end of the best plan; none while a bid for another call stands best: what that brings goes first."""
+        if self.promised - {CallKey(call.sender, call.call)}:
+            return None
+        found = self.plan(job_of(self.mirror, call), now_us, version=1)
+        if found is None:
+            return None
+        return Proposal(to_bus_ms(found.plan.end), None, (found.plan.end, found.plan.steps), ())
+
+    # --- plans -------------------------------------------------------------------------------------------------
+
+    def is_candidate(self, now_us: int) -> bool:
+        """Whether it has no plan, or one that ends before T + delta T."""
+        end_us = self.mirror.traffic.end_of(self.machine.node_id, now_us)
+        return not self.has_queue and not self.is_held and end_us <= now_us + self.site.horizon_us
+
+    def start(self, now_us: int) -> tuple[int, int]:
+        """Where and when the machine is free: an area, bus us."""
+        node = self.machine.node_id
+        return self.mirror.where[node], self.mirror.traffic.end_of(node, now_us)
+
+    def plan(self, job: Job, now_us: int, *, version: int) -> Found | None:
+        """What is left of the plan in hand, and then ``job``."""
+        kept = remaining(self.mirror.traffic, self.machine.node_id, now_us)
+        here, free_us = self.start(now_us)
+        return self.search(now_us).best(here, free_us, job, version=version, kept=kept)
+
+    def search(self, now_us: int, traffic: Traffic | None = None) -> Search:
+        """A search over the mirror as it is, or over another picture; lanes that are blocked for long are left out."""
+        self.searches += 1
+        found = self.mirror.traffic if traffic is None else traffic
+        return Search(self.site, found, self.machine.node_id, now_us, self.mirror.long_blocked(now_us))
+
+    def again(self, now_us: int, *, version: int) -> Plan | None:
+        """The loads of the plan in hand planned anew from the step in hand, around everybody's plans; None if no way.
+
+        What is done at a station is ended there first.
+        """
+        node, traffic = self.machine.node_id, self.mirror.traffic
+        left = remaining(traffic, node, now_us)
+        if left is None or not left.loads:
+            return None
+        at_station = self.site.entities[left.steps[0].entity].kind is EntityKind.STATION
+        kept, loads = _handled(left) if at_station else (None, left.loads)
+        here = left.steps[0].entity if not at_station else self.site.entities[left.steps[0].entity].area
+        count = len(kept.steps) if kept is not None else 0
+        began = kept.end if kept is not None else left.begin
+        # Where others will be without what is planned now.
+        alone = copy_of(traffic)
+        begun = kept if kept is not None else replace(left, steps=left.steps[:1], loads=())
+        alone.take_up(replace(begun, version=left.version), now_us)
+        search = self.search(now_us, alone)
+        for load in loads:
+            source = left.steps[load.pick].entity if load.pick < len(left.steps) else 0
+            if at_station and load.pick < count:
+                source = 0
+            job = Job(load.box, load.task, source, left.steps[load.put].entity, traffic.date_of(load))
+            found = search.best(here, began, job, version=version, kept=kept)
+            if found is None:
+                return None
+            kept = found.plan
+            if at_station and load.pick < count:
+                # It is picked up in the steps that are ended first.
+                kept = replace(kept, loads=(*kept.loads[:-1], kept.loads[-1]._replace(pick=load.pick)))
+            began = kept.end
+            here = self.site.entities[found.plan.steps[-1].entity].area
+        return kept
+
+
+def _handled(left: Plan) -> tuple[Plan, tuple[Load, ...]]:
+    """The steps at the station in hand as a plan that comes first, and the loads that are not put down by then."""
+    count = left.visits()[0][1] + 1
+    loads = tuple(load for load in left.loads if load.put >= count)
+    done = tuple(load for load in left.loads if load.put < count)
+    return Plan(left.owner, left.version, left.begin, left.steps[:count], done), loads
+
+
+def job_of(mirror: TerminalMirror, call: CallForProposals) -> Job:
+    """What a call asks for."""
+    before = mirror.traffic.before.get(call.task, 0)
+    return Job(call.car.number, call.task, call.from_station, call.to_station, before)

@@ -1,0 +1,308 @@
+"""What a vehicle means to do: tasks won, the plan adopted in its turn, and the plan made anew where it is violated."""
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import Grade, Reason, TaskPhase
+from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.messages import CallForProposals, Itinerary, Stamp, TaskReport
+from onboard.core.negotiation import Awarded, NegotiationEvent, PreAssigned, Released
+from onboard.core.serial import successor, to_bus_ms
+from onboard.systems.terminal.body import Body
+from onboard.systems.terminal.generation import VehicleGeneration, job_of
+from onboard.systems.terminal.memory import plan_record, read_plan
+from onboard.systems.terminal.messages import Assignment, StepReport, StepResult
+from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.plan import Load, Plan, PlanReader, to_frames
+from onboard.systems.terminal.search import Job, remaining
+from onboard.systems.terminal.site import Terminal
+from onboard.systems.terminal.traffic import Owned
+
+#: A violated plan that cannot be bettered is looked at again after this, us. Ours.
+AGAIN_US = 10_000_000
+#: How far the plan has come, and what was won and is not planned yet, is said again so often, us (dbc/terminal.dbc).
+SAY_US = 5_000_000
+#: Refused for so long without anybody before me, us: the steward sees another order. Ours.
+TELL_US = 10_000_000
+#: Refused for so long behind somebody, us: whoever that is may wait for me by a list that only I have otherwise. Ours.
+TELL_BEHIND_US = 30_000_000
+#: Plans are adopted in turns of bus time, one vehicle so long after the other, us: each sees what the one before has
+#: told, so that no two plans are made at once around the same gaps. Ours.
+TURN_US = 50_000
+_NO_STAMP = Stamp(0, 0, 0)
+
+
+@dataclass
+class Planner:
+    """One vehicle's plan. ``queue`` are tasks won that are in no plan yet; ``touched`` counts plans made anew."""
+
+    fleet: Fleet
+    generation: VehicleGeneration
+    body: Body
+    queue: deque[Job] = field(default_factory=deque)
+    touched: int = 0
+    version: int = 0
+    stamp: Stamp = _NO_STAMP
+    _looked_at: int = -1
+    _again_at_us: int | None = None
+    _patience_at_us: int | None = None
+    _queue_at_us: int | None = None
+    _said_at_us: int | None = None
+    _turn_at_us: int | None = None
+    #: The step in hand, and since when the right to go on from it is refused.
+    _refused: tuple[int, int] | None = None
+
+    @property
+    def site(self) -> Terminal:
+        """The site."""
+        return self.generation.site
+
+    @property
+    def mirror(self) -> TerminalMirror:
+        """My picture of the others."""
+        return self.generation.mirror
+
+    @property
+    def owned(self) -> Owned | None:
+        """My plan in execution."""
+        return self.mirror.traffic.plans.get(self.fleet.node_id)
+
+    def start(self, now_us: int) -> None:
+        """After a restart the journal knows the plan and how far it has come."""
+        plan, over = read_plan(self.fleet.node_id, self.fleet.entries)
+        if plan is None:
+            return
+        self.version = plan.version
+        self.mirror.take_up(plan, now_us)
+        for step, ended_us in over:
+            self.mirror.traffic.report(self.fleet.node_id, plan.version, step, ended_us)
+
+    def next_wake(self) -> int | None:
+        """My next turn in which there is something to plan, or when a task is to be spoken of again."""
+        said_us = self._said_at_us if self.queue or self.owned is not None else None
+        return min((time for time in (said_us, self._turn_at_us) if time is not None), default=None)
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """Awarded: the plan is made a second time, around what is known then (row P20), and told."""
+        match event:
+            case PreAssigned(call_key=key):
+                self.generation.promised.add(key)
+            case Released(call_key=key):
+                self.generation.promised.discard(key)
+            case Awarded(call_key=key, call=call):
+                self.generation.promised.discard(key)
+                return self._awarded(call, now_us)
+        return []
+
+    def called(self, call: CallForProposals) -> None:
+        """A box that is in my queue is called for: its desk took the task for lost, and whoever wins it now has it."""
+        self.queue = deque(job for job in self.queue if job.box != call.car.number)
+        self.generation.has_queue = bool(self.queue)
+
+    def speak(self, now_us: int) -> list[Effect]:
+        """Say again how far the plan has come, and of a task that waits to be planned that it is not lost."""
+        owned = self.owned
+        effects: list[Effect] = []
+        if self._said_at_us is None or self._said_at_us > now_us:
+            self._said_at_us = self._said_at_us or now_us + SAY_US
+            return []
+        self._said_at_us = now_us + SAY_US
+        if owned is not None and owned.current:
+            effects.append(Send(self.report(owned, owned.current - 1, owned.began)))
+        node = self.fleet.node_id
+        waiting = [TaskReport(node, job.task, TaskPhase.AWARDED, job.target, Reason.NONE) for job in self.queue]
+        return effects + [Send(report) for report in waiting]
+
+    def over(self, now_us: int) -> list[Effect]:
+        """The plan is over; under a version of its own, so that whoever missed the report asks."""
+        self.version = successor(self.version, 8)
+        nothing = Plan(self.fleet.node_id, self.version, now_us, ())
+        return [Record(plan_record(nothing)), *self.statement(now_us)]
+
+    # --- tasks -------------------------------------------------------------------------------------------------
+
+    def _awarded(self, call: CallForProposals, now_us: int) -> list[Effect]:
+        self.stamp = Stamp(to_bus_ms(now_us), call.sender, call.call & 0xFF)
+        taken = Send(TaskReport(self.fleet.node_id, call.task, TaskPhase.AWARDED, call.to_station, Reason.NONE))
+        self._take(job_of(self.mirror, call))
+        return [taken]
+
+    def assigned(self, order: Assignment, now_us: int) -> list[Effect]:
+        """A central planner's order is as good as an award."""
+        taken = Send(TaskReport(self.fleet.node_id, order.task, TaskPhase.AWARDED, order.target, Reason.NONE))
+        owned = self.owned
+        known = [load.task for load in owned.plan.loads] if owned is not None else []
+        if order.task in known or any(job.task == order.task for job in self.queue):
+            return [taken]
+        before = self.mirror.traffic.before.get(order.task, 0)
+        job = Job(order.box, order.task, self.mirror.station_of(order.box), order.target, before)
+        if job.source:
+            self._take(job)
+        return [taken] if job.source else []
+
+    def _take(self, job: Job) -> None:
+        """It is planned in my next turn."""
+        self.queue.append(job)
+        self.generation.has_queue = True
+
+    def _plan_next(self, now_us: int) -> list[Effect]:
+        """Put the oldest task won behind what is planned; forfeit one whose box is in another's plan."""
+        if not self.queue or (self._queue_at_us is not None and now_us < self._queue_at_us):
+            return []
+        job = self.queue[0]
+        if self.mirror.in_plans(job.box) not in (None, self.fleet.node_id):
+            self._drop_first()
+            return [Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.FORFEITED, job.source, Reason.NONE))]
+        if self.mirror.traffic.dates(now_us).circle:
+            # While plans wait for each other there are no dates to put anything behind: one is made anew first.
+            return []
+        found = self.generation.plan(job, now_us, version=successor(self.version, 8))
+        if found is None:
+            self._queue_at_us = now_us + AGAIN_US
+            return []
+        self._drop_first()
+        return self._adopt(found.plan, now_us)
+
+    def in_turn(self, now_us: int) -> list[Effect]:
+        """What is only done in my turn; I wake for the turn in which something is due."""
+        turn_us = self._turn_us(now_us)
+        effects: list[Effect] = []
+        if turn_us == now_us:
+            effects = self._plan_next(now_us) + self._mend(now_us)
+            effects = effects or self._tell_anew(now_us)
+            turn_us = self._turn_us(now_us + TURN_US)
+        due_us = self._planning_due(now_us)
+        self._turn_at_us = max(turn_us, self._turn_us(due_us)) if due_us is not None else None
+        return effects
+
+    def _tell_anew(self, now_us: int) -> list[Effect]:
+        """A steward that refuses me while I see nobody before me has another order: my plan is told anew, as it is.
+
+        So it is after long where I do see somebody: lists may differ without any plan being missed, and then two may
+        each wait for the other with nobody else's picture showing why (campaign terminal, all, seed 15).
+        """
+        owned, tokens = self.owned, self.fleet.tokens
+        refused = [key.number >> 8 for key, why in tokens.refused.items() if why is Reason.TOKEN_NOT_GRANTABLE_YET]
+        if owned is None or not refused:
+            self._refused = None
+            return []
+        if self._refused is None or self._refused[0] != owned.current:
+            self._refused = (owned.current, now_us)
+        patience_us = TELL_US if any(self._is_first(entity) for entity in refused) else TELL_BEHIND_US
+        if now_us - self._refused[1] < patience_us:
+            return []
+        self._refused = None
+        left = remaining(self.mirror.traffic, self.fleet.node_id, now_us)
+        return [] if left is None else self._adopt(replace(left, version=successor(self.version, 8)), now_us)
+
+    def _is_first(self, entity: int) -> bool:
+        """Whether nobody is before me in an entity's list but those inside, and there is room beside them."""
+        traffic = self.mirror.traffic
+        row = traffic.lists.get(entity, [])
+        inside = [one for one in row if traffic.is_inside(one)]
+        capacity = self.site.entities[entity].capacity
+        following = next((one for one in row if not traffic.is_inside(one)), None)
+        return following is not None and following.owner == self.fleet.node_id and len(inside) < capacity
+
+    def _planning_due(self, now_us: int) -> int | None:
+        """When there is something to plan, or to look at."""
+        times = [self._again_at_us, self._patience_at_us]
+        if self.owned is not None and self.fleet.tokens.refused:
+            times.append(now_us + TELL_US)
+        if self.queue:
+            times.append(self._queue_at_us or now_us)
+        if self.owned is not None and self.mirror.traffic.changes != self._looked_at:
+            times.append(now_us)
+        return min((time for time in times if time is not None), default=None)
+
+    def _drop_first(self) -> None:
+        self.queue.popleft()
+        self._queue_at_us = None
+        self.generation.has_queue = bool(self.queue)
+
+    def _turn_us(self, now_us: int) -> int:
+        """When my turn to adopt plans is, or begins next; ``now_us`` itself while it is."""
+        count, rank = len(self.site.vehicles), self.site.vehicles.index(self.fleet.node_id)
+        behind = (now_us // TURN_US - rank) % count
+        return now_us if not behind else (now_us // TURN_US + count - behind) * TURN_US
+
+    # --- plans -------------------------------------------------------------------------------------------------
+
+    def _adopt(self, plan: Plan, now_us: int) -> list[Effect]:
+        """Journal the plan, put it between the others' and tell it."""
+        plan = self._as_told(plan, now_us)
+        self.version = plan.version
+        self.mirror.take_up(plan, now_us)
+        return [Record(plan_record(plan)), *self.statement(now_us)]
+
+    def _as_told(self, plan: Plan, now_us: int) -> Plan:
+        """The plan as all others read it: in whole ms, with the durations that they know."""
+        reader, read = PlanReader(self.site), None
+        for frame in to_frames(plan):
+            read = reader.feed(frame, now_us)  # type: ignore[arg-type]  # a plan's own frames
+        assert read is not None
+        loads = tuple(replace_before(load, old) for load, old in zip(read.loads, plan.loads, strict=True))
+        return replace(read, loads=loads)
+
+    def statement(self, now_us: int) -> list[Effect]:
+        """Itinerary head, plan, and how far it has come."""
+        owned = self.owned
+        if self.version == 0:
+            return []
+        node = self.fleet.node_id
+        plan = owned.plan if owned is not None else Plan(node, self.version, now_us, ())
+        grade = Grade.FIRM if owned is not None else Grade.RELEASED
+        itinerary = Itinerary(node, self.version, grade, self.stamp, ())
+        self.fleet.mirror.on_itinerary(itinerary, now_us)
+        effects: list[Effect] = [Send(itinerary), *(Send(frame) for frame in to_frames(plan))]
+        if owned is not None and owned.current:
+            effects.append(Send(self.report(owned, owned.current - 1, owned.began)))
+        return effects
+
+    def report(self, owned: Owned, step: int, at_us: int, result: StepResult = StepResult.DONE) -> StepReport:
+        """What became of a step."""
+        entity = owned.plan.steps[step].entity
+        return StepReport(self.fleet.node_id, owned.plan.version, step, result, entity, to_bus_ms(at_us))
+
+    def _mend(self, now_us: int) -> list[Effect]:
+        """Make my plan anew if it is violated, and mine only (M31); a blocked lane is waited for first (M33)."""
+        owned, traffic = self.owned, self.mirror.traffic
+        if owned is None or (self.body.is_moving or self.body.is_handling):
+            return []
+        self._patience_at_us = self._patience_end(now_us)
+        due = self._again_at_us is not None and self._again_at_us <= now_us
+        if traffic.changes == self._looked_at and not due:
+            return []
+        self._looked_at = traffic.changes
+        self._again_at_us = None
+        why = next((one.why for one in traffic.violations(now_us) if one.owner == self.fleet.node_id), "")
+        blocked = self.mirror.long_blocked(now_us) & {step.entity for step in owned.plan.steps[owned.current + 1 :]}
+        if blocked:
+            why = f"lane {self.site.entities[min(blocked)].name} is blocked"
+        return self._anew(owned, why, now_us, must=bool(blocked) or "wait for" in why) if why else []
+
+    def _anew(self, owned: Owned, why: str, now_us: int, *, must: bool) -> list[Effect]:
+        self._again_at_us = now_us + AGAIN_US
+        plan = self.generation.again(now_us, version=successor(self.version, 8))
+        end_us = self.mirror.traffic.end_of(self.fleet.node_id, now_us)
+        same_way = plan is not None and [one.entity for one in plan.steps] == [
+            one.entity for one in owned.plan.steps[owned.current :]
+        ]
+        if plan is None or (plan.end >= end_us and not must) or (same_way and "blocked" in why):
+            return []
+        self.touched += 1
+        return [Report(f"plan made anew: {why}"), *self._adopt(plan, now_us)]
+
+    def _patience_end(self, now_us: int) -> int | None:
+        """When the next blocked lane on my way has been waited for long enough."""
+        ends = [since + self.site.patience_us for since in self.mirror.traffic.blocked.values()]
+        coming = min((end for end in ends if end > now_us), default=None)
+        if self._patience_at_us is not None and self._patience_at_us <= now_us:
+            self._looked_at = -1
+        return coming if self.owned is not None else None
+
+
+def replace_before(load: Load, old: Load) -> Load:
+    """A load as it was told, with the date that its owner knows."""
+    return load._replace(before=old.before)

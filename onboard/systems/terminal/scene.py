@@ -1,0 +1,295 @@
+"""The terminal's plan: vehicles on the lanes along their plans, boxes at stations, blocked lanes, slots held.
+
+The fleet bus tells which elementary action a vehicle is at, and when it should be over; where its device bus is heard
+as well, the slot that it is in counts.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from onboard.core.codes import ANY_STATION, TokenKind
+from onboard.core.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
+from onboard.core.serial import is_newer
+from onboard.systems.terminal.chart import BAY, MARGIN, chart_of
+from onboard.systems.terminal.messages import (
+    Action,
+    LaneState,
+    MoveMode,
+    MoveState,
+    PlanHead,
+    PlanStep,
+    StepReport,
+    StepResult,
+)
+from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.trace.scene.scene import NEARLY, BusClock, Json, Spot, along, part, shape, spot_on, still
+from onboard.trace.view import SiteView
+
+_DRIVING = Action.GOTO
+
+
+@dataclass
+class _Body:
+    """One vehicle: its plan as far as it was told, the step it is at, and how it moves meanwhile."""
+
+    entity: int
+    version: int | None = None
+    begin_ms: int = 0
+    count: int = 0
+    steps: dict[int, PlanStep] = field(default_factory=dict)
+    current: int = 0
+    since_us: int = 0
+    slot: int = 0
+    is_still: bool = False
+    path: list[list[float]] = field(default_factory=list)
+
+
+class TerminalScene:
+    """Fed beside ``view``, which knows the calls."""
+
+    noun = "box"
+
+    def __init__(self, site: Terminal, view: SiteView) -> None:
+        self.site = site
+        self.view = view
+        self._clock = BusClock()
+        self._bodies = {node: _Body(site.machines[node].home.track) for node in site.vehicles}
+        self._tokens: dict[int, tuple[int, int]] = {}
+        self._blocked: dict[int, bool] = {}
+        self._boxes = {number: box.station for number, box in enumerate(site.boxes, start=1)}
+        chart = chart_of(site)
+        self._spots, self._corners, self._lines = chart.spots, chart.corners, chart.lines
+        for node, body in self._bodies.items():
+            body.path = still(self._bay(node, body.entity))
+
+    # --- the drawing -------------------------------------------------------------------------------------------
+
+    def layout(self) -> Json:
+        """The network; lanes are lines, crossings points, areas and stations rectangles."""
+        shapes, width, height = [], 0.0, 0.0
+        for one in self.site.entities.values():
+            name = str(one.number)
+            match one.kind:
+                case EntityKind.LANE:
+                    shapes.append(shape(name, "lane", one.name, self._lines[one.number], slots=one.capacity))
+                case EntityKind.CROSSING:
+                    shapes.append(shape(name, "node", one.name, [self._spots[one.number]]))
+                case EntityKind.AREA | EntityKind.STATION:
+                    corners = self._corners[one.number]
+                    kind = "area" if one.kind is EntityKind.AREA else "station"
+                    shapes.append(shape(name, kind, one.name, corners, room=one.room))
+                    width, height = max(width, corners[1][0]), max(height, corners[1][1])
+        for one in self.site.entities.values():
+            for other in one.leads_to:
+                if other in self._spots and one.number in self._spots and not self._is_lane(one.number, other):
+                    ends = [self._spots[one.number], self._spots[other]]
+                    shapes.append(shape(f"{one.number}-{other}", "link", "", ends))
+        width = max([width, *(x for x, _ in self._spots.values())]) + MARGIN
+        height = max([height, *(y for _, y in self._spots.values())]) + MARGIN
+        lanes = [one.name for one in self.site.entities.values() if one.kind is EntityKind.LANE]
+        return {"plan": {"width": width, "height": height, "shapes": shapes}, "blockable": lanes}
+
+    def _is_lane(self, *numbers: int) -> bool:
+        return any(self.site.entities[number].kind is EntityKind.LANE for number in numbers)
+
+    # --- in ----------------------------------------------------------------------------------------------------
+
+    def feed(self, message: Message, time_us: int) -> None:
+        """As in the port."""
+        if message.sender in self._bodies:
+            self._on_vehicle(message, time_us)
+        match message:
+            case BusTime():
+                self._clock.feed(message, time_us)
+            case LaneState():
+                if self._blocked.get(message.lane, False) is not message.blocked:
+                    words = "is blocked" if message.blocked else "is free again"
+                    self.view.say(time_us, f"{self.place(message.lane)} {words}")
+                self._blocked[message.lane] = message.blocked
+            case TokenGrant() if message.token_kind is TokenKind.SEGMENT:
+                self._on_token(message.token, message.version, message.holder)
+            case TokenHeld() if message.token_kind is TokenKind.SEGMENT:
+                self._on_token(message.token, message.version, message.sender)
+            case CarAt() if message.car.number in self._boxes:
+                # The newest at a station is the last in its row.
+                del self._boxes[message.car.number]
+                self._boxes[message.car.number] = 0 if message.station == ANY_STATION else message.station
+
+    def _on_vehicle(self, message: Message, time_us: int) -> None:
+        """What a vehicle says of its own plan."""
+        body = self._bodies[message.sender]
+        match message:
+            case PlanHead():
+                self._on_head(message, time_us)
+            case PlanStep() if body.version == message.version and message.entity in self.site.entities:
+                body.steps[message.step] = message
+                if message.step == body.current:
+                    self._go(message.sender, body, time_us)
+            case StepReport():
+                self._on_report(message, time_us)
+
+    def feed_device(self, node: int, message: Message, time_us: int) -> None:
+        """As in the port."""
+        body = self._bodies.get(node)
+        if body is None or not isinstance(message, MoveState):
+            return
+        is_still = message.mode is not MoveMode.MOVING
+        if (message.entity, message.slot, is_still) == (body.entity, body.slot, body.is_still):
+            return
+        body.is_still = is_still
+        if message.entity in self.site.entities and message.slot:
+            body.entity, body.slot = message.entity, message.slot
+            self._in_slot(node, body, time_us, at_end=message.at_end or is_still)
+
+    def _on_token(self, number: int, version: int, holder: int) -> None:
+        known = self._tokens.get(number)
+        if known is None or not is_newer(known[0], version, 16):
+            self._tokens[number] = (version, holder)
+
+    def _on_head(self, head: PlanHead, time_us: int) -> None:
+        body = self._bodies[head.sender]
+        if body.version == head.version:
+            return
+        is_same_story = body.begin_ms == head.begin_ms and body.version is not None
+        body.version, body.begin_ms, body.count, body.steps = head.version, head.begin_ms, head.steps, {}
+        if not is_same_story:
+            body.current, body.since_us = 0, self._clock.log_us(head.begin_ms, time_us) or time_us
+
+    def _on_report(self, report: StepReport, time_us: int) -> None:
+        body = self._bodies[report.sender]
+        if report.result is not StepResult.DONE or report.version != body.version:
+            return
+        if report.step + 1 <= body.current:
+            return
+        body.current = report.step + 1
+        body.since_us = self._clock.log_us(report.at_ms, time_us) or time_us
+        self._go(report.sender, body, time_us)
+
+    def _go(self, node: int, body: _Body, time_us: int) -> None:
+        """The step in hand begins."""
+        step = body.steps.get(body.current)
+        if step is None:
+            return
+        before_ms = body.steps[body.current - 1].end_ms if body.current - 1 in body.steps else 0
+        length_us = max(0, step.end_ms - before_ms) * 1000
+        if body.entity != step.entity or body.slot == 0:
+            body.entity, body.slot = step.entity, 0
+            line = self._lines.get(step.entity) if step.action is _DRIVING else None
+            if line is not None:
+                body.path = along(line, body.since_us, body.since_us + round(length_us * NEARLY), NEARLY)
+            else:
+                body.path = still(self._standing(node, step.entity), time_us)
+
+    def _in_slot(self, node: int, body: _Body, time_us: int, *, at_end: bool) -> None:
+        """What the vehicle's own drive says: into this slot, evenly, or at its end."""
+        entity = self.site.entities[body.entity]
+        line = self._lines.get(body.entity)
+        if line is None:
+            body.path = still(self._standing(node, body.entity), time_us)
+            return
+        slots = max(1, entity.capacity)
+        begin, end = (body.slot - 1) / slots, min(1.0, body.slot / slots)
+        if at_end:
+            body.path = still(spot_on(line, end * NEARLY), time_us)
+        else:
+            body.path = along(part(line, begin, end * NEARLY), time_us, time_us + entity.duration_us // slots)
+
+    # --- out ---------------------------------------------------------------------------------------------------
+
+    def machine(self, node: int, now_us: int) -> Json:
+        """As in the port."""
+        body = self._bodies.get(node)
+        if body is None:
+            return {"where": "", "car": None}
+        aboard = self.view.aboard.get(node)
+        step = body.steps.get(body.current)
+        doing = step.action.name.lower().replace("_", " ") if step is not None and step.action is not _DRIVING else ""
+        told: list[list[object]] = []
+        for later in self._to_come(body):
+            end_us = self._clock.log_us(body.begin_ms + later.end_ms, now_us)
+            what = later.action.name.lower().replace("_", " ")
+            told.append([end_us, f"{what} {self.place(later.entity)}"])
+        return {
+            "where": f"{self.place(body.entity)}{f', {doing}' if doing else ''}",
+            "car": self.thing(aboard).partition(" ")[2] if aboard is not None else None,
+            "path": body.path,
+            "ahead": self._ahead(node, body),
+            "held": self._held(node),
+            "told": told,
+        }
+
+    def _to_come(self, body: _Body) -> Iterator[PlanStep]:
+        return (body.steps[number] for number in range(body.current, body.count) if number in body.steps)
+
+    def _ahead(self, node: int, body: _Body) -> list[str | list[float]]:
+        """The way to come: lanes by their shapes, the one in hand too; other places by their spots."""
+        found: list[str | list[float]] = []
+        for step in self._to_come(body):
+            if step.entity in self._lines:
+                one: str | list[float] = str(step.entity)
+            elif self.site.entities[step.entity].kind is EntityKind.AREA:
+                continue
+            else:
+                x, y = self._standing(node, step.entity)
+                one = [round(x, 1), round(y, 1)]
+            if not found or found[-1] != one:
+                found.append(one)
+        return found
+
+    def _held(self, node: int) -> list[list[object]]:
+        """Lanes with the piece of them that is held, and crossings."""
+        found: list[list[object]] = []
+        for number, (_, holder) in sorted(self._tokens.items()):
+            entity = self.site.entities.get(number >> 8)
+            if holder != node or entity is None or entity.kind is EntityKind.AREA:
+                continue
+            slots, slot = max(1, entity.capacity), number & 0xFF
+            line = self._lines.get(entity.number)
+            piece = part(line, (slot - 1) / slots, min(1.0, slot / slots)) if line is not None else []
+            found.append([str(entity.number), [[round(x, 1), round(y, 1)] for x, y in piece]])
+        return found
+
+    def marks(self, now_us: int) -> Json:
+        """Stations with the boxes that stand there, and blocked lanes."""
+        marks: Json = {}
+        for one in self.site.entities.values():
+            if one.kind is EntityKind.STATION:
+                row = [self.site.boxes[number - 1].name for number, at in self._boxes.items() if at == one.number]
+                marks[str(one.number)] = {"count": len(row), "lines": row}
+        for lane, blocked in self._blocked.items():
+            if blocked:
+                marks[str(lane)] = {"state": "blocked", "lines": ["blocked"]}
+        return {"marks": marks, "things": []}
+
+    def thing(self, reference: Reference) -> str:
+        """A box by its name in the site file."""
+        if 0 < reference.number <= len(self.site.boxes):
+            return f"box {self.site.boxes[reference.number - 1].name}"
+        return f"box {reference.number}"
+
+    def place(self, number: int) -> str:
+        """As in the port."""
+        entity = self.site.entities.get(number)
+        return entity.name if entity is not None else "anywhere" if number == ANY_STATION else f"place {number}"
+
+    def task_end(self, reference: Reference, station: int) -> str:
+        """As in the port."""
+        return f"has put the box down at {self.place(station)}"
+
+    # --- spots -------------------------------------------------------------------------------------------------
+
+    def _bay(self, node: int, area: int) -> Spot:
+        """A vehicle's own bay in an area."""
+        if area not in self._corners:
+            return self._spots[area]
+        (x0, _), (x1, y1) = self._corners[area]
+        rank, count = self.site.vehicles.index(node), len(self.site.vehicles)
+        return x0 + (x1 - x0) * (rank + 0.5) / count, y1 - BAY / 2
+
+    def _standing(self, node: int, entity: int) -> Spot:
+        """Where a vehicle is drawn that is at a station, in an area, or on a crossing."""
+        place = self.site.entities[entity]
+        if place.kind is EntityKind.STATION:
+            (x0, _), (x1, y1) = self._corners[entity]
+            return (x0 + x1) / 2, y1
+        return self._bay(node, entity)

@@ -1,0 +1,362 @@
+"""The vehicle: carries out the elementary actions of its plan, reports each, and makes its own plan anew if violated.
+
+Nobody plans for it. It moves only into slots whose rights it holds, in the order in which the plans pass (design,
+section 5), so a wrong mirror costs time and nothing else. In an area every vehicle has a bay of its own.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from onboard.core.authority import TokenKey, car_token, segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.core.effects import Effect, Record, Send
+from onboard.core.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
+from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionState, authorised
+from onboard.core.negotiation import Estimator, NegotiationEvent
+from onboard.core.site import Machine, Segment, Site
+from onboard.systems.terminal.body import Body
+from onboard.systems.terminal.generation import VehicleGeneration
+from onboard.systems.terminal.manual import Manual
+from onboard.systems.terminal.memory import box_record, read_boxes, step_record
+from onboard.systems.terminal.messages import (
+    Action,
+    Assignment,
+    HandlerMode,
+    HandlerState,
+    MoveMode,
+    MoveState,
+    StepResult,
+)
+from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.plan import Load
+from onboard.systems.terminal.planner import Planner
+from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.terminal.traffic import Owned
+
+#: A failed action of the handler is tried again after this, us. Ours.
+RETRY_US = 5_000_000
+#: What a statement about a box says where that about a car has a wheelbase (dbc/fleet.dbc).
+NO_WHEELBASE_MM = 1500
+
+
+def terminal(site: Site) -> Terminal:
+    """The site as what it is. Raises ``TypeError`` for another system's."""
+    if not isinstance(site, Terminal):
+        raise TypeError(f"site {site.name} is no container terminal")
+    return site
+
+
+@dataclass(frozen=True)
+class VehicleFactory:
+    """Makes vehicles."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> VehicleGeneration:
+        """The vehicle's task-generation function, with the picture that it looks at."""
+        place = terminal(site)
+        return VehicleGeneration(place, machine, TerminalMirror(place, machine.node_id, mirror))
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Vehicle":
+        """The vehicle's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, VehicleGeneration):
+            raise TypeError("a vehicle needs its own task-generation function")
+        return Vehicle(fleet, estimator)
+
+
+@dataclass
+class Vehicle:
+    """One vehicle: its devices, its plan, and what it does next."""
+
+    fleet: Fleet
+    generation: VehicleGeneration
+    kind: KindCode = KindCode.VEHICLE
+    body: Body = field(init=False)
+    planner: Planner = field(init=False)
+    manual: Manual = field(init=False)
+    _retry_at_us: int | None = None
+    _may_retry: bool = False
+    _told_blocked: bool = False
+    _actions: dict[Action, Callable[[Owned, int], list[Effect]]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.body = Body(self.fleet.node_id)
+        self.planner = Planner(self.fleet, self.generation, self.body)
+        self.manual = Manual(self.fleet.node_id)
+        self._actions = {
+            Action.GOTO: self._goto,
+            Action.DOCK: self._dock,
+            Action.PICK_UP: self._pick_up,
+            Action.PUT_DOWN: self._put_down,
+            Action.UNDOCK: self._undock,
+        }
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def site(self) -> Terminal:
+        """The site."""
+        return self.generation.site
+
+    @property
+    def mirror(self) -> TerminalMirror:
+        """My picture of the others."""
+        return self.generation.mirror
+
+    @property
+    def owned(self) -> Owned | None:
+        """My plan in execution."""
+        return self.mirror.traffic.plans.get(self.fleet.node_id)
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        if not self.body.is_known:
+            return MachineState.STARTING
+        if not self.manual.is_automatic:
+            return MachineState.WAITING
+        return MachineState.IDLE if self.owned is None else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """Version of the plan."""
+        return self.planner.version if self.owned is not None else 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """After a restart the journal knows the plan and how far it has come."""
+        self.mirror.remember(read_boxes(self.fleet.node_id, self.site.desk, self.fleet.entries))
+        self.planner.start(now_us)
+        self.manual.replay(self.fleet.entries)
+        self.generation.is_held = not self.manual.is_automatic
+        return []
+
+    def sense(self, message: Message, now_us: int) -> list[Effect]:
+        """Drive and handler."""
+        if isinstance(message, MoveState | HandlerState):
+            was_known = self.body.is_known
+            self.body.sense(message)
+            if self.body.is_known and not was_known:
+                return [*self._settle_in(now_us), *self.statements(now_us)]
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Everybody's plans, reports, boxes and lanes; a central planner's order is as good as an award."""
+        self.mirror.hear(message, now_us)
+        if isinstance(message, ManualOrder) and message.machine == self.fleet.node_id:
+            effects = self.manual.step_by_hand(message, self.owned)
+            self.generation.is_held = not self.manual.is_automatic
+            return effects
+        if isinstance(message, Assignment) and message.vehicle == self.fleet.node_id:
+            return self.planner.assigned(message, now_us)
+        if isinstance(message, CallForProposals):
+            self.planner.called(message)
+        if isinstance(message, Heartbeat):
+            return self.mirror.ask(message)
+        return []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """Tasks won are the planner's."""
+        return self.planner.negotiated(event, now_us)
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Rights come from a steward and go back there."""
+        return Reason.TOKEN_NOT_GRANTABLE_YET
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """One step of the plan, where its condition is met."""
+        if not self.body.is_known:
+            return []
+        if self._retry_at_us is not None and self._retry_at_us <= now_us:
+            self._retry_at_us, self._may_retry = None, True
+        effects = self.body.repeat(now_us) + self._give_back(now_us) + self.manual.rests(self.body.is_at_rest)
+        effects += self.planner.in_turn(now_us)
+        owned = self.owned
+        if effects:
+            return effects
+        effects = self.planner.speak(now_us)
+        if effects or owned is None:
+            return effects
+        return self._actions[owned.plan.steps[owned.current].action](owned, now_us)
+
+    def next_wake(self) -> int | None:
+        """Repeats and retries of the devices, and the planner's turn."""
+        times = (self.body.due_us, self._retry_at_us, self.planner.next_wake())
+        return min((time for time in times if time is not None), default=None)
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """My plan, how far it has come, the box that I carry, those put down that no desk keeps yet, my rights."""
+        effects = self.planner.statement(now_us)
+        effects += [Send(one) for one in self.mirror.kept_by(self.fleet.node_id)]
+        handler = self.body.handler
+        if handler is not None and handler.box and self.fleet.tokens.holds(self._box_token(handler.box)):
+            effects.append(Send(self._box_at(handler.box, ANY_STATION)))
+        return effects + self.manual.statement() + self.fleet.tokens.statements()
+
+    # --- motion -----------------------------------------------------------------------------------------------
+
+    def _done(self, owned: Owned, now_us: int) -> list[Effect]:
+        """The step in hand is over: reported, deleted, the next begins now (row M30)."""
+        step = owned.current
+        report = self.planner.report(owned, step, now_us)
+        self.mirror.hear(report, now_us)
+        self._told_blocked = False
+        effects: list[Effect] = [Record(step_record(owned.plan.version, step, now_us)), Send(report)]
+        if self.owned is None:
+            effects += self.planner.over(now_us)
+        return effects
+
+    def _settle_in(self, now_us: int) -> list[Effect]:
+        """After power-up: the body says where the plan has come to; a step may have ended while nobody looked."""
+        owned, move = self.owned, self.body.move
+        assert move is not None
+        if owned is None:
+            return []
+        steps = owned.plan.steps
+        if steps[owned.current].entity != move.entity and owned.current + 1 < len(steps):
+            if steps[owned.current + 1].entity == move.entity:
+                return self._done(owned, now_us)
+        elif owned.current == len(steps) - 1 and steps[owned.current].entity != move.entity:
+            return self._done(owned, now_us)
+        return []
+
+    def _goto(self, owned: Owned, now_us: int) -> list[Effect]:
+        """Cross the entity in hand, slot by slot, and enter the next one (M11: the way inside is the drive's)."""
+        move, steps, current = self.body.move, owned.plan.steps, owned.current
+        assert move is not None
+        following = steps[current + 1].entity
+        if move.entity == following:
+            return self._done(owned, now_us)
+        if self.body.is_moving:
+            return []
+        if move.mode is MoveMode.BLOCKED and not self._told_blocked:
+            self._told_blocked = True
+            return [Send(self.planner.report(owned, current, now_us, StepResult.BLOCKED))]
+        if not self.manual.may_begin(owned):
+            return []
+        here = self.site.entities[move.entity]
+        if here.kind is EntityKind.LANE and move.slot < here.capacity:
+            return self._enter(move.entity, move.slot + 1, following, now_us)
+        if here.kind is EntityKind.AREA and self.body.towards() != following:
+            return self.body.go(move.entity, move.slot, following, now_us)
+        if following in self.mirror.traffic.blocked:
+            return []
+        onward = steps[current + 2].entity if current + 2 < len(steps) else 0
+        slot = self.mirror.entry_slot(following, self.fleet.node_id)
+        return self._enter(following, slot, onward, now_us)
+
+    def _enter(self, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
+        """Ask for the right to a slot and go there once it is held and the slot in hand is crossed."""
+        key = segment_token(Segment(entity, slot))
+        if self.site.entities[entity].kind is not EntityKind.AREA:
+            allowed = authorised(
+                MotionState(self.fleet.tokens, self.body.is_known, stopped=False), Segment(entity, slot)
+            )
+            if not allowed[0]:
+                return self.fleet.tokens.want(key, now_us)
+        return self.body.go(entity, slot, towards, now_us) if self.body.stands_ready else []
+
+    def _give_back(self, now_us: int) -> list[Effect]:
+        """Rights to slots behind me, and to slots that my plan does not lead to any more, go back to their stewards."""
+        move = self.body.move
+        if move is None or self.body.is_moving:
+            return []
+        keep = {segment_token(Segment(move.entity, move.slot)), *self._wanted_slots()}
+        effects: list[Effect] = []
+        tokens = self.fleet.tokens
+        for key in [one for one in tokens.wanted if one.kind is TokenKind.SEGMENT and one not in keep]:
+            tokens.forget(key)
+        for key in [one for one in tokens.mine() if one.kind is TokenKind.SEGMENT and one not in keep]:
+            effects += tokens.give(key, self.site.stewards[key.number >> 8], now_us)
+        return effects
+
+    def _wanted_slots(self) -> list[TokenKey]:
+        """The slot that comes next by the plan."""
+        owned, move = self.owned, self.body.move
+        if owned is not None and not self.manual.may_begin(owned):
+            return []
+        if owned is None or move is None or owned.current + 1 >= len(owned.plan.steps):
+            return []
+        here = self.site.entities[move.entity]
+        if here.kind is EntityKind.LANE and move.slot < here.capacity:
+            return [segment_token(Segment(move.entity, move.slot + 1))]
+        following = owned.plan.steps[owned.current + 1].entity
+        return [segment_token(Segment(following, self.mirror.entry_slot(following, self.fleet.node_id)))]
+
+    # --- at stations -------------------------------------------------------------------------------------------
+
+    def _load(self, owned: Owned) -> Load | None:
+        step = owned.current
+        return next((load for load in owned.plan.loads if step in (load.pick, load.put)), None)
+
+    def _handle(self, action: Action, box: int, now_us: int) -> list[Effect]:
+        owned = self.owned
+        if self.body.is_handling or self._retry_at_us is not None or owned is None or not self.manual.may_begin(owned):
+            return []
+        assert self.body.handler is not None
+        if self.body.handler.gear is HandlerMode.FAILED and not self._may_retry:
+            self._retry_at_us = now_us + RETRY_US
+            return [Send(self.planner.report(owned, owned.current, now_us, StepResult.FAILED))]
+        self._may_retry = False
+        return self.body.handle(action, box, now_us)
+
+    def _dock(self, owned: Owned, now_us: int) -> list[Effect]:
+        assert self.body.handler is not None
+        if self.body.handler.gear is HandlerMode.DOCKED and not self.body.is_handling:
+            return self._done(owned, now_us)
+        return self._handle(Action.DOCK, 0, now_us) if self.body.stands_ready else []
+
+    def _pick_up(self, owned: Owned, now_us: int) -> list[Effect]:
+        """Only with the right to the box: its custodian gives it to whoever plans to carry it."""
+        load = self._load(owned)
+        assert load is not None and self.body.handler is not None
+        key = self._box_token(load.box)
+        if not self.fleet.tokens.holds(key):
+            return self.fleet.tokens.want(key, now_us)
+        if self.body.handler.box == load.box and not self.body.is_handling:
+            aboard = self._state_box(load.box, ANY_STATION)
+            return [*aboard, self._phase(load.task, TaskPhase.LOADED, 0), *self._done(owned, now_us)]
+        return self._handle(Action.PICK_UP, load.box, now_us)
+
+    def _put_down(self, owned: Owned, now_us: int) -> list[Effect]:
+        load = self._load(owned)
+        assert load is not None and self.body.handler is not None
+        if self.body.handler.box == 0 and not self.body.is_handling:
+            station = owned.plan.steps[owned.current].entity
+            effects: list[Effect] = [Record(box_record(self._box_at(load.box, station)))]
+            effects += self._state_box(load.box, station)
+            key = self._box_token(load.box)
+            if self.fleet.tokens.holds(key):
+                effects += self.fleet.tokens.give(key, self.site.desk, now_us)
+            return [*effects, self._phase(load.task, TaskPhase.DONE, station), *self._done(owned, now_us)]
+        return self._handle(Action.PUT_DOWN, load.box, now_us)
+
+    def _undock(self, owned: Owned, now_us: int) -> list[Effect]:
+        """Undocked and back in the bay of the area: the station is free."""
+        move, handler = self.body.move, self.body.handler
+        assert move is not None and handler is not None
+        area = self.site.entities[owned.plan.steps[owned.current].entity].area
+        if move.entity == area:
+            return self._done(owned, now_us)
+        if handler.gear is not HandlerMode.FREE or self.body.is_handling:
+            return self._handle(Action.UNDOCK, 0, now_us)
+        if self.body.is_moving or not self.manual.may_begin(owned):
+            return []
+        steps = owned.plan.steps
+        towards = steps[owned.current + 2].entity if owned.current + 2 < len(steps) else 0
+        return self._enter(area, self.mirror.entry_slot(area, self.fleet.node_id), towards, now_us)
+
+    def _phase(self, task: Reference, phase: TaskPhase, station: int) -> Effect:
+        return Send(TaskReport(self.fleet.node_id, task, phase, station or ANY_STATION, Reason.NONE))
+
+    def _box_token(self, box: int) -> TokenKey:
+        return car_token(*self.site.box(box))
+
+    def _box_at(self, box: int, station: int) -> CarAt:
+        version = self.fleet.tokens.version_of(self._box_token(box))
+        return CarAt(self.fleet.node_id, self.site.box(box), station, version, NO_WHEELBASE_MM)
+
+    def _state_box(self, box: int, station: int) -> list[Effect]:
+        statement = self._box_at(box, station)
+        self.fleet.mirror.on_car(statement)
+        self.mirror.hear(statement, 0)
+        return [Send(statement)]

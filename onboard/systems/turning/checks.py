@@ -1,0 +1,134 @@
+"""Rules of the turning cell, from the frames alone: bids equal their bills, an order is on one lathe, batches grow."""
+
+from collections.abc import Callable
+
+from onboard.core.codes import CallResult, TaskPhase
+from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.systems.turning.messages import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
+from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
+from onboard.trace.check.event import Event, Finding
+from onboard.trace.check.picture import Picture
+from onboard.trace.check.rule import Handlers, Rule
+
+#: Five terms and their sum are rounded to cents one by one, ct.
+ROUNDING_CT = 3
+
+
+class BillsAddUp(Rule):
+    """The five terms that a lathe tells before its bid sum to the bid."""
+
+    name = "bills-add-up"
+    title = "the five terms of a bid sum to it"
+    source = "row P26"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._terms: dict[tuple[int, Reference], dict[str, int]] = {}
+        self._tasks: dict[tuple[int, int], Reference] = {}
+
+    def handlers(self) -> Handlers:
+        """Bills, calls and bids."""
+        return {
+            BillCutting: self._on_cutting,
+            BillWaiting: self._on_waiting,
+            BillBar: self._on_bar,
+            CallForProposals: self._on_call,
+            Bid: self._on_bid,
+        }
+
+    def _of(self, sender: int, manager: int, task: int) -> dict[str, int]:
+        return self._terms.setdefault((sender, Reference(manager, task)), {})
+
+    def _on_cutting(self, event: Event[BillCutting]) -> None:
+        word = event.message
+        terms = self._of(word.sender, word.manager, word.task)
+        terms["machining"], terms["tools"] = word.machining_ct, word.tools_ct
+
+    def _on_waiting(self, event: Event[BillWaiting]) -> None:
+        word = event.message
+        terms = self._of(word.sender, word.manager, word.task)
+        terms["setup"], terms["latency"] = word.setup_ct, word.latency_ct
+
+    def _on_bar(self, event: Event[BillBar]) -> None:
+        word = event.message
+        terms = self._of(word.sender, word.manager, word.task)
+        terms["material"] = word.material_ct
+        if len(terms) == 5 and abs(sum(terms.values()) - word.total_ct) > ROUNDING_CT:
+            self.find(event, (word.sender,), f"terms sum to {sum(terms.values())} ct, told {word.total_ct} ct")
+
+    def _on_call(self, event: Event[CallForProposals]) -> None:
+        self._tasks[event.message.sender, event.message.call] = event.message.task
+
+    def _on_bid(self, event: Event[Bid]) -> None:
+        bid = event.message
+        task = self._tasks.get((bid.initiator, bid.call))
+        terms = self._terms.get((bid.sender, task), {}) if task is not None else {}
+        if len(terms) == 5 and abs(sum(terms.values()) - bid.cost) > ROUNDING_CT:
+            self.find(event, (bid.sender,), f"bids {bid.cost} ct, its terms sum to {sum(terms.values())} ct")
+
+
+class BillsGoDown(BidsGoDown):
+    """As everywhere; a bid that is not the sum of its bill does not count."""
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._totals_ct: dict[tuple[int, Reference], int] = {}
+
+    def handlers(self) -> Handlers:
+        """Bills too."""
+        return {**super().handlers(), BillBar: self._on_bar}
+
+    def _on_bar(self, event: Event[BillBar]) -> None:
+        word = event.message
+        self._totals_ct[word.sender, Reference(word.manager, word.task)] = word.total_ct
+
+    def is_sound(self, bid: Bid, task: Reference) -> bool:
+        """The sum as it was told."""
+        return self._totals_ct.get((bid.sender, task)) == bid.cost
+
+
+class OneLathe(Rule):
+    """An order that a lathe has told to have is told by no other, until it is given or taken back; its batch grows."""
+
+    name = "one-lathe"
+    title = "every order is on one lathe, and its batch only grows"
+    source = "row P11"
+
+    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+        super().__init__(picture, report)
+        self._owner: dict[Reference, int] = {}
+        self._made: dict[Reference, int] = {}
+
+    def handlers(self) -> Handlers:
+        """Reports, progress, and what the desk takes back."""
+        return {TaskReport: self._on_report, LatheProgress: self._on_progress, Award: self._on_award}
+
+    def _on_award(self, event: Event[Award]) -> None:
+        word = event.message
+        if word.result is CallResult.REJECTED and word.sender == word.task.origin:
+            self._owner.pop(word.task, None)
+
+    def _on_report(self, event: Event[TaskReport]) -> None:
+        word = event.message
+        if word.phase in (TaskPhase.FORFEITED, TaskPhase.REFUSED):
+            if self._owner.get(word.task) == word.sender:
+                del self._owner[word.task]
+            return
+        owner = self._owner.setdefault(word.task, word.sender)
+        if owner != word.sender:
+            what = f"tells to have order {word.task.origin}.{word.task.number}, which another has"
+            self.find(event, (word.sender, owner), what)
+
+    def _on_progress(self, event: Event[LatheProgress]) -> None:
+        word = event.message
+        task = Reference(word.manager, word.task)
+        if word.made < self._made.get(task, 0) and word.lathe_phase is LathePhase.TURNING:
+            self.find(event, (word.sender,), f"told {self._made[task]} parts made before, now {word.made}")
+        if word.made > word.batch:
+            self.find(event, (word.sender,), f"made {word.made} of {word.batch} parts")
+        if word.lathe_phase in (LathePhase.TURNING, LathePhase.FINISHED):
+            self._made[task] = max(word.made, self._made.get(task, 0))
+
+
+#: What a turning cell's log is judged by: the rules of every system that apply, and its own.
+RULES: tuple[type[Rule], ...] = (CallsClosed, BidsInTime, BillsGoDown, BillsAddUp, OneLathe)

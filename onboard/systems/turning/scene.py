@@ -1,0 +1,139 @@
+"""The turning cell: nothing drives there, so each lathe is a card with its orders, the parts made and worn edges."""
+
+from collections import OrderedDict
+
+from onboard.core.codes import ANY_STATION
+from onboard.core.messages import Message, Reference
+from onboard.systems.turning.messages import (
+    BillBar,
+    LathePhase,
+    LatheProgress,
+    NcMode,
+    NcState,
+    ToolState,
+    TurningOrder,
+)
+from onboard.systems.turning.site import Turning
+from onboard.trace.scene.scene import Json, shape, still
+from onboard.trace.view import SiteView
+
+#: Plan units of a card, and between cards.
+WIDTH, HEIGHT, GAP = 300.0, 250.0, 24.0
+#: Lathes side by side.
+COLUMNS = 3
+#: Orders that are remembered: the newest.
+MOST_KEPT = 256
+
+
+class TurningScene:
+    """Fed beside ``view``, which knows the calls."""
+
+    noun = "order"
+
+    def __init__(self, site: Turning, view: SiteView) -> None:
+        self.site = site
+        self.view = view
+        self._orders: OrderedDict[Reference, TurningOrder] = OrderedDict()
+        self._progress: dict[int, OrderedDict[Reference, LatheProgress]] = {node: OrderedDict() for node in site.lathes}
+        self._modes: dict[int, NcMode] = {}
+        self._worn: dict[tuple[int, int], int] = {}
+        self._prices: dict[tuple[int, Reference], int] = {}
+
+    def layout(self) -> Json:
+        """A card for each lathe."""
+        shapes = []
+        for number, (node, lathe) in enumerate(self.site.lathes.items()):
+            x = GAP + number % COLUMNS * (WIDTH + GAP)
+            y = GAP + number // COLUMNS * (HEIGHT + GAP)
+            shapes.append(shape(f"m{node}", "card", lathe.name, [(x, y), (x + WIDTH, y + HEIGHT)], node=node))
+        rows = -(-len(shapes) // COLUMNS)
+        columns = max(1, min(COLUMNS, len(shapes)))
+        size = {"width": GAP + columns * (WIDTH + GAP), "height": GAP + rows * (HEIGHT + GAP)}
+        return {"plan": {**size, "shapes": shapes}}
+
+    def feed(self, message: Message, time_us: int) -> None:
+        """As in the port."""
+        match message:
+            case TurningOrder():
+                self._orders[Reference(message.sender, message.task)] = message
+                if len(self._orders) > MOST_KEPT:
+                    self._orders.popitem(last=False)
+            case BillBar():
+                self._prices[message.sender, Reference(message.manager, message.task)] = message.total_ct
+                if len(self._prices) > MOST_KEPT:
+                    del self._prices[next(iter(self._prices))]
+            case LatheProgress() if message.sender in self._progress:
+                self._on_progress(message, time_us)
+
+    def _on_progress(self, message: LatheProgress, time_us: int) -> None:
+        task, row = Reference(message.manager, message.task), self._progress[message.sender]
+        known = row.get(task)
+        if known is None or known.lathe_phase is not message.lathe_phase:
+            words = message.lathe_phase.name.lower().replace("_", " ")
+            self.view.say(time_us, f"{self.view.name(message.sender)}: {self.thing(task)}, {words}")
+        row[task] = message
+        if message.lathe_phase is LathePhase.FINISHED:
+            del row[task]
+
+    def feed_device(self, node: int, message: Message, time_us: int) -> None:
+        """What a numerical control does, and its edges."""
+        match message:
+            case NcState():
+                self._modes[node] = message.nc_mode
+            case ToolState():
+                self._worn[node, message.tool] = message.used_ms
+
+    def machine(self, node: int, now_us: int) -> Json:
+        """As in the port; a lathe is drawn as its card."""
+        row = self._progress.get(node)
+        if row is None:
+            return {"where": "", "car": None}
+        here = next((one for one in row.values() if one.lathe_phase is not LathePhase.QUEUED), None)
+        words = "" if here is None else f"{here.lathe_phase.name.lower().replace('_', ' ')} {here.made} of {here.batch}"
+        told = [[None, self._line(node, task, one)] for task, one in row.items()]
+        car = None if here is None else str(here.task)
+        return {"where": words, "car": car, "path": still((0, 0)), "ahead": [], "held": [], "told": told}
+
+    def marks(self, now_us: int) -> Json:
+        """Lines and bars of every card."""
+        marks: Json = {}
+        for node, lathe in self.site.lathes.items():
+            row = self._progress[node]
+            bars = [
+                [f"order {task.number}", one.made / max(1, one.batch), f"{one.made} of {one.batch}"]
+                for task, one in row.items()
+                if one.lathe_phase is not LathePhase.QUEUED
+            ]
+            for tool in lathe.tools:
+                used = self._worn.get((node, tool.number))
+                if used is not None:
+                    share = used / (tool.life_min * 60_000)
+                    bars.append([f"T{tool.number:02d} worn", min(1.0, share), f"{share:.0%}"])
+            lines = [self._line(node, task, one) for task, one in row.items()] or ["no order"]
+            mode = self._modes.get(node)
+            marks[f"m{node}"] = {
+                "lines": [*([f"control {mode.name.lower()}"] if mode is not None else []), *lines[:4]],
+                "bars": bars[:5],
+            }
+        return {"marks": marks, "things": []}
+
+    def _line(self, node: int, task: Reference, one: LatheProgress) -> str:
+        price = self._prices.get((node, task))
+        cost = f", {price / 100:.2f} a part" if price is not None else ""
+        return f"{self.thing(task)}: {one.lathe_phase.name.lower().replace('_', ' ')}{cost}"
+
+    def thing(self, reference: Reference) -> str:
+        """An order with what is to be made."""
+        order = self._orders.get(reference)
+        drawing = self.site.drawings.get(order.drawing) if order is not None else None
+        if order is None or drawing is None:
+            return f"order {reference.number}"
+        return f"order {reference.number}, {order.batch} x {drawing.name}"
+
+    def place(self, number: int) -> str:
+        """Bars come and parts go by hand."""
+        return "anywhere" if number == ANY_STATION else f"place {number}"
+
+    def task_end(self, reference: Reference, station: int) -> str:
+        """As in the port."""
+        return f"has made {self.thing(reference)}"

@@ -1,0 +1,51 @@
+"""What the machines of a turning cell know beforehand."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+from onboard.core.codes import KindCode
+from onboard.core.site import Site
+from onboard.systems.turning.drawing import At, Drawing, Element, element_fault
+from onboard.systems.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work
+
+__all__ = [
+    "At",
+    "Chuck",
+    "Drawing",
+    "Element",
+    "Job",
+    "Lathe",
+    "Material",
+    "Tool",
+    "Turning",
+    "Wanted",
+    "Work",
+    "element_fault",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """An order that the site's own demand brings, ``at_ms`` after its begin."""
+
+    at_ms: int
+    job: Job
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turning(Site):
+    """A turning cell: its lathes, and the drawings and materials that orders name. A run asks for ``orders``."""
+
+    system: ClassVar[str] = "turning"
+    demand: ClassVar[frozenset[str]] = frozenset({"orders"})
+
+    lathes: dict[int, Lathe]
+    drawings: dict[int, Drawing]
+    materials: dict[int, Material]
+    orders: tuple[Wanted, ...] = ()
+
+    @cached_property
+    def desks(self) -> tuple[int, ...]:
+        """Node-IDs of the desks, lowest first."""
+        return tuple(node for node, one in sorted(self.machines.items()) if one.kind is KindCode.DESK)

@@ -1,0 +1,133 @@
+"""Machines and segments that nobody can pass: planned around until they are there again (design, section 5).
+
+A machine that is silent, has stopped itself or waits to be admitted is an obstacle: where its body is by its last word,
+and every slot whose token it holds, since nothing is taken back because of a time-out. A segment is blocked by a word
+on the bus (``Blocked``) until another clears it. What is known here steers plans only; tokens alone permit motion.
+"""
+
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from onboard.core.authority import segment_token
+from onboard.core.codes import MOBILE_KINDS, Reason
+from onboard.core.messages import Blocked, Clear, Progress
+from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX, lift_at, platform
+from onboard.ways.occupancy import standing_segments
+from onboard.ways.reservations import FOREVER, Reservations, Use, Window
+
+#: Owner of the windows of segments that are blocked by a word on the bus: no node carries it.
+BLOCKED = 256
+
+
+class Obstacle(NamedTuple):
+    """One machine in the way: its slots, since when (bus us) and why."""
+
+    slots: frozenset[Segment]
+    since_us: int
+    reason: Reason
+
+
+@dataclass
+class Obstacles:
+    """All obstacles known to one machine. ``changes`` grows with every change, so that nobody need look twice."""
+
+    site: Site
+    reservations: Callable[[], Reservations]
+    machines: dict[int, Obstacle] = field(default_factory=dict)
+    #: Segments that somebody says nobody can pass, and those of which it was taken back, each with why.
+    blocked: dict[Segment, Reason] = field(default_factory=dict)
+    cleared: dict[Segment, Reason] = field(default_factory=dict)
+    changes: int = 0
+    _slots: tuple[Segment, ...] = ()
+
+    def take_up(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> bool:
+        """A machine is in the way at ``slots``; True where that was not known so."""
+        known = self.machines.get(node)
+        if known is not None and (known.slots, known.reason) == (slots, reason):
+            return False
+        since_us = now_us if known is None else known.since_us
+        self.machines[node] = Obstacle(slots, since_us, reason)
+        self._put(node, slots, now_us)
+        return True
+
+    def let_go(self, node: int) -> bool:
+        """A machine takes part again, or its plan is known; True where it was an obstacle."""
+        if self.machines.pop(node, None) is None:
+            return False
+        self.reservations().release(node)
+        self.changes += 1
+        return True
+
+    def is_at(self, slot: Segment) -> bool:
+        """Whether a slot is blocked, or some machine that is an obstacle has it."""
+        return slot in self.blocked or any(slot in obstacle.slots for obstacle in self.machines.values())
+
+    def hear(self, word: Blocked | Clear, now_us: int) -> bool:
+        """Take up what somebody says of a segment; True where it is news. Segments of no site are passed over."""
+        segment = Segment(word.track, word.index)
+        if segment not in self._all_slots() or (segment in self.blocked) is isinstance(word, Blocked):
+            return False
+        if isinstance(word, Blocked):
+            self.blocked[segment] = word.reason
+            self.cleared.pop(segment, None)
+        else:
+            del self.blocked[segment]
+            self.cleared[segment] = word.reason
+        self._put(BLOCKED, self.blocked, now_us)
+        return True
+
+    def words(self, node: int, tracks: Collection[int]) -> list[Blocked | Clear]:
+        """What ``node``, steward of ``tracks``, says again of their segments to who asks: blocked ones, and cleared."""
+        found: list[Blocked | Clear] = [Blocked(node, *one, why) for one, why in sorted(self.blocked.items())]
+        found += [Clear(node, *one, why) for one, why in sorted(self.cleared.items())]
+        return [word for word in found if word.track in tracks]
+
+    def retime(self, now_us: int) -> None:
+        """All that is in the way is so from now on: since when it was in a time of before is not known any more."""
+        for node, obstacle in self.machines.items():
+            self.machines[node] = obstacle._replace(since_us=now_us)
+            self._put(node, obstacle.slots, now_us)
+        if self.blocked:
+            self._put(BLOCKED, self.blocked, now_us)
+
+    def _put(self, owner: int, slots: Iterable[Segment], now_us: int) -> None:
+        reservations = self.reservations()
+        reservations.release(owner)
+        lifts = [slot.track for slot in sorted(slots) if slot.index == PLATFORM_INDEX and slot.track in self.site.lifts]
+        reservations.reserve(
+            owner,
+            [Window(slot, now_us, FOREVER) for slot in sorted(slots)],
+            [Use(lift, 1, 1, now_us, FOREVER, owner) for lift in lifts],
+        )
+        reservations.fix(owner)
+        self.changes += 1
+
+    def slots_of(
+        self, machine: Machine, seen: Progress | None, holder_of: Callable[[Segment], int]
+    ) -> frozenset[Segment]:
+        """Slots that a machine is in by its last word (its home, if it never spoke) and those whose tokens it holds."""
+        found = {slot for slot in self._all_slots() if holder_of(slot) == machine.node_id}
+        if machine.kind in MOBILE_KINDS:
+            here = machine.home if seen is None else Segment(seen.track, seen.index)
+            if here.track in self.site.tracks:
+                aboard = lift_at(self.site, here)
+                found.update([platform(aboard)] if aboard is not None else standing_segments(self.site, here))
+        return frozenset(found)
+
+    def _all_slots(self) -> tuple[Segment, ...]:
+        if not self._slots:
+            found: list[Segment] = []
+            for number, track in self.site.tracks.items():
+                if track.kind is TrackKind.LIFT:
+                    found += [Segment(number, PLATFORM_INDEX), Segment(number, GATE_INDEX)]
+                else:
+                    found += [Segment(number, index) for index in range(1, track.length + 1)]
+            self._slots = tuple(found)
+        return self._slots
+
+
+def holder_in(holder_of: Callable[..., int]) -> Callable[[Segment], int]:
+    """Who holds a slot's token, from who holds a token."""
+    return lambda slot: holder_of(segment_token(slot))

@@ -1,0 +1,36 @@
+"""Plans with what the wire does not repeat: when the leg in hand began. All times are bus time in us."""
+
+from typing import NamedTuple
+
+from onboard.core.messages import Itinerary, Leg
+from onboard.core.serial import from_bus_ms
+from onboard.ways.occupancy import leg_begins_us
+
+#: Windows told in whole milliseconds may overlap by their rounding; so much is no conflict, us. Ours.
+TOLERANCE_US = 10_000
+
+
+class Plan(NamedTuple):
+    """A firm itinerary and when its first leg began (bus us)."""
+
+    itinerary: Itinerary
+    first_begin_us: int
+
+
+def next_plan(known: Plan | None, itinerary: Itinerary, now_us: int) -> Plan:
+    """The plan that ``itinerary`` tells after ``known``: a first leg that was planned before keeps its begin.
+
+    An itinerary names the ends of its legs and its award; a leg under way began long after that.
+    """
+    award_us = from_bus_ms(itinerary.stamp.award_ms, now_us)
+    if known is None or not itinerary.legs:
+        return Plan(itinerary, award_us)
+    begins_us = leg_begins_us(known.itinerary, now_us, known.first_begin_us)
+    for leg, begin_us in zip(known.itinerary.legs, begins_us, strict=True):
+        if _way(leg) == _way(itinerary.legs[0]):
+            return Plan(itinerary, min(begin_us, from_bus_ms(itinerary.legs[0].end_ms, now_us)))
+    return Plan(itinerary, award_us)
+
+
+def _way(leg: Leg) -> tuple[int, ...]:
+    return leg.action, leg.track, leg.from_index, leg.to_index, leg.side

@@ -1,0 +1,283 @@
+"""Who passes a segment before whom: the order in which tokens are granted (design, section 5).
+
+Firm plans without conflict give an order of passing on every segment. It is agreed where two machines' plans, as last
+told, nowhere want one segment at one time; while a delay of one has not been answered by the other they do, and then
+the order is the one last agreed. What a machine has passed no longer counts: its own words (the leg in hand, where its
+body is) and the tokens that it gave back tell, never the clock. So a machine that is late, or dead, keeps its place in
+the order until it tells another plan, and a wrong order costs time, never safety.
+
+A plan that is told anew drops the legs that are over, so a moving leg is known by how many more come behind it.
+All times are bus time in us. Pure: plans, progress and grants in, an order out.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from onboard.core.codes import NOBODY, LegAction, Reason
+from onboard.core.messages import Itinerary, Leg, Progress
+from onboard.core.serial import is_newer
+from onboard.core.site import Segment, Site
+from onboard.ways.occupancy import body_mm, leg_windows
+from onboard.ways.passing import TOLERANCE_US, Plan
+
+
+class Turn(NamedTuple):
+    """Occupation of a segment during one leg, ``to_come`` moving legs before the plan's end."""
+
+    to_come: int
+    from_us: int
+    to_us: int
+
+
+Turns = dict[Segment, list[Turn]]
+
+
+class Meeting(NamedTuple):
+    """Two machines want one segment at one time: their turns, and who comes first by what they last agreed, or None."""
+
+    segment: Segment
+    mine: Turn
+    theirs: Turn
+    first: int | None
+
+
+@dataclass
+class _Way:
+    """One machine's plan: its turns, and how far it has come.
+
+    ``in_hand`` is how many moving legs come behind leg number ``leg``, the one in hand; in that leg its body is at
+    index ``body`` and has left the segments ``left``.
+    """
+
+    itinerary: Itinerary
+    turns: Turns
+    moves: tuple[Leg, ...]
+    in_hand: int
+    leg: int = 0
+    body: int | None = None
+    left: set[Segment] = field(default_factory=set)
+
+    def open_turns(self, segment: Segment, turns: Turns | None = None) -> Iterator[Turn]:
+        """Turns on a segment that are not over, in order; with other times where ``turns`` are given."""
+        for turn in (self.turns if turns is None else turns).get(segment, ()):
+            if turn.to_come < self.in_hand or (turn.to_come == self.in_hand and segment not in self.left):
+                yield turn
+
+    def to_come(self, leg: int) -> int:
+        """How many moving legs come behind leg number ``leg``."""
+        return sum(moves(one) for one in self.itinerary.legs[leg + 1 :])
+
+
+@dataclass
+class PassingOrder:
+    """The order of passing on all segments, as far as one machine has heard."""
+
+    site: Site
+    _ways: dict[int, _Way] = field(default_factory=dict)
+    #: Turns of both under which two machines last agreed, lower node-ID first.
+    _agreed: dict[tuple[int, int], tuple[Turns, Turns]] = field(default_factory=dict)
+
+    # --- what is heard -----------------------------------------------------------------------------------------
+
+    def on_plan(self, plan: Plan, now_us: int) -> None:
+        """A firm plan under a new version, or a released one, which has no turns."""
+        node, itinerary = plan.itinerary.sender, plan.itinerary
+        known = self._ways.get(node)
+        way = _Way(itinerary, _turns(self.site, plan, now_us), _moves(itinerary), 0)
+        way.in_hand = way.to_come(0) if itinerary.legs else 0
+        continued = known is not None and known.moves[len(known.moves) - len(way.moves) :] == way.moves
+        if known is not None and continued and known.in_hand == way.in_hand:
+            way.body, way.left = known.body, known.left
+        self._ways[node] = way
+        for other in self._ways:
+            if other != node:
+                self._agree(node, other, keep=continued)
+
+    def drop(self, node: int) -> None:
+        """A machine is an obstacle: it passes nothing until it tells a plan, so nobody comes behind it."""
+        self._ways.pop(node, None)
+        for pair in [pair for pair in self._agreed if node in pair]:
+            del self._agreed[pair]
+
+    def on_progress(self, progress: Progress) -> None:
+        """Where a machine's body is; of another version than its plan's it tells nothing."""
+        way = self._ways.get(progress.sender)
+        if way is None or progress.itinerary_version != way.itinerary.version or not way.itinerary.legs:
+            return
+        in_hand = way.to_come(progress.leg)
+        if in_hand > way.in_hand:
+            return
+        if in_hand < way.in_hand:
+            way.in_hand, way.left = in_hand, set()
+        way.leg = min(progress.leg, len(way.itinerary.legs) - 1)
+        leg = way.itinerary.legs[way.leg]
+        if leg.track == progress.track:
+            way.body = progress.index
+            way.left |= self._behind(leg, progress)
+
+    def on_return(self, node: int, segment: Segment) -> None:
+        """A machine gave a segment's token back: it has left it, unless it lies ahead of it in the leg in hand.
+
+        A grant that was lost and is said again may come when the machine is on its way back already.
+        """
+        way = self._ways.get(node)
+        if way is None or not way.itinerary.legs:
+            return
+        leg = way.itinerary.legs[way.leg]
+        if leg.action is LegAction.TRAVEL and leg.track == segment.track:
+            body = leg.from_index if way.body is None else way.body
+            step = 1 if leg.to_index > leg.from_index else -1
+            if (segment.index - body) * step > 0:
+                return
+        way.left.add(segment)
+
+    # --- the order ---------------------------------------------------------------------------------------------
+
+    def predecessor(self, node: int, segment: Segment) -> int | None:
+        """Who passes right before ``node``, 0 for nobody; None where the plan of ``node`` does not come here."""
+        mine = self._first(node, segment)
+        if mine is None:
+            return None
+        found = [(turns[1].from_us, other) for other, turns in self._before(node, segment)]
+        return max(found)[1] if found else NOBODY
+
+    def verdict(self, node: int, segment: Segment, version: int, believed: int) -> Reason:
+        """Whether the order lets ``node`` have the segment now.
+
+        ``version`` and ``believed`` are its request's itinerary version and predecessor. MIRROR_BEHIND where the two
+        views differ and a newer word is needed to tell who is right.
+        """
+        way = self._ways.get(node)
+        if way is None or is_newer(version, way.itinerary.version, 8):
+            return Reason.MIRROR_BEHIND
+        first = self.predecessor(node, segment)
+        if first is None:
+            # It stands here after power-up, or has a plan that was not heard: only where nobody plans to be.
+            others = (other for other in self._ways if other != node)
+            return Reason.MIRROR_BEHIND if any(self._first(o, segment) for o in others) else Reason.NONE
+        if first == NOBODY:
+            unknown = believed not in (NOBODY, node) and version == way.itinerary.version
+            return Reason.MIRROR_BEHIND if unknown and not self._has_passed(believed, segment) else Reason.NONE
+        same = first == believed or version != way.itinerary.version
+        return Reason.TOKEN_NOT_GRANTABLE_YET if same else Reason.MIRROR_BEHIND
+
+    def meetings(self, node: int, other: int) -> list[Meeting]:
+        """Where the plans of ``node`` and ``other`` want one segment at one time, in what is not over."""
+        mine, theirs = self._ways.get(node), self._ways.get(other)
+        if mine is None or theirs is None:
+            return []
+        return [
+            Meeting(segment, one, two, self._agreed_first(node, other, segment, one, two))
+            for segment in sorted(mine.turns.keys() & theirs.turns.keys())
+            for one in mine.open_turns(segment)
+            for two in theirs.open_turns(segment)
+            if _overlap_us(one, two) > TOLERANCE_US
+        ]
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _agreed_first(self, node: int, other: int, segment: Segment, one: Turn, two: Turn) -> int | None:
+        """Who of two machines comes first in these turns by the times under which they last agreed."""
+        agreed = self._agreed.get((min(node, other), max(node, other)))
+        if agreed is None:
+            return None
+        first, second = agreed if node < other else (agreed[1], agreed[0])
+        mine = next((turn for turn in first.get(segment, ()) if turn.to_come == one.to_come), None)
+        theirs = next((turn for turn in second.get(segment, ()) if turn.to_come == two.to_come), None)
+        if mine is None or theirs is None or _overlap_us(mine, theirs) > TOLERANCE_US:
+            return None
+        return node if (mine.from_us, node) < (theirs.from_us, other) else other
+
+    def _first(self, node: int, segment: Segment) -> Turn | None:
+        way = self._ways.get(node)
+        return None if way is None else next(way.open_turns(segment), None)
+
+    def _before(self, node: int, segment: Segment) -> Iterator[tuple[int, tuple[Turn, Turn]]]:
+        """Other machines that come before ``node`` on a segment, each with both turns (mine, theirs)."""
+        for other in self._ways:
+            if other != node:
+                pair = self._pair(node, other, segment)
+                if pair is not None and (pair[1].from_us, other) < (pair[0].from_us, node):
+                    yield other, pair
+
+    def _pair(self, node: int, other: int, segment: Segment) -> tuple[Turn, Turn] | None:
+        """The next turns of two machines, with the times under which they agreed last."""
+        mine, theirs = self._ways[node], self._ways[other]
+        if self._first(node, segment) is None or self._first(other, segment) is None:
+            return None
+        low, high = min(node, other), max(node, other)
+        agreed = self._agreed.get((low, high))
+        if agreed is not None:
+            first, second = agreed if node == low else (agreed[1], agreed[0])
+            one, two = next(mine.open_turns(segment, first), None), next(theirs.open_turns(segment, second), None)
+            if one is not None and two is not None:
+                return one, two
+        one, two = self._first(node, segment), self._first(other, segment)
+        return (one, two) if one is not None and two is not None else None
+
+    def _agree(self, node: int, other: int, *, keep: bool) -> None:
+        """Take the present times as agreed where the two plans have no conflict; else keep the last ones, if any."""
+        low, high = min(node, other), max(node, other)
+        one, two = self._ways[low], self._ways[high]
+        if not _conflict(one, two):
+            self._agreed[low, high] = (one.turns, two.turns)
+        elif not keep:
+            self._agreed.pop((low, high), None)
+
+    def _has_passed(self, node: int, segment: Segment) -> bool:
+        """Whether a machine's plan, or a token that it gave back, tells that it was here and does not come again."""
+        way = self._ways.get(node)
+        return way is not None and self._first(node, segment) is None and segment in {*way.turns, *way.left}
+
+    def _behind(self, leg: Leg, progress: Progress) -> set[Segment]:
+        """Segments of a moving leg that the body, clearance included, has left."""
+        if leg.action is not LegAction.TRAVEL or leg.track != progress.track or leg.track not in self.site.tracks:
+            return set()
+        step = 1 if leg.to_index > leg.from_index else -1
+        pitch_mm = self.site.tracks[leg.track].pitch_mm
+        rear_mm = progress.index * pitch_mm + progress.offset_mm - step * body_mm(self.site) // 2
+        return {
+            Segment(leg.track, index)
+            for index in range(leg.from_index, leg.to_index, step)
+            if (rear_mm - index * pitch_mm) * step >= pitch_mm // 2
+        }
+
+
+def moves(leg: Leg) -> bool:
+    """Whether a leg is more than standing: waits come and go as a plan is delayed."""
+    return leg.action is not LegAction.STAND
+
+
+def _moves(itinerary: Itinerary) -> tuple[Leg, ...]:
+    return tuple(leg._replace(end_ms=0) for leg in itinerary.legs if moves(leg))
+
+
+def _turns(site: Site, plan: Plan, now_us: int) -> Turns:
+    legs = [leg for leg in plan.itinerary.legs if leg.track in site.tracks]
+    to_come = sum(moves(leg) for leg in legs)
+    found: Turns = {}
+    for number, windows in enumerate(leg_windows(site, plan.itinerary, now_us, plan.first_begin_us)):
+        if number < len(legs):
+            to_come -= moves(legs[number])
+        for window in windows:
+            turns = found.setdefault(window.segment, [])
+            if turns and turns[-1].to_come == to_come:
+                turns[-1] = turns[-1]._replace(to_us=max(turns[-1].to_us, window.to_us))
+            else:
+                turns.append(Turn(to_come, window.from_us, window.to_us))
+    return found
+
+
+def _conflict(one: _Way, two: _Way) -> bool:
+    """Whether two plans want one segment at one time, in what is not over."""
+    for segment in one.turns.keys() & two.turns.keys():
+        for mine in one.open_turns(segment):
+            for theirs in two.open_turns(segment):
+                if _overlap_us(mine, theirs) > TOLERANCE_US:
+                    return True
+    return False
+
+
+def _overlap_us(one: Turn, two: Turn) -> int:
+    return min(one.to_us, two.to_us) - max(one.from_us, two.from_us)

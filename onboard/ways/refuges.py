@@ -1,0 +1,58 @@
+"""Where a machine may stand for ever. Compartment fronts, lift platforms and sills never are (design, section 5)."""
+
+from collections.abc import Iterable
+from functools import lru_cache
+
+from onboard.core.codes import KindCode
+from onboard.core.site import Segment, Site, TrackKind
+from onboard.ways.reach import passages
+
+
+@lru_cache(maxsize=16)
+def _refuges(
+    tracks: tuple[tuple[int, TrackKind, int, tuple[Segment, ...]], ...], kept: frozenset[Segment]
+) -> frozenset[Segment]:
+    found: set[Segment] = set()
+    for number, kind, length, _ in tracks:
+        if kind is not TrackKind.LIFT:
+            found.update(Segment(number, index) for index in range(1, length + 1))
+    return frozenset(found - kept)
+
+
+def refuges(site: Site) -> frozenset[Segment]:
+    """Alley and spur segments that block neither a compartment, nor a lift's sill, nor a spur's mouth.
+
+    That a whole fleet fits (at most F - 1 carriers on F alleys without spurs) is checked where a site is loaded.
+    """
+    kept = {station.segment for station in site.compartments.values()}
+    for track in site.tracks.values():
+        if track.kind is not TrackKind.ALLEY:
+            kept.update(track.joins)
+    shape = tuple((t.number, t.kind, t.length, t.joins) for t in site.tracks.values())
+    return _refuges(shape, frozenset(kept))
+
+
+def open_refuges(site: Site, standing: Iterable[Segment]) -> frozenset[Segment]:
+    """Those refuges in which one more machine may end while others stand for ever at ``standing``.
+
+    Where there are several floors: no alley before compartments, so that the street alley stays free for all, no alley
+    that is the only way to another unless the robot is the only one, and neither an alley nor a spur in which another
+    stands: at most one in each. One floor leaves that choice only where each robot has a spur; otherwise every refuge
+    is open there, as the machines can pass each other nowhere else.
+    """
+    alleys = [track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
+    robots = sum(machine.kind is KindCode.ROBOT for machine in site.machines.values())
+    if len(alleys) == 1 and not 1 < robots <= len(site.spurs):
+        return refuges(site)
+    street = {station.track for station in site.compartments.values()}
+    # With compartments on all floors, the lowest of them has to be the one that stays free.
+    closed = (street if street < set(alleys) else {min(alleys)}) | {segment.track for segment in standing}
+    if robots > 1:
+        closed |= passages(site)
+    return _without(refuges(site), frozenset(closed))
+
+
+@lru_cache(maxsize=256)
+def _without(found: frozenset[Segment], closed: frozenset[int]) -> frozenset[Segment]:
+    """Kept, so that a search meets the same set again and what it has worked out for it."""
+    return frozenset(segment for segment in found if segment.track not in closed)

@@ -1,0 +1,208 @@
+"""What a carrier can do by itself or with a lift: rest-to-rest runs along tracks, hops through spurs' mouths, rides.
+
+Built once for a site and kept: run tables are the same for every search. A lift's platform is a position at the end of
+each alley that it serves, index 0 or length + 1; a ride is a move from one of them to another.
+"""
+
+from collections.abc import Collection, Iterator
+from heapq import heappop, heappush
+from typing import NamedTuple
+
+from onboard.core.site import Segment, Site, TrackKind
+from onboard.ways.kinematics import run_duration_us
+from onboard.ways.lift_uses import ride_us
+from onboard.ways.lifts import lift_tracks, platform_on
+from onboard.ways.occupancy import Sweep, alley_segments, leg_sweeps, turn_in_us
+from onboard.ways.reservations import FOREVER
+
+#: Sites whose tables are kept in one process: one in a machine, some in a test run.
+_MAX_KEPT = 16
+#: Goals, and sets of them, whose tables are kept for one site.
+_MAX_GOALS = 1_024
+
+
+class Move(NamedTuple):
+    """One move between two positions at rest; ``distance_mm`` is what the carrier drives.
+
+    ``lift_track`` is the lift's where the move is a ride.
+    """
+
+    destination: Segment
+    duration_us: int
+    distance_mm: int
+    lift_track: int | None = None
+
+
+class Roads:
+    """Moves and shortest times of one site. A position is a segment of an alley or spur, or a platform."""
+
+    def __init__(self, site: Site) -> None:
+        self.site = site
+        self._positions: dict[int, dict[int, Segment]] = {}
+        self._run_us: dict[int, tuple[int, ...]] = {}
+        self._hops: dict[Segment, list[Move]] = {}
+        self._junctions: dict[int, list[Segment]] = {}
+        self._platforms: dict[Segment, tuple[int, int]] = {}
+        self._moves: dict[Segment, tuple[Move, ...]] = {}
+        self._touched: dict[Segment, list[Segment]] = {}
+        self._longest: dict[int, tuple[Sweep, ...]] = {}
+        self._alike: dict[tuple[int, int], int] = {}
+        self._to_goals: dict[frozenset[Segment], _Ways] = {}
+        for track in site.tracks.values():
+            if track.kind is not TrackKind.LIFT:
+                indices = range(1, track.length + 1)
+                self._positions[track.number] = {index: Segment(track.number, index) for index in indices}
+        for lift_track in lift_tracks(site):
+            self._add_lift(lift_track)
+        for number, positions in self._positions.items():
+            pitch_mm = site.tracks[number].pitch_mm
+            durations = (run_duration_us(count * pitch_mm, site.carrier) for count in range(len(positions)))
+            self._run_us[number] = tuple(durations)
+        for track in site.tracks.values():
+            if track.kind is TrackKind.SPUR:
+                hop_us = turn_in_us(site, track.number)
+                for mouth in track.joins:
+                    self._join(mouth, Move(Segment(track.number, 1), hop_us, track.pitch_mm))
+                    self._join(Segment(track.number, 1), Move(mouth, hop_us, track.pitch_mm))
+
+    def _add_lift(self, lift_track: int) -> None:
+        """A position at the end of each alley that the lift serves, and the rides between them."""
+        aboard: list[Segment] = []
+        for lift_index, sill in enumerate(self.site.tracks[lift_track].joins, start=1):
+            position = platform_on(self.site, lift_track, sill.track)
+            if position is not None:
+                self._platforms[position] = lift_track, lift_index
+                self._positions[sill.track][position.index] = position
+                aboard.append(position)
+        for here in aboard:
+            for there in aboard:
+                if here != there:
+                    duration_us = ride_us(self.site, lift_track, self._platforms[here][1], self._platforms[there][1])
+                    self._join(here, Move(there, duration_us, 0, lift_track))
+
+    def _join(self, here: Segment, hop: Move) -> None:
+        self._hops.setdefault(here, []).append(hop)
+        junctions = self._junctions.setdefault(here.track, [])
+        if here not in junctions:
+            junctions.append(here)
+
+    def knows(self, position: Segment) -> bool:
+        """Whether a carrier can be at a position of this site."""
+        return position.index in self._positions.get(position.track, ())
+
+    def lift_at(self, position: Segment) -> tuple[int, int] | None:
+        """Lift track and lift index where a position is a platform, else None."""
+        return self._platforms.get(position)
+
+    def segment(self, track: int, index: int) -> Segment | None:
+        """The segment of a track, or None beyond its ends; a platform is none."""
+        return self._positions[track].get(index) if 0 < index <= self.site.tracks[track].length else None
+
+    def touched(self, position: Segment) -> list[Segment]:
+        """What a carrier standing at a position occupies: that position first if it is a platform, then segments."""
+        found = self._touched.get(position)
+        if found is None:
+            aboard = [position] if position in self._platforms else []
+            found = self._touched[position] = aboard + alley_segments(self.site, position)
+        return found
+
+    def moves(self, here: Segment) -> tuple[Move, ...]:
+        """All moves from a position: runs by growing index, then hops and rides in the order of the site's tracks."""
+        found = self._moves.get(here)
+        if found is None:
+            found = self._moves[here] = (*self._runs(here), *self._hops.get(here, ()))
+        return found
+
+    def _runs(self, here: Segment) -> Iterator[Move]:
+        durations, pitch_mm = self._run_us[here.track], self.site.tracks[here.track].pitch_mm
+        for _, there in sorted(self._positions[here.track].items()):
+            count = abs(there.index - here.index)
+            if count:
+                yield Move(there, durations[count], count * pitch_mm)
+
+    def run_us(self, track: int, count: int) -> int:
+        """Duration of a run over ``count`` steps of a track."""
+        return self._run_us[track][count]
+
+    def positions(self, track: int) -> Collection[Segment]:
+        """All positions on an alley or spur."""
+        return self._positions[track].values()
+
+    def junctions(self, track: int) -> list[Segment]:
+        """Positions of a track from which one can go to another: platforms, mouths of spurs, spurs' first segments."""
+        return self._junctions.get(track, [])
+
+    def longest(self, track: int) -> tuple[Sweep, ...]:
+        """Sweeps of a run from one end of a track to the other; none where it has but one position."""
+        found = self._longest.get(track)
+        if found is None:
+            count = len(self._positions[track]) - 1
+            found = self._longest[track] = leg_sweeps(self.site, track, count) if count else ()
+        return found
+
+    def alike(self, track: int, count: int) -> int:
+        """How many of its first sweeps a run over ``count`` steps shares with the longest one of the track."""
+        found = self._alike.get((track, count))
+        if found is None:
+            sweeps = leg_sweeps(self.site, track, count)
+            pairs = zip(sweeps, self.longest(track), strict=False)
+            found = next((n for n, (one, other) in enumerate(pairs) if one != other), len(sweeps))
+            self._alike[track, count] = found
+        return found
+
+    def shortest_us(self, origin: Segment, goal: Segment) -> int:
+        """Least time between two positions with nobody in the way and every lift at hand; FOREVER without a way."""
+        return self.nearest_us(origin, frozenset((goal,)))
+
+    def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
+        """Least time to any of ``goals`` as in ``shortest_us``."""
+        ways = self._ways_to(goals)
+        durations = self._run_us[origin.track]
+        least_us = FOREVER
+        for index, rest_us in ways.get(origin.track, ()):
+            least_us = min(least_us, durations[abs(origin.index - index)] + rest_us)
+        return least_us
+
+    def _ways_to(self, goals: frozenset[Segment]) -> "_Ways":
+        """Goals and junctions by track, with the least time from each to a goal (Dijkstra 1959).
+
+        Moves take the same time both ways.
+        """
+        found = self._to_goals.get(goals)
+        if found is not None:
+            return found
+        if len(self._to_goals) >= _MAX_GOALS:
+            self._to_goals.clear()
+        found = self._to_goals[goals] = {}
+        queue = [(0, goal) for goal in sorted(goals) if self.knows(goal)]
+        closed: set[Segment] = set()
+        while queue:
+            time_us, here = heappop(queue)
+            if here in closed:
+                continue
+            closed.add(here)
+            found.setdefault(here.track, []).append((here.index, time_us))
+            for hop in self._hops.get(here, ()):
+                heappush(queue, (time_us + hop.duration_us, hop.destination))
+            durations = self._run_us[here.track]
+            for junction in self._junctions.get(here.track, ()):
+                heappush(queue, (time_us + durations[abs(here.index - junction.index)], junction))
+        return found
+
+
+#: By track: index and time from there to a goal.
+_Ways = dict[int, list[tuple[int, int]]]
+
+
+_kept: dict[int, Roads] = {}
+
+
+def roads_of(site: Site) -> Roads:
+    """The roads of a site, built at the first call for this very object."""
+    roads = _kept.get(id(site))
+    # A kept table holds its site, so an identity in use is never that of another site.
+    if roads is None:
+        if len(_kept) >= _MAX_KEPT:
+            del _kept[next(iter(_kept))]
+        roads = _kept[id(site)] = Roads(site)
+    return roads

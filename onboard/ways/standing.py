@@ -1,0 +1,115 @@
+"""Machines that say that they go somewhere, and stand: obstacles until they move (design, section 5).
+
+A machine that says what it waits for, or that its plan comes later, is given longer; but no word is a motion, and in
+the end only its place counts.
+"""
+
+from dataclasses import dataclass, field
+
+from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, ManualMode
+from onboard.core.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
+from onboard.core.mirror import Mirror
+from onboard.core.serial import from_bus_ms
+from onboard.core.site import Segment, Site
+from onboard.ways.occupancy import final_position, turned_in
+
+#: A machine that says nothing stands for so long after it should have been elsewhere, us: a door or a drive's retries
+#: take less. Ours.
+STANDS_AFTER_US = 20_000_000
+#: And for so long where it says that it is late or waits, us: it may wait for a customer who takes his time. Ours.
+WAITS_AFTER_US = 600_000_000
+
+
+#: Words about one's plan; who asks for a right waits for it.
+_SPEAKS = (Waiting, TaskReport, TokenRequest)
+
+
+@dataclass
+class _Seen:
+    """One machine: where, since when there and late, and when it last said something of its plan."""
+
+    place: tuple[int, int, int]
+    moved_us: int
+    spoke_us: int
+    #: Since when its plan, whichever, has not left it where it is.
+    late_us: int | None = None
+    stands: bool = False
+    #: The plan that was looked at last, and by when it has the machine leave this place, bus ms; None: never.
+    plan: Itinerary | None = None
+    leaves_ms: int | None = None
+
+
+@dataclass
+class Standing:
+    """What one machine saw of the others' motions. All times are bus time in us."""
+
+    site: Site
+    mirror: Mirror
+    _seen: dict[int, _Seen] = field(default_factory=dict)
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """A machine moves, or speaks of its plan."""
+        if isinstance(message, Progress):
+            place = message.track, message.index, message.offset_mm
+            known = self._seen.get(message.sender)
+            if known is None or known.place != place:
+                self._seen[message.sender] = _Seen(place, now_us, now_us)
+            return
+        if isinstance(message, ManualOrder) and message.manual_mode is ManualMode.AUTOMATIC:
+            # A person lets it go: whoever did has seen why it stood, and it has to ask for its way first.
+            known = self._seen.get(message.machine)
+            if known is not None:
+                self._seen[message.machine] = _Seen(known.place, now_us, now_us)
+            return
+        speaks = isinstance(message, _SPEAKS)
+        speaks = speaks or (isinstance(message, Itinerary) and message.grade is Grade.FIRM)
+        if speaks and message.sender in self._seen:
+            self._seen[message.sender].spoke_us = now_us
+
+    def stands(self, node: int, now_us: int) -> bool:
+        """Whether a machine has stood for too long where its plan does not leave it; motion or a person ends that."""
+        seen = self._seen.get(node)
+        machine = self.site.machines.get(node)
+        if seen is None or machine is None or machine.kind not in MOBILE_KINDS:
+            return False
+        if not seen.stands:
+            leaves_us = self._leaves_us(node, seen, now_us)
+            if leaves_us is None:
+                seen.late_us = None
+                return False
+            seen.late_us = now_us if seen.late_us is None else seen.late_us
+            quiet_us = now_us - max(seen.moved_us, seen.spoke_us, leaves_us)
+            seen.stands = quiet_us >= STANDS_AFTER_US or now_us - seen.late_us >= WAITS_AFTER_US + STANDS_AFTER_US
+        return seen.stands
+
+    def _leaves_us(self, node: int, seen: _Seen, now_us: int) -> int | None:
+        """When its plan has it leave where it stands, at the latest; None where it may stand there for ever."""
+        itinerary = self.mirror.itineraries.get(node)
+        if itinerary is not seen.plan:
+            seen.plan = itinerary
+            seen.leaves_ms = None if itinerary is None else self._leaves_ms(itinerary, Segment(*seen.place[:2]))
+        return None if seen.leaves_ms is None else from_bus_ms(seen.leaves_ms, now_us)
+
+    def _leaves_ms(self, itinerary: Itinerary, here: Segment) -> int | None:
+        if self._is_at(here, final_position(self.site, itinerary)):
+            return None
+        runs = [leg for leg in itinerary.legs if _goes(leg)]
+        # The last run that begins or passes here: before it the machine may work here, or come here again.
+        away = [leg for leg in runs if self._begins_or_passes(leg, here)] or runs
+        return away[-1].end_ms if away else None
+
+    def _begins_or_passes(self, leg: Leg, here: Segment) -> bool:
+        places = {one for one in (here, turned_in(self.site, here)) if one is not None}
+        ends = sorted((leg.from_index, leg.to_index))
+        return any(
+            leg.track == one.track and one.index != leg.to_index and ends[0] <= one.index <= ends[1] for one in places
+        )
+
+    def _is_at(self, here: Segment, end: Segment | None) -> bool:
+        if end is None:
+            return True
+        return bool({here, turned_in(self.site, here)} & {end, turned_in(self.site, end)} - {None})
+
+
+def _goes(leg: Leg) -> bool:
+    return leg.action in (LegAction.TRAVEL, LegAction.RIDE) and leg.from_index != leg.to_index
