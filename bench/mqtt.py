@@ -33,8 +33,7 @@ from onboard.gateway.settings import GatewaySettings
 from onboard.io.broker_address import BrokerAddress
 from onboard.io.journal import FileJournal
 from onboard.io.mqtt import MqttBroker
-from onboard.systems.registry import system_of
-from onboard.wire.codec import codecs
+from onboard.systems.contract import codecs_for
 from tests.mqtt.logs import VERSIONS, content, published, validator
 from tests.mqtt.mosquitto import Mosquitto
 from tests.mqtt.played import frames
@@ -79,8 +78,7 @@ async def fed(part: list[tuple[int, Frame]], gateway: Gateway | None) -> Latenes
 
 async def measure(part: list[tuple[int, Frame]], folder: Path) -> None:
     site = find_site(SITE)
-    system = system_of(site)
-    codec = codecs(system.name, system.messages).fleet
+    codec = codecs_for(site).fleet
     mosquitto = Mosquitto(folder / "broker")
     await mosquitto.start()
     reader = await asyncio.create_subprocess_exec(

@@ -29,10 +29,9 @@ from bus_sim.run import RunOptions, Simulation, build
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.page import CarParkSource
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.systems.registry import system_of
+from onboard.systems.contract import codecs_for
 from onboard.trace.readers.open_log import Log
 from onboard.web.film import Film
-from onboard.wire.codec import codecs
 
 SITE = "large"
 ROOT = Path(__file__).parents[1]
@@ -199,8 +198,7 @@ def _repeated(run: Path, hours: float, out: Path) -> int:
 
 def _load(path: Path) -> dict[str, float]:
     site = find_site(SITE)
-    system = system_of(site)
-    with Film(site, codecs(system.name, system.messages)) as film, Log(str(path)) as log:
+    with Film(site, codecs_for(site)) as film, Log(str(path)) as log:
         load_s = _timed(lambda: film.read(log))
         span_us = film.last_us - film.first_us
         moments = [film.first_us + span_us * (number * 17 % 40) // 40 for number in range(40)]

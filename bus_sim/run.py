@@ -25,10 +25,10 @@ from onboard.core.messages import Message
 from onboard.core.serial import next_boot
 from onboard.core.site import Machine, Site, journal_owner
 from onboard.ports.bus import Bus
-from onboard.systems.registry import compaction_for, factory_for, system_of
+from onboard.systems.contract import codecs_for
+from onboard.systems.registry import compaction_for, factory_for
 from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
-from onboard.wire.codec import codecs
 from onboard.wire.decoder import Decoder
 
 #: The fleet bus in a log and on the served socket.
@@ -113,8 +113,7 @@ class BusRun:
     after_crash: list[Callable[[Machine], None]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        system = system_of(self.site)
-        self.codecs = codecs(system.name, system.messages)
+        self.codecs = codecs_for(self.site)
 
     def start(self) -> None:
         """Switch on the plant, then every controller, in the order of their node-IDs. On the running loop."""

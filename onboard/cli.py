@@ -27,9 +27,10 @@ from onboard.io.signals import terminated_as_interrupted
 from onboard.life import Life
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
+from onboard.systems.contract import codecs_for
 from onboard.systems.registry import compaction_for, factory_for, system_of
 from onboard.web.address import is_installed as is_web_installed
-from onboard.wire.codec import Codec, codecs
+from onboard.wire.codec import Codec
 
 if TYPE_CHECKING:
     from onboard.gateway.gateway import Gateway
@@ -208,8 +209,7 @@ async def run(
             await journal.close()
             return life.end()
         life.begin()
-        system = system_of(config.site)
-        codec = codecs(system.name, system.messages)
+        codec = codecs_for(config.site)
         telemetry: Telemetry = ConsoleTelemetry()
         beside = gateway(buses[0], codec.fleet) if gateway is not None else None
         published: asyncio.Task[None] | None = None

@@ -27,8 +27,9 @@ from onboard.core.holon import Holon
 from onboard.core.serial import next_boot
 from onboard.core.site import Machine, Site
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
-from onboard.systems.registry import factory_for, system_of
-from onboard.wire.codec import Codecs, codecs
+from onboard.systems.contract import codecs_for
+from onboard.systems.registry import factory_for
+from onboard.wire.codec import Codecs
 
 #: What a controller that fell over by a program error says; everything else that it halts for is a decision.
 _ERROR = "Error: "
@@ -142,8 +143,7 @@ class Fuzzer:
         self._chance = random.Random(f"fuzz:{site.name}:{machine.name}:{seed}")
         self._share = device_share
         self._journal = SimulatedJournal()
-        system = system_of(site)
-        self._codecs: Codecs = codecs(system.name, system.messages)
+        self._codecs: Codecs = codecs_for(site)
         fleet, devices = record(site, seed)
         # A node of its own on the bus would be heard at once; so nearly all forged frames have other senders.
         others = [frame for frame in fleet if frame.arbitration_id & 0xFF != machine.node_id]

@@ -9,7 +9,8 @@ from functools import partial
 from bus_sim.can.medium import Medium
 from bus_sim.run import FLEET, BusRun
 from onboard.core.frame import Frame
-from onboard.trace.check.systems import checks_for, rules_for
+from onboard.trace.check.checks import Checks
+from onboard.trace.check.systems import rules_for
 
 
 class Judges:
@@ -19,7 +20,7 @@ class Judges:
         self._site = run.site
         #: Rules that say that something must happen in time; all others are rules of safety.
         self._liveness = frozenset(rule.name for rule in rules_for(run.site) if rule.liveness)
-        self._checks = checks_for(run.site, disturbed=disturbed)
+        self._checks = Checks(run.site, disturbed=disturbed)
         self._listen(FLEET, run.fleet)
         for node_id, medium in run.devices.items():
             self._listen(run.site.machines[node_id].name, medium)

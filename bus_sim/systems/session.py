@@ -23,8 +23,7 @@ from bus_sim.systems.watched import FOREVER_US, watched
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.systems.registry import system_of
-from onboard.wire.codec import codecs
+from onboard.systems.contract import codecs_for
 from onboard.wire.decoder import Decoder
 
 if TYPE_CHECKING:
@@ -126,8 +125,7 @@ def check_faults(faults: tuple[AnyFault, ...], site: Site) -> None:
 
 def links_of(site: Site, devices: dict[int, Medium]) -> dict[int, BusDeviceLink]:
     """The plant's end of each machine's device bus, by node-ID."""
-    system = system_of(site)
-    codec = codecs(system.name, system.messages).device
+    codec = codecs_for(site).device
     return {
         node: BusDeviceLink(medium.attach("plant", node), codec, Decoder(codec), node)
         for node, medium in devices.items()

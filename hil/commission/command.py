@@ -14,8 +14,7 @@ from hil.commission.walk import walk
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
-from onboard.systems.registry import system_of
-from onboard.wire.codec import codecs
+from onboard.systems.contract import codecs_for
 
 HELP = """\
 The controller of the new machine stays off until the walk asks for it: the walk gives orders to its devices in its
@@ -73,7 +72,7 @@ def main(words: list[str]) -> int:
 
 
 async def _commission(config: MachineConfig, settings: BusSettings) -> Protocol:
-    contract = codecs(system_of(config.site).name, system_of(config.site).messages)
+    contract = codecs_for(config.site)
     fleet = devices = await open_bus(settings)
     try:
         if BusSettings.of(config.device_bus) != settings:

@@ -21,8 +21,7 @@ from hil.guest.mesh import Mesh, hand_out_boards, inside, join_pair, run
 from onboard.cli import main as onboard
 from onboard.config.site import parse_site
 from onboard.io.pycan import open_python_can
-from onboard.systems.registry import system_of
-from onboard.wire.codec import codecs
+from onboard.systems.contract import codecs_for
 
 #: Further nodes of the fleet bus: the simulated plant, which only listens there, and the tools of a person.
 PLANT, TOOLS = "plant", "tools"
@@ -57,8 +56,7 @@ class SiteRun:
 
     def prepare(self) -> None:
         """What every process would do for itself first, and what it imports late: once, before the forks."""
-        system = system_of(parse_site((self.share / "site.toml").read_text(encoding="utf-8"), "site.toml"))
-        codecs(system.name, system.messages)
+        codecs_for(parse_site((self.share / "site.toml").read_text(encoding="utf-8"), "site.toml"))
         assert callable(open_python_can)
 
     def connect(self) -> Mesh:

@@ -1,6 +1,7 @@
 """A person's mistakes in a file: all of them at once, one clear line each."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
@@ -68,7 +69,7 @@ class ConfigError(Exception):
         return "\n".join(str(problem) for problem in self.problems)
 
 
-def nearest(name: str, known: list[str]) -> str:
+def nearest(name: str, known: Sequence[str]) -> str:
     """A remedy for an unknown name: the nearest known one, or all of them."""
     close = get_close_matches(name, known, n=1)
     if close:

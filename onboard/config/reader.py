@@ -1,9 +1,9 @@
 """Typed look-ups in a TOML document that note every mistake and go on with a stand-in value."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from onboard.config.problems import Problems, nearest
 from onboard.config.toml_lines import Document, KeyPath, path_text
@@ -23,6 +23,17 @@ _TYPE_NAMES = {
 def type_name(value: object) -> str:
     """The type of a TOML value in words."""
     return _TYPE_NAMES.get(type(value), "a date or time")
+
+
+class Common(NamedTuple):
+    """What is read of every site file first: its name, and the fleet bus's bit/s.
+
+    ``crowded`` lets more machines in than find room to rest: for studies of what they do in each other's way.
+    """
+
+    name: str
+    bitrate: int
+    crowded: bool = False
 
 
 @dataclass
@@ -85,7 +96,7 @@ class Table:
             self.bad(name, value, "empty", "write a text in quotes")
         return value or default or ""
 
-    def choice(self, name: str, known: list[str], default: str | None = None) -> str:
+    def choice(self, name: str, known: Sequence[str], default: str | None = None) -> str:
         """One of a few words; the stand-in without a default is the first of them."""
         value = self._get(name, str, " or ".join(f'"{word}"' for word in known), required=default is None)
         if value is not None and value not in known:

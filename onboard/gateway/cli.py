@@ -28,8 +28,8 @@ from onboard.io.open_bus import (
 )
 from onboard.io.signals import ended_by
 from onboard.ports.broker import BrokerError
-from onboard.systems.registry import system_of
-from onboard.wire.codec import Codec, codecs
+from onboard.systems.contract import codecs_for
+from onboard.wire.codec import Codec
 
 EXAMPLES = """\
 exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mistake in the command line or in a file
@@ -113,8 +113,7 @@ async def _run(site: Site, settings: GatewaySettings, address: BrokerAddress, bu
             raise JournalDamagedError(f"{journal.condition.why}; move the file away: what waits in it is lost")
         opened = await open_bus(bus)
         try:
-            system = system_of(site)
-            codec = codecs(system.name, system.messages).fleet
+            codec = codecs_for(site).fleet
             client = f"{settings.prefix}-{level(site.name)}"
             send = opened.send if settings.node_id is not None else None
             gateway = Gateway(site, codec, broker, settings, reports=reports, wall_us=wall_us, client=client, send=send)

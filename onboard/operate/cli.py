@@ -16,8 +16,7 @@ from onboard.operate.names import OperateError, tool_of
 from onboard.operate.order import MISTAKE
 from onboard.operate.station import Station
 from onboard.operate.wishes import Maker, Wish, maker_of
-from onboard.systems.registry import system_of
-from onboard.wire.codec import codecs
+from onboard.systems.contract import codecs_for
 
 EXAMPLES = """\
 exit status: 0 done, and confirmed by those whom it concerns; 1 not confirmed, it says by whom; 2 a person's mistake
@@ -127,8 +126,7 @@ def wish_of(args: argparse.Namespace) -> Wish:
 
 async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make: Maker) -> int:
     bus = await open_bus(settings)
-    system = system_of(site)
-    station = Station(site, codecs(system.name, system.messages).fleet, bus, _tell)
+    station = Station(site, codecs_for(site).fleet, bus, _tell)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, station.interrupt)

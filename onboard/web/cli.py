@@ -11,14 +11,14 @@ from onboard.config.site import load_site
 from onboard.core.site import Site
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
 from onboard.io.signals import ended_by
-from onboard.systems.registry import system_of
+from onboard.systems.contract import codecs_for
 from onboard.trace.readers.open_log import Log, LogOpenError
 from onboard.web.address import DEFAULT_PORT, WebError
 from onboard.web.app import Source
 from onboard.web.film import Film
 from onboard.web.live import LiveSource, LogSource
 from onboard.web.serve import WebServer
-from onboard.wire.codec import Codecs, codecs
+from onboard.wire.codec import Codecs
 
 EXAMPLES = """\
 exit status: 0 stopped by a person; 1 the bus is gone or not there yet; 2 a mistake in the command line or in a file
@@ -60,8 +60,7 @@ def main(argv: Sequence[str]) -> int:
         parser.error("name a log, or a bus: -i INTERFACE -c CHANNEL")
     try:
         site = load_site(args.site)
-        system = system_of(site)
-        codec = codecs(system.name, system.messages)
+        codec = codecs_for(site)
         if args.log is not None:
             with Film(site, codec) as film:
                 _read(film, args.log)

@@ -11,6 +11,7 @@ from onboard.cli import main as onboard_main
 from onboard.config.site import load_site
 from onboard.systems import registry
 from onboard.systems.mapd.site import Mapd
+from onboard.systems.system import System
 
 DATA = Path(bus_sim.__file__).parent / "data"
 DEMO = DATA / "plants" / "Demo-01.xml"
@@ -248,7 +249,7 @@ def test_what_such_a_site_cannot_do_is_said_in_one_line(
 def test_a_machine_without_a_behaviour_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(registry._SYSTEMS, "mapd", registry.System("mapd", {}))
+    monkeypatch.setitem(registry._ADDED, "mapd", System("mapd", {}))
     (tmp_path / "s.toml").write_text(SITE)
     machine = tmp_path / "machine.toml"
     machine.write_text(MACHINE)

@@ -19,7 +19,8 @@ from onboard.core.messages import NO_REFERENCE, Award, Bid, Message, Reference, 
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Segment, Site
-from onboard.systems.registry import System, add_system, remove_system
+from onboard.systems.registry import add_system, remove_system
+from onboard.systems.system import System
 
 PAGE = Path(__file__).parents[2] / "docs" / "new-kind.md"
 DESK, OLD, NEW = 1, 21, 22

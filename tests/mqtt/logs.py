@@ -13,9 +13,8 @@ from bus_sim.sites import find_site
 from onboard.core.messages import Message
 from onboard.gateway.publisher import Outgoing, Publisher
 from onboard.gateway.settings import GatewaySettings
-from onboard.systems.registry import system_of
+from onboard.systems.contract import codecs_for
 from onboard.trace.candump_reader import CandumpReader
-from onboard.wire.codec import codecs
 from onboard.wire.decoder import Decoder
 
 SCHEMAS = Path(__file__).parent / "schemas"
@@ -34,8 +33,7 @@ def record(path: Path, *words: str) -> Path:
 
 def messages(site_name: str, log: Path) -> Iterator[tuple[int, Message]]:
     """Every message of the fleet bus with its time, us from the first."""
-    system = system_of(find_site(site_name))
-    decoder = Decoder(codecs(system.name, system.messages).fleet)
+    decoder = Decoder(codecs_for(find_site(site_name)).fleet)
     first_us: int | None = None
     for line in CandumpReader(log.read_bytes().splitlines(keepends=True)):
         first_us = line.time_us if first_us is None else first_us

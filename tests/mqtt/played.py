@@ -14,9 +14,8 @@ from onboard.gateway.gateway import Gateway
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import GatewaySettings
 from onboard.ports.journal import Compaction, Entry
-from onboard.systems.registry import system_of
+from onboard.systems.contract import codecs_for
 from onboard.trace.candump_reader import CandumpReader
-from onboard.wire.codec import codecs
 from tests.mqtt.double import DoubleBroker
 from tests.mqtt.logs import EPOCH_US
 
@@ -85,8 +84,7 @@ async def _play(
 ) -> Gateway:
     loop = asyncio.get_running_loop()
     site = find_site(site_name)
-    system = system_of(site)
-    codec = codecs(system.name, system.messages).fleet
+    codec = codecs_for(site).fleet
     reports = Reports(journal if journal is not None else MemoryJournal())
     gateway = Gateway(site, codec, broker or DoubleBroker(), GatewaySettings(epoch_us=EPOCH_US), reports=reports)
     for time_us, frame in frames(log):

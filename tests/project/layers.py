@@ -22,12 +22,14 @@ CORE_TYPES = (
     "onboard.core.site",
 )
 
+FOLDER = Path(__file__).parents[2] / "onboard" / "systems"
+#: The systems: each is a folder.
+SYSTEMS = tuple(sorted(folder.name for folder in FOLDER.iterdir() if (folder / "system.py").is_file()))
 #: What each system's machines know beforehand and what they say beyond the messages of all: values as well.
-SYSTEM_TYPES = tuple(
-    f"onboard.systems.{system}.{noun}"
-    for system in ("car_park", "cell", "graph", "mapd", "terminal", "turning")
-    for noun in ("messages", "site")
-)
+SYSTEM_TYPES = tuple(f"onboard.systems.{system}.{noun}" for system in SYSTEMS for noun in ("messages", "site"))
+
+#: How the parts of a site's own system are found.
+REGISTRY = ("onboard.systems.contract", "onboard.systems.registry")
 
 #: Standard modules without I/O, clock, chance or tasks: all that decisions may use.
 PURE_STDLIB = frozenset(
@@ -54,9 +56,11 @@ ALL_OF_ONBOARD = (
     "onboard.controller",
     "onboard.core",
     "onboard.io",
-    "onboard.systems",
     "onboard.ports",
+    "onboard.systems",
+    "onboard.ways",
     "onboard.wire",
+    "onboard.work",
 )
 
 
@@ -74,19 +78,55 @@ class Layer:
     pure: bool = False
 
 
+def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
+    """The layers of one system's folder: its machines decide and nothing else; reader, judges and drawing do not."""
+    own = f"onboard.systems.{system}"
+    machines = ("onboard.core", "onboard.ways", "onboard.work", "onboard.systems.system")
+    yield own, Layer(machines, only_stdlib=PURE_STDLIB, pure=True)
+    config = Layer(
+        ("onboard.config", "onboard.core", "onboard.ways", own), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
+    )
+    history = Layer(
+        (*CORE_TYPES, own, "onboard.trace", "onboard.ways", "onboard.wire"),
+        not_stdlib=frozenset({"asyncio", "random", "threading"}),
+    )
+    parts = {
+        **dict.fromkeys(("constants", "layout", "machines", "missions_reader", "reader", "room"), config),
+        **dict.fromkeys(("chart", "checks", "scene"), history),
+    }
+    folder = FOLDER / system
+    yield from ((f"{own}.{noun}", rule) for noun, rule in parts.items() if _is_part(folder / noun))
+
+
+def _is_part(place: Path) -> bool:
+    return place.is_dir() or place.with_suffix(".py").is_file()
+
+
+#: The one file that loads modules by computed names: parts of systems.
+FINDER = "onboard/systems/registry.py"
+
 #: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
-    "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.systems": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
+    # Until the mirror knows no way, it and what reads it lean on them.
+    "onboard.core": Layer(("onboard.ways",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.ways": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.work": Layer(("onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
+    # It knows no system by name; a system's parts are found by the name of their folder.
+    "onboard.systems": Layer(("onboard.core",)),
+    "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),
+    **{layer: rule for system in SYSTEMS for layer, rule in _parts_of(system)},
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
-    "onboard.config": Layer(("onboard.core", *SYSTEM_TYPES), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
+    "onboard.config": Layer(
+        ("onboard.core", "onboard.systems", "onboard.ways"), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
+    ),
     "onboard.controller": Layer(
         ("onboard.core", "onboard.wire", "onboard.ports"), not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"}
     ),
     "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
     "onboard.trace": Layer(
-        (*CORE_TYPES, *SYSTEM_TYPES, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})
+        (*CORE_TYPES, *SYSTEM_TYPES, *REGISTRY, "onboard.wire"),
+        not_stdlib=frozenset({"asyncio", "random", "threading"}),
     ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
     "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
@@ -122,7 +162,8 @@ LAYERS: dict[str, Layer] = {
             *CORE_TYPES,
             *SYSTEM_TYPES,
             "onboard.config.problems",
-            *(f"onboard.core.{name}" for name in ("authority", "holding", "lifts", "regeneration")),
+            *(f"onboard.core.{name}" for name in ("authority", "holding", "regeneration")),
+            "onboard.ways.lifts",
             "onboard.gateway.pauses",
             "onboard.gateway.whereabouts",
             "onboard.ports",
@@ -199,7 +240,7 @@ def _check_file(root: Path, file: Path) -> Iterator[str]:
         wrong = _breach(found.module, own, layer, place)
         if wrong:
             yield f"{place}:{found.line}: {own} imports {found.module}: {wrong}"
-    for line, what in _dynamic_imports(tree):
+    for line, what in _dynamic_imports(tree) if place != FINDER else ():
         yield f"{place}:{line}: {what}: a computed import cannot be checked; write an import statement"
     if layer.pure:
         for line, what in _impure_calls(tree):

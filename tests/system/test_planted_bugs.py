@@ -14,7 +14,8 @@ from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
 from onboard.core.site import Site
-from onboard.trace.check.checks import RULES, Checks, Verdict
+from onboard.systems.car_park.checks import RULES
+from onboard.trace.check.checks import Checks, Verdict
 from tests.sites import one_floor
 from tests.system.scene import ORIGIN_US, stays
 

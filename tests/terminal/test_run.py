@@ -28,9 +28,8 @@ from onboard.systems.terminal.messages import (
 )
 from onboard.systems.terminal.vehicle import Vehicle, terminal
 from onboard.trace.candump_reader import CandumpReader
-from onboard.trace.check.checks import check_records
+from onboard.trace.check.checks import Checks, check_records
 from onboard.trace.check.holds import LetGoAgain
-from onboard.trace.check.systems import checks_for
 from tests.faults.systems import withstands
 from tests.terminal.seeds import short
 
@@ -97,7 +96,7 @@ def test_m01_m04_m05_all_missions_are_done_and_nothing_breaks(seen: Seen) -> Non
 
 def test_every_rule_holds_over_the_whole_log(seen: Seen) -> None:
     with seen.trace.open("rb") as lines:
-        verdict = check_records(CandumpReader(lines), checks_for(SITE))
+        verdict = check_records(CandumpReader(lines), Checks(SITE))
     assert verdict.is_good, verdict.lines()
     judged = [rule for rule in verdict.rules if rule is not LetGoAgain]
     assert all(verdict.seen[rule.name] for rule in judged), "every rule had something to judge; nobody is held here"

@@ -10,12 +10,12 @@ from tempfile import mkdtemp
 from bus_sim.sites import find_site
 from onboard.core.messages import Message
 from onboard.core.site import Site
-from onboard.systems.registry import system_of
+from onboard.systems.contract import codecs_for
 from onboard.trace.listener import Listener
 from onboard.trace.raw import RawFrame
 from onboard.trace.readers.open_log import Log
 from onboard.web.film import Film
-from onboard.wire.codec import Codecs, codecs
+from onboard.wire.codec import Codecs
 from tests.mapd.sites import drawn, site_text
 
 ROOT = Path(__file__).parents[2]
@@ -54,8 +54,7 @@ def environment() -> dict[str, str]:
 
 def contract(site: Site) -> Codecs:
     """What is said on a site's buses."""
-    system = system_of(site)
-    return codecs(system.name, system.messages)
+    return codecs_for(site)
 
 
 def film_of(name: str, path: Path | None = None, *, fleet_only: bool = False) -> Film:

@@ -49,15 +49,7 @@ from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
-from onboard.systems.car_park.bay_task import (
-    DESK_INPUT,
-    REMINDERS,
-    RETRY_US,
-    SETTLING_US,
-    BayPhase,
-    BayTask,
-    withdrawal,
-)
+from onboard.systems.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.program import Program
@@ -170,7 +162,7 @@ class Compartment:
         if machine is None or machine.kind is not KindCode.ROBOT or self.phase is BayPhase.STARTING:
             return []
         if job is None or report.task != job.task:
-            return withdrawal(self.fleet.node_id, report)
+            return bay_task.withdrawal(self.fleet.node_id, report)
         if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None:
             # I was restarted and asked all: its winner says that the task is in hand.
             return self._won_by(report.sender, job.call)

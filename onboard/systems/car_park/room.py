@@ -7,7 +7,7 @@ is the only way to another; every other alley and every spur takes one carrier.
 
 from itertools import groupby
 
-from onboard.config.machines import Fleet
+from onboard.config.fleet import Fleet
 from onboard.config.reader import Table
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment, Site, TrackKind

@@ -164,3 +164,6 @@ class CarParkScene:
     def task_end(self, reference: Reference, station: int) -> str:
         """The view tells it: parked or fetched."""
         return ""
+
+
+SCENE = CarParkScene

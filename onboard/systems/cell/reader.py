@@ -2,24 +2,20 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from onboard.config.constants import read_timing
-from onboard.config.machines import Fleet
-from onboard.config.reader import Table
+from onboard.config.fleet import Fleet
+from onboard.config.reader import Common, Table
+from onboard.config.timing import read_timing
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.cell.site import MAX_COORDINATE_MM, Area, Arm, Cell, Point, Wish
-
-if TYPE_CHECKING:
-    from onboard.config.systems import Common
 
 _NOWHERE = Segment(0, 0)
 #: A call for a goal holds calls within calls, each half of what is left: four levels need this long. Ours.
 CALL_WINDOW_MS = 3_000
 
 
-def read_cell(root: Table, common: "Common") -> Cell:
+def read(root: Table, common: Common) -> Cell:
     """Robots with their areas, goal managers, obstacles, and the goals that a run of the site brings."""
     fleet = Fleet()
     arms: dict[int, Arm] = {}

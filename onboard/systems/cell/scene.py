@@ -175,3 +175,6 @@ def _keep(kept: OrderedDict[_Key, _Value], key: _Key, value: _Value) -> None:
 
 def _metres(at: Spot) -> str:
     return f"({at[0] / 1000:.1f}, {at[1] / 1000:.1f}) m"
+
+
+SCENE = CellScene

@@ -2,24 +2,21 @@
 
 from dataclasses import replace
 from itertools import count, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from onboard.config.constants import read_timing
-from onboard.config.machines import Fleet
-from onboard.config.reader import Table
+from onboard.config.fleet import Fleet
+from onboard.config.reader import Common, Table
+from onboard.config.timing import read_timing
 from onboard.core.codes import KindCode, Side
 from onboard.core.site import Segment, Station
 from onboard.systems.graph.site import MAX_CAPACITY, MAX_NODE, MAX_STOPS, FactoryGraph, Graph, Order, Rules, edge
-
-if TYPE_CHECKING:
-    from onboard.config.systems import Common
 
 _NOWHERE = Segment(0, 0)
 #: Longest edge, mm.
 MAX_LENGTH_MM = 60_000
 
 
-def read_graph(root: Table, common: "Common") -> FactoryGraph:
+def read(root: Table, common: Common) -> FactoryGraph:
     """Edges, rules, hosts of node agents, robots, desks, and the orders that a run of the site brings."""
     table = root.table("graph", required=True)
     edges = _edges(table)

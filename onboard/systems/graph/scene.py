@@ -148,3 +148,6 @@ class GraphScene:
 
 def _edge_id(one: int, other: int) -> str:
     return f"e{one}-{other}"
+
+
+SCENE = GraphScene

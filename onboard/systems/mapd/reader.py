@@ -1,11 +1,11 @@
 """The site file of a pick-up and delivery site; docs/import.md describes every key."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from onboard.config.constants import read_timing
-from onboard.config.machines import Fleet
+from onboard.config.fleet import Fleet
 from onboard.config.problems import nearest
-from onboard.config.reader import Table
+from onboard.config.reader import Common, Table
+from onboard.config.timing import read_timing
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.mapd.messages import MOST_WAYS
@@ -22,9 +22,6 @@ from onboard.systems.mapd.site import (
     network_floor,
 )
 
-if TYPE_CHECKING:
-    from onboard.config.systems import Common
-
 _NOWHERE = Segment(0, 0)
 #: A cell's token is that of a station, of which there are so many (kinds/mapd/rights.py).
 MAX_CELLS = 64_000
@@ -35,7 +32,7 @@ MAX_RELEASE = 100_000
 BLOCKED = "@TO#W"
 
 
-def read_mapd(root: Table, common: "Common") -> Mapd:
+def read(root: Table, common: Common) -> Mapd:
     """Floor, robots with their homes, desk, endpoints and the tasks that a run of the site brings."""
     step_ms = root.table("steps").integer("step_ms", 100, 60_000, 1_000)
     rows, (points, lines, zones) = _read_floor(root)

@@ -228,3 +228,6 @@ def _spots(site: Mapd) -> dict[int, Spot]:
     lengths = {(one, other): 1.0 for one, ways in enumerate(site.floor.ways) for other in ways}
     spots = arrange(lengths, list(range(site.floor.size)), CELL)
     return {cell: (x + MARGIN, y + MARGIN) for cell, (x, y) in spots.items()}
+
+
+SCENE = MapdScene

@@ -210,7 +210,7 @@ class PlansInOrder(_TerminalRule):
 
 
 #: What a terminal's log is judged by: the rules of all fleets that hold here, and its own.
-TERMINAL_RULES: tuple[type[Rule], ...] = (
+RULES: tuple[type[Rule], ...] = (
     OneHolder,
     CallsClosed,
     BidsInTime,

@@ -2,19 +2,15 @@
 
 import re
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
-from onboard.config.constants import read_timing
-from onboard.config.machines import Fleet
+from onboard.config.fleet import Fleet
 from onboard.config.problems import nearest
-from onboard.config.reader import Table
+from onboard.config.reader import Common, Table
+from onboard.config.timing import read_timing
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.terminal.missions_reader import read_blockages, read_missions, read_presses
 from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
-
-if TYPE_CHECKING:  # that module names this one
-    from onboard.config.systems import Common
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,15}")
 #: Entity numbers are the tracks of tokens: 8 bits, without 0 and 255.
@@ -62,7 +58,7 @@ class Network:
         return 0
 
 
-def read_terminal(root: Table, common: "Common") -> Terminal:
+def read(root: Table, common: Common) -> Terminal:
     """A terminal; every mistake is noted in ``root.problems``."""
     planning, vehicle = root.table("planning"), root.table("vehicle")
     speed_mm_s = vehicle.integer("speed_mm_s", 100, 20_000, 5_000)

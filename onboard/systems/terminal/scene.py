@@ -293,3 +293,6 @@ class TerminalScene:
             (x0, _), (x1, y1) = self._corners[entity]
             return (x0 + x1) / 2, y1
         return self._bay(node, entity)
+
+
+SCENE = TerminalScene

@@ -1,11 +1,10 @@
 """The site file of a turning cell; docs/turning.md describes every key."""
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
-from onboard.config.constants import read_timing
-from onboard.config.machines import Fleet
-from onboard.config.reader import Table
+from onboard.config.fleet import Fleet
+from onboard.config.reader import Common, Table
+from onboard.config.timing import read_timing
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.turning.site import (
@@ -23,14 +22,11 @@ from onboard.systems.turning.site import (
     element_fault,
 )
 
-if TYPE_CHECKING:
-    from onboard.config.systems import Common
-
 _NOWHERE = Segment(0, 0)
 _WORKS = {"facing": Work.FACE, "roughing": Work.ROUGH, "finishing": Work.FINISH}
 
 
-def read_turning(root: Table, common: "Common") -> Turning:
+def read(root: Table, common: Common) -> Turning:
     """Lathes with their chucks and tools, desks, materials, drawings, and the orders that a run of the site brings."""
     fleet = Fleet()
     lathes: dict[int, Lathe] = {}

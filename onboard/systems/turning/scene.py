@@ -137,3 +137,6 @@ class TurningScene:
     def task_end(self, reference: Reference, station: int) -> str:
         """As in the port."""
         return f"has made {self.thing(reference)}"
+
+
+SCENE = TurningScene

@@ -9,49 +9,16 @@ from onboard.core.codes import MachineState, Reason
 from onboard.core.frame import Frame
 from onboard.core.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
-from onboard.systems.car_park.checks.cars import CarsConserved, OneCustodian
-from onboard.systems.car_park.checks.customers import CustomersServed, FullMeansFull, TasksServed
-from onboard.systems.car_park.checks.doors import Doors
-from onboard.systems.car_park.checks.lifts import LiftByGate, LiftCrush, PlatformThere
-from onboard.systems.car_park.checks.motion import InsideAuthority, OneBody
-from onboard.systems.car_park.checks.shuttles import TornCar
+from onboard.systems.contract import codecs_for
 from onboard.trace.candump_reader import CandumpReader, Record
-from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.holds import LetGoAgain
-from onboard.trace.check.liveness import NobodyStarves, NoRounds, SomethingHappens
-from onboard.trace.check.owners import OneOwner
+from onboard.trace.check.liveness import NobodyStarves
 from onboard.trace.check.picture import SETTLING_US, Picture
-from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Rule
-from onboard.wire.codec import Codec, device_codec, fleet_codec
+from onboard.trace.check.systems import rules_for
+from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
 from onboard.wire.speakers import why_unheard
-
-#: Every rule, in the order in which the report names them.
-RULES: tuple[type[Rule], ...] = (
-    OneHolder,
-    InsideAuthority,
-    OneBody,
-    LiftByGate,
-    LiftCrush,
-    PlatformThere,
-    TornCar,
-    Doors,
-    CarsConserved,
-    OneCustodian,
-    OneOwner,
-    CallsClosed,
-    BidsInTime,
-    BidsGoDown,
-    TasksServed,
-    CustomersServed,
-    FullMeansFull,
-    SomethingHappens,
-    NobodyStarves,
-    NoRounds,
-    LetGoAgain,
-)
 
 #: Findings that are kept word for word; all are counted.
 MOST_FINDINGS = 1_000
@@ -134,7 +101,7 @@ class Checks:
     """Feed a log's frames, or messages, in order; then ``finish``.
 
     ``disturbed``: frames may have been lost on purpose, so rules that need all of them are left out. Without a site
-    the rules that need one are left out.
+    the rules that need one are left out. Contract and rules are those of the site's system where none are given.
     """
 
     def __init__(
@@ -144,12 +111,14 @@ class Checks:
         disturbed: bool = False,
         fleet: Codec | None = None,
         device: Codec | None = None,
-        rules: tuple[type[Rule], ...] = RULES,
+        rules: tuple[type[Rule], ...] | None = None,
     ) -> None:
         self._site = site
         self._disturbed = disturbed
-        self._codecs = (fleet or fleet_codec(), device or device_codec())
+        both = codecs_for(site)
+        self._codecs = (fleet or both.fleet, device or both.device)
         self._decoders: dict[str, tuple[Decoder, Decoder]] = {}
+        rules = rules_for(site) if rules is None else rules
         self.verdict = Verdict(tuple(rule for rule in rules if not self._why_not(rule)))
         self.verdict.left_out = {rule.name: why for rule in rules if (why := self._why_not(rule))}
         self._last_us: int | None = None

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from onboard.core.site import Site
+from onboard.systems.contract import codecs_for
 from onboard.trace.chart.sequence import as_svg, as_text, chart
 from onboard.trace.chart.svg import Drawing
 from onboard.trace.chart.time_space import draw, watch
@@ -17,7 +18,6 @@ from onboard.trace.commands.common import (
     add_command,
     add_log,
     add_site,
-    codecs_of,
     open_log,
     site_of,
     tell_faults,
@@ -69,7 +69,7 @@ class _Heard:
     """Messages of a log, and when it began."""
 
     def __init__(self, log: Log, site: Site) -> None:
-        self.listener = Listener(codecs_of(site))
+        self.listener = Listener(codecs_for(site))
         self.start_us = 0
         self._frames = iter(log)
 

@@ -6,15 +6,14 @@ import sys
 from pathlib import Path
 
 from onboard.core.site import Site
+from onboard.systems.contract import codecs_for
 from onboard.trace.check.checks import Checks, Verdict
-from onboard.trace.check.systems import rules_for
 from onboard.trace.commands.common import (
     Commands,
     TraceError,
     add_command,
     add_log,
     add_site,
-    codecs_of,
     open_log,
     site_of,
     write_text,
@@ -51,9 +50,9 @@ def register(commands: Commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Judge; 0 where no rule was broken."""
     site = site_of(args)
-    contracts = codecs_of(site)
+    contracts = codecs_for(site)
     fleet = _read_codec(args.dbc) if args.dbc is not None else contracts.fleet
-    checks = Checks(site, disturbed=args.faults, fleet=fleet, device=contracts.device, rules=rules_for(site))
+    checks = Checks(site, disturbed=args.faults, fleet=fleet, device=contracts.device)
     verdict = _check(args, checks)
     if args.json is not None:
         write_text(args.json, json.dumps(verdict.to_json(), indent=2) + "\n")

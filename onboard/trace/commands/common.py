@@ -8,10 +8,8 @@ from typing import Protocol
 
 from onboard.config.site import load_site
 from onboard.core.site import Site
-from onboard.systems.registry import system_of
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
-from onboard.wire.codec import Codecs, codecs
 
 
 class Commands(Protocol):
@@ -61,14 +59,6 @@ def site_of(args: argparse.Namespace) -> Site | None:
     """The site asked for, if any. Raises ``ConfigError``."""
     path: Path | None = args.site
     return load_site(path) if path is not None else None
-
-
-def codecs_of(site: Site | None) -> Codecs:
-    """Both contracts, with what a site's system adds."""
-    if site is None:
-        return codecs("", ())
-    system = system_of(site)
-    return codecs(system.name, system.messages)
 
 
 def open_log(args: argparse.Namespace) -> Log:

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import (
     Commands,
     TraceError,
     add_command,
     add_log,
     add_site,
-    codecs_of,
     open_log,
     site_of,
     tell_faults,
@@ -121,7 +121,7 @@ def _decode(args: argparse.Namespace, chosen: _Chosen) -> None:
         lines = DbcLines(_read_dbc(args.dbc), screen)
     else:
         site = site_of(args)
-        lines = MessageLines(site, codecs_of(site), screen)
+        lines = MessageLines(site, codecs_for(site), screen)
     _print_all(line for frame in chosen for line in lines.of(frame))
     tell_faults(chosen.log)
     for line in lines.report():

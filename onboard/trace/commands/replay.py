@@ -9,8 +9,9 @@ from onboard.core.behaviour import BehaviourFactory
 from onboard.core.holon import Holon
 from onboard.core.messages import Heartbeat
 from onboard.core.site import Machine, Site
+from onboard.systems.contract import codecs_for
 from onboard.systems.registry import factory_for
-from onboard.trace.commands.common import Commands, TraceError, add_command, add_log, codecs_of, open_log, tell_faults
+from onboard.trace.commands.common import Commands, TraceError, add_command, add_log, open_log, tell_faults
 from onboard.trace.replay.driver import JOURNAL_US, Driver, RaisedCosts, Recording, compare, in_words, record
 from onboard.wire.codec import Codecs
 
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> int:
     """Replay and compare."""
     site = load_site(args.site)
     machine = _machine(site, args.machine)
-    codecs = codecs_of(site)
+    codecs = codecs_for(site)
     with open_log(args) as log:
         recording = record(log, machine, codecs, args.bus, site.system)
     tell_faults(log)

@@ -5,13 +5,13 @@ import sys
 
 from onboard.core.messages import Reference
 from onboard.core.site import Site
+from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import (
     Commands,
     TraceError,
     add_command,
     add_log,
     add_site,
-    codecs_of,
     open_log,
     site_of,
     tell_faults,
@@ -60,7 +60,7 @@ def run_calls(args: argparse.Namespace) -> int:
     """Print the calls."""
     site = site_of(args)
     task = task_of(args.task, site)
-    listener, calls, words = Listener(codecs_of(site)), Calls(), Words(site)
+    listener, calls, words = Listener(codecs_for(site)), Calls(), Words(site)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):
@@ -81,7 +81,7 @@ def run_why(args: argparse.Namespace) -> int:
     site = site_of(args)
     assert site is not None, "argparse asks for it"
     task = task_of(args.task, site)
-    listener, why, words = Listener(codecs_of(site)), Why(site), Words(site)
+    listener, why, words = Listener(codecs_for(site)), Why(site), Words(site)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):

@@ -1,18 +1,8 @@
-"""Which scene draws which system: the one place to add one. A system without its own has its machines' table only."""
+"""The scene that a site's system draws. A system without its own has its machines' table only."""
 
 from onboard.core.messages import Message, Reference
 from onboard.core.site import Site
-from onboard.systems.car_park.scene import CarParkScene
-from onboard.systems.cell.scene import CellScene
-from onboard.systems.cell.site import Cell
-from onboard.systems.graph.scene import GraphScene
-from onboard.systems.graph.site import FactoryGraph
-from onboard.systems.mapd.scene import MapdScene
-from onboard.systems.mapd.site import Mapd
-from onboard.systems.terminal.scene import TerminalScene
-from onboard.systems.terminal.site import Terminal
-from onboard.systems.turning.scene import TurningScene
-from onboard.systems.turning.site import Turning
+from onboard.systems.registry import part
 from onboard.trace.scene.scene import Json, Scene
 from onboard.trace.view import SiteView
 
@@ -55,15 +45,8 @@ class PlainScene:
 
 def scene_of(site: Site, view: SiteView) -> Scene:
     """The scene of a site, to be fed beside ``view``."""
-    match site:
-        case Terminal():
-            return TerminalScene(site, view)
-        case FactoryGraph():
-            return GraphScene(site, view)
-        case Cell():
-            return CellScene(site, view)
-        case Mapd():
-            return MapdScene(site, view)
-        case Turning():
-            return TurningScene(site, view)
-    return CarParkScene(site, view) if site.tracks else PlainScene()
+    module = part(site.system, "scene")
+    if module is None:
+        return PlainScene()
+    scene: Scene = module.SCENE(site, view)
+    return scene

@@ -1,0 +1,17 @@
+"""A factory graph: robots, the nodes that host their agents, and the desk."""
+
+from onboard.core.codes import KindCode
+from onboard.systems.graph.agents import HostFactory
+from onboard.systems.graph.desk import DeskFactory
+from onboard.systems.graph.messages import MESSAGES
+from onboard.systems.graph.records import RECORDS
+from onboard.systems.graph.robot import RobotFactory
+from onboard.systems.graph.site import FactoryGraph
+from onboard.systems.system import System
+
+SYSTEM = System(
+    FactoryGraph.system,
+    {KindCode.VEHICLE: RobotFactory(), KindCode.NODE: HostFactory(), KindCode.DESK: DeskFactory()},
+    messages=MESSAGES,
+    records=RECORDS,
+)
