@@ -7,6 +7,7 @@ import pytest
 from onboard.core.authority import car_token, station_token
 from onboard.core.codes import (
     ANY_STATION,
+    OUTSIDE,
     DeskInput,
     DeskText,
     DoorPosition,
@@ -24,6 +25,7 @@ from onboard.core.holon import Holon
 from onboard.core.messages import (
     BayState,
     BusTime,
+    CallForProposals,
     CarAt,
     DeskEvent,
     DeskOrder,
@@ -51,6 +53,8 @@ CAR, TASK, WHEELBASE_MM = Reference(BAY, 1), Reference(BAY, 7), 2_600
 HERE = SITE.compartments[BAY].number
 PLACE = SITE.places[0].number
 Entry = dict[str, str | int]
+PARKING: Entry = {"record": "job", "task_origin": BAY, "task": 1, "operation": int(Operation.PARK)}
+PARKING |= {"car_origin": BAY, "car": 1, "wheelbase_mm": WHEELBASE_MM}
 
 
 def token_entry(record: str, version: int, holder: int) -> Entry:
@@ -175,17 +179,26 @@ def test_a_robot_killed_before_it_said_done_says_so_when_it_knows_where_it_is(ha
 
 
 def test_who_presses_again_inside_gets_the_ticket_that_the_power_failed_to_print() -> None:
-    entries = [
-        token_entry("token_held", 1, BAY),
-        {"record": "job", "task_origin": BAY, "task": 1, "operation": int(Operation.PARK), "car_origin": BAY, "car": 1}
-        | {"wheelbase_mm": WHEELBASE_MM},
-    ]
-    bay = machine(BAY, entries)
+    bay = machine(BAY, [token_entry("token_held", 1, BAY), PARKING])
     bay.sense(DoorState(BAY, DoorPosition.OPEN, DoorPosition.LOCKED, LightColour.GREEN), 10)
     first = bay.sense(BayState(BAY, 1_500, 4_300, 1_500, WHEELBASE_MM, True, False), 20)
     assert CarAt(BAY, CAR, HERE, 1, WHEELBASE_MM) in said(first), "nor had it been said that the car is here"
     assert tickets(first) == []
     assert tickets(bay.sense(DeskEvent(BAY, 1, DeskInput.KEY, Reference(0, 0)), 30)) == [CAR]
+
+
+def test_a_car_that_its_driver_took_out_while_the_bay_was_off_is_called_for_by_nobody() -> None:
+    """It was given back, or its driver left by himself; the compartment knows by its sensors only."""
+    entries = [token_entry("token_held", 1, BAY), journalled_place(BAY, HERE, 1), PARKING]
+    bay, words = machine(BAY, entries), list[Message]()
+    for now_us in range(100_000, 20_000_000, 100_000):
+        doors = DoorState(BAY, DoorPosition.LOCKED, DoorPosition.LOCKED, LightColour.RED)
+        for sensed in (doors, BayState(BAY, 0, 0, 0, 0, False, False)):
+            words += said(bay.sense(sensed, now_us))
+        words += said(bay.wake(now_us))
+    assert not any(isinstance(word, CallForProposals) for word in words)
+    assert TaskReport(BAY, CAR, TaskPhase.REFUSED, HERE, Reason.CANCELLED) in words
+    assert CarAt(BAY, CAR, OUTSIDE, 1, WHEELBASE_MM) in words
 
 
 def tickets(effects: list[Effect]) -> list[Reference]:

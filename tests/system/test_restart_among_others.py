@@ -98,3 +98,13 @@ def test_who_was_off_while_its_task_was_called_anew_does_not_begin_it() -> None:
     second = "crash:at_s=375.432383,target=MR2,restart_s=13.868,write=1,durable=no"
     report = played("small", 2169, Arrivals(6, 20, 10, 200), first, second, limit_s=3_600)
     assert report.verdict is Verdict.SERVED, report.why()
+
+
+def test_who_works_where_another_was_to_come_first_does_not_plan_to_work_there_until_that_one_has_been() -> None:
+    """The other then planned to wait for it, for 154 s, aboard a lift, and nobody moved although it left after six.
+
+    Two crashes a seed on `small`, seed 135.
+    """
+    crash = "crash:at_s=117.016517,target=MR1,restart_s=17.716,write=1,durable=no"
+    report = played("small", 135, Arrivals(6, 20, 10, 200), crash, limit_s=3_600)
+    assert report.verdict is Verdict.SERVED, report.why()

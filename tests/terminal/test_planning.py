@@ -149,6 +149,16 @@ def test_a_box_is_put_on_a_stack_after_all_that_are_fetched_from_it(first: str) 
     assert stack_list(picture, "S3") == [11, 14]
 
 
+def test_nobody_bids_for_a_box_that_is_in_a_plan() -> None:
+    """Two desks called for one box at once; one vehicle won both, and one mission got a box too few (liar, seed 5)."""
+    picture = mirror(14)
+    generation = VehicleGeneration(SITE, SITE.machines[14], picture)
+    assert generation.lower_bound(call("B4", "S1"), 0) is not None
+    plan(picture, 13, "B4", "S10")
+    assert generation.lower_bound(call("B4", "S1"), 0) is None
+    assert generation.lower_bound(call("B14", "S1"), 0) is not None
+
+
 def test_a_box_that_was_wanted_by_its_type_is_so_again_when_it_is_given_back() -> None:
     """It was wanted by name then, and another desk's mission took it where a stack grew on it (stranger, seed 4)."""
     picture, orders = mirror(1), Orders(SITE, 1)

@@ -70,9 +70,9 @@ class BayTask:
     was_granted: bool = False
     retry_at_us: int | None = None
     reminders: int = 0
-    #: How often nobody could, one after the other, and why the last time.
+    #: How often nobody could, one after the other, and why the last time; its driver may leave before anybody is asked.
     refusals: int = 0
-    reason: Reason = Reason.NONE
+    reason: Reason = Reason.CANCELLED
 
     @property
     def is_given_back(self) -> bool:

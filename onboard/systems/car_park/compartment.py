@@ -415,7 +415,7 @@ class Compartment:
     def _when_awaiting(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
-            has_left = self.job.is_given_back and not self.bay.load_kg
+            has_left = self.job.operation is Operation.PARK and not self.bay.load_kg
             return self._left(self.job) if has_left else self._call_for(self.job, now_us)
         if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
@@ -467,7 +467,7 @@ class Compartment:
     def _left(self, job: BayTask) -> list[Effect]:
         """The car has gone out with its driver, fetched or never parked."""
         refused = TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, job.reason)
-        effects: list[Effect] = [Send(refused)] if job.is_given_back else []
+        effects: list[Effect] = [Send(refused)] if job.operation is Operation.PARK else []
         effects += custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm)
         effects.append(self.outputs.show(DeskText.WELCOME, Reference(0, 0)))
         return effects + self._to_free()
