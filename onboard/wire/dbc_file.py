@@ -134,7 +134,11 @@ def read_annotations(text: str) -> Annotations:
             for name, choices in database.dbc.value_tables.items()
         },
         {message.name: _attributes(message) for message in database.messages},
-        {(message.name, signal.name): _attributes(signal) for message in database.messages for signal in message.signals},
+        {
+            (message.name, signal.name): _attributes(signal)
+            for message in database.messages
+            for signal in message.signals
+        },
         {message.name: tuple(signal.name for signal in message.signals) for message in database.messages},
     )
 

@@ -4,10 +4,10 @@ What a DBC says by standard means is taken from there: ``VAL_TABLE_`` names an e
 whose values its own ``VAL_`` repeats. The rest are attributes:
 
 * ``Noun`` of a message: the module that it goes to, where the file's would be too long;
-* ``PartOf`` of a message: the set of frames that it is a part of, in the order of their identifiers; ``SetComment`` of
-  the first one says what the set is; ``Repeats`` of a last one "Leg legs leg" means that the set's field ``legs``,
-  whose count the first frame tells, is a tuple of ``Leg``, numbered by the signal ``leg``; ``FieldOrder`` the order of its
-  fields, where it is not that of the signals;
+* ``PartOf`` of a message: the set of frames that it is a part of, in the order of their identifiers; ``SetComment``
+  of the first one says what the set is; ``Repeats`` of a last one "Leg legs leg" means that the set's field ``legs``,
+  whose count the first frame tells, is a tuple of ``Leg``, numbered by the signal ``leg``; ``FieldOrder`` is the order
+  of its fields, where it is not that of the signals;
 * ``Default`` of a signal: what its field is where nobody names it;
 * ``TableComment`` of a signal: what its value table is, told at one of the signals that have it.
 """
