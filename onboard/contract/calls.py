@@ -182,11 +182,11 @@ class CallForProposals(Message):
     car: Reference
     #: Distance of the car's axles, in steps of 10 mm; 1500 where no car is meant. 1500 to 4050 mm.
     wheelbase_mm: int
-    #: Number of a sub-call among those of its parent, from 1; 0 for a call of its own. 0 to 15.
-    part: int = 0
     #: ``origin``: Node-ID of the initiator of the call that this one is a part of; 0 with number 0: none. 0 to 255.
     #: ``number``: Call number of the call that this one is a part of; 0 with origin 0: none. 0 to 65535.
     parent: Reference = NO_REFERENCE
+    #: Number of a sub-call among those of its parent, from 1; 0 for a call of its own. 0 to 15.
+    part: int = 0
     #: How long after this call's deadline the part can begin at the earliest, in steps of 100 ms. 0 to 1638300 ms.
     ready_ms: int = 0
     #: How long after this call's deadline the winner holds its bid as an option, in steps of 250 ms; 0: no option, the

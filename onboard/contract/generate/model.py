@@ -7,7 +7,7 @@ whose values its own ``VAL_`` repeats. The rest are attributes:
 * ``PartOf`` of a message: the set of frames that it is a part of, in the order of their identifiers; ``SetComment``
   of the first one says what the set is; ``Repeats`` of a last one "Leg legs leg" means that the set's field ``legs``,
   whose count the first frame tells, is a tuple of ``Leg``, numbered by the signal ``leg``; ``FieldOrder`` is the order
-  of its fields, where it is not that of the signals;
+  of the fields of ``Leg``, and at the first message of the set, where it is not that of the signals;
 * ``Default`` of a signal: what its field is where nobody names it;
 * ``TableComment`` of a signal: what its value table is, told at one of the signals that have it.
 """
@@ -92,12 +92,12 @@ def read_contract(name: str, text: str, module: str, known: tuple[Table, ...]) -
         for signal in layout.signals
         if "TableComment" in notes.signals.get((layout.name, signal.name), {})
     }
-    for table, choices in notes.tables.items():
-        if choices not in comments:
-            raise ContractError(f"{name}.dbc: value table {table}: no signal that has it has a TableComment")
-    tables = tuple(Table(one, comments[choices], choices, module) for one, choices in notes.tables.items())
+    tables = tuple(Table(one, comments.get(choices, ""), choices, module) for one, choices in notes.tables.items())
     every = {table.choices: table for table in (*known, *tables)}
     frames = tuple(_frame(name, layout, notes, every) for layout in layouts)
+    for table in tables:
+        if not table.comment:
+            raise ContractError(f"{name}.dbc: value table {table.name}: no signal that has it has a TableComment")
     return Contract(name, text, notes.version, tables, frames, _sets(frames, notes))
 
 
@@ -172,5 +172,6 @@ def _set(name: str, frames: tuple[Frame, ...], notes: Annotations) -> FrameSet:
         inner = tuple(field for field in frames[-1].fields if field.name not in left_out)
         inner = tuple(sorted(inner, key=lambda field: order.index(field.name) if order else 0))
         fields[many] = Field(many, f"tuple[{repeated}, ...]", counted.signals, "")
-    ordered = sorted(fields.values(), key=lambda field: bool(field.default))
+    order = attributes.get("FieldOrder", "").split()
+    ordered = sorted(fields.values(), key=lambda field: order.index(field.name) if order else bool(field.default))
     return FrameSet(name, frames[0].module, attributes["SetComment"], frames, tuple(ordered), repeated, inner)

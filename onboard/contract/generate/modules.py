@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -62,7 +63,7 @@ def generated(every: tuple[Contract, ...]) -> dict[str, str]:
                 names = [frame.layout.name for frame in frames] + [one.name for one in sets]
                 shared[module] = sorted([*names, *(one.repeated for one in sets if one.repeated)])
     files["messages.py"] = _every_message(shared)
-    return {name: _formatted(text, name) for name, text in files.items()}
+    return _formatted(files)
 
 
 def _classes(
@@ -145,12 +146,18 @@ def _import(module: str, names: Iterable[str]) -> str:
     return f"from {PACKAGE}.{module} import {ordered}\n" if ordered else ""
 
 
-def _formatted(text: str, name: str) -> str:
-    """The text as ruff sorts imports and lays out code; ruff comes with the tools for tests."""
-    for words in (("check", "--quiet", "--select", "I,RUF022", "--fix", "--exit-zero"), ("format", "--quiet")):
-        command = [sys.executable, "-m", "ruff", *words, "--stdin-filename", f"onboard/contract/{name}", "-"]
-        text = subprocess.run(command, input=text, capture_output=True, text=True, check=True, cwd=_ROOT).stdout
-    return text
+def _formatted(files: dict[str, str]) -> dict[str, str]:
+    """The texts as ruff sorts imports and lays out code; ruff comes with the tools for tests."""
+    ruff = [sys.executable, "-m", "ruff"]
+    config = ("--quiet", "--no-cache", "--config", str(_ROOT / "pyproject.toml"))
+    with tempfile.TemporaryDirectory() as folder:
+        places = {name: Path(folder, name) for name in files}
+        Path(folder, "packing").mkdir()
+        for name, text in files.items():
+            places[name].write_text(text, encoding="utf-8")
+        subprocess.run([*ruff, "check", *config, "--select", "I,RUF022", "--fix", "--exit-zero", folder], check=True)
+        subprocess.run([*ruff, "format", *config, folder], check=True)
+        return {name: place.read_text(encoding="utf-8") for name, place in places.items()}
 
 
 _ROOT = Path(__file__).parents[3]
