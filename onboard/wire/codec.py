@@ -57,10 +57,9 @@ class Codec:
         Raises ``ValueError``, naming the signal, for a value outside its range, and ``KeyError`` for a message of
         another bus.
         """
-        if isinstance(message, CallForProposals):
-            return tuple(self._encode(part) for part in _parts_of_call(message))
-        if isinstance(message, Itinerary):
-            return tuple(self._encode(part) for part in _parts_of_itinerary(message))
+        parts = _SETS.get(type(message))
+        if parts is not None:
+            return tuple(self._encode(part) for part in parts(message))
         return (self._encode(message),)
 
     def _encode(self, message: Message) -> Frame:
@@ -127,6 +126,13 @@ def _parts_of_itinerary(itinerary: Itinerary) -> tuple[Message, ...]:
         for number, leg in enumerate(itinerary.legs)
     ]
     return (head, *legs)
+
+
+#: What takes a message of several frames apart.
+_SETS: dict[type[Message], Callable[[Any], tuple[Message, ...]]] = {
+    CallForProposals: _parts_of_call,
+    Itinerary: _parts_of_itinerary,
+}
 
 
 def _wheelbase_mm(call: CallForProposals) -> int:

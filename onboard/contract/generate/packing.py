@@ -13,8 +13,10 @@ from onboard.wire.dbc_file import SignalLayout
 
 #: Letters of ``struct`` by length in bytes.
 _LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
+#: Bits of one digit of CPython's whole numbers: sums that stay below are several times as fast.
+_DIGIT_BITS = 30
 #: Cost of one more word and of one more signal in a word, in ns on the machine of docs/figures.md, and of each signal
-#: behind the first in a word that is longer than a digit of CPython's whole numbers (30 bits).
+#: behind the first in a word that is longer than a digit.
 _WORD_NS, _SIGNAL_NS, _LONG_NS = 12, 30, 20
 
 
@@ -122,20 +124,34 @@ def _refusal(frame: Frame, signal: SignalLayout) -> list[str]:
 
 
 def _written(word: Word, names: dict[str, str]) -> str:
-    """The expression that makes a word of its signals."""
-    terms = []
+    """The expression that makes a word of its signals, those of one digit of a whole number together."""
+    digits: list[list[SignalLayout]] = []
     for signal in word.signals:
-        term = names[signal.name]
-        if signal.scale != 1:
-            term = f"({term} - {signal.offset}) // {signal.scale}" if signal.offset else f"{term} // {signal.scale}"
-        if signal.signed and not word.is_plain:
-            term = f"({term} & {_mask(signal)})"
-        shift = signal.shift - word.start * 8
-        alone = len(word.signals) == 1 and not shift
-        if not alone and signal.scale != 1:
-            term = f"({term})"
-        terms.append(term if not shift else f"{term} * 0x{1 << shift:X}")
-    return " + ".join(terms)
+        end = signal.shift + signal.bits
+        if digits and end - digits[-1][0].shift <= _DIGIT_BITS:
+            digits[-1].append(signal)
+        else:
+            digits.append([signal])
+    sums = []
+    for digit in digits:
+        terms = [_times(_raw(word, signal, names[signal.name]), signal.shift - digit[0].shift) for signal in digit]
+        shift = digit[0].shift - word.start * 8
+        total = " + ".join(terms)
+        sums.append(_times(f"({total})" if shift and len(terms) > 1 else total, shift))
+    return " + ".join(sums)
+
+
+def _raw(word: Word, signal: SignalLayout, name: str) -> str:
+    """What a signal holds of a value."""
+    term = name
+    if signal.scale != 1:
+        term = f"({term} - {signal.offset}) // {signal.scale}" if signal.offset else f"{term} // {signal.scale}"
+        term = term if len(word.signals) == 1 else f"({term})"
+    return f"({term} & {_mask(signal)})" if signal.signed and not word.is_plain else term
+
+
+def _times(term: str, shift: int) -> str:
+    return f"{term} * 0x{1 << shift:X}" if shift else term
 
 
 def _mask(signal: SignalLayout) -> str:

@@ -174,8 +174,7 @@ def pack_call_parent(message: CallParent) -> bytes:
     return _Q.pack(
         call
         + parent_origin * 0x10000
-        + parent_number * 0x1000000
-        + (ready_ms // 100) * 0x10000000000
+        + (parent_number + (ready_ms // 100) * 0x10000) * 0x1000000
         + (hold_ms // 250) * 0x40000000000000
     )
 

@@ -299,7 +299,7 @@ def pack_arm_progress(message: ArmProgress) -> bytes:
     if not 0 <= goal <= 65535:
         raise OutOfRangeError("ArmProgress.goal", goal, 0, 65535)
     return _Q.pack(
-        (x_mm & 0xFFFFF) + (y_mm & 0xFFFFF) * 0x100000 + message.arm_phase * 0x10000000000 + goal * 0x100000000000
+        (x_mm & 0xFFFFF) + ((y_mm & 0xFFFFF) + message.arm_phase * 0x100000) * 0x100000 + goal * 0x100000000000
     )
 
 
@@ -331,8 +331,7 @@ def pack_part_at(message: PartAt) -> bytes:
         part_origin
         + part_number * 0x100
         + (x_mm & 0x7FFFF) * 0x1000000
-        + (y_mm & 0x7FFFF) * 0x80000000000
-        + message.aboard * 0x4000000000000000
+        + ((y_mm & 0x7FFFF) + message.aboard * 0x80000) * 0x80000000000
     )
 
 

@@ -90,9 +90,7 @@ def pack_arm_state(message: ArmState) -> bytes:
     y_mm = message.y_mm
     if not -524288 <= y_mm <= 524287:
         raise OutOfRangeError("ArmState.y_mm", y_mm, -524288, 524287)
-    return _Q.pack(
-        sequence + (x_mm & 0xFFFFF) * 0x100 + (y_mm & 0xFFFFF) * 0x10000000 + message.arm_mode * 0x1000000000000
-    )
+    return _Q.pack(sequence + (x_mm & 0xFFFFF) * 0x100 + ((y_mm & 0xFFFFF) + message.arm_mode * 0x100000) * 0x10000000)
 
 
 def unpack_arm_state(sender: int, data: bytes) -> ArmState | None:
@@ -162,7 +160,7 @@ def pack_order_to(message: OrderTo) -> bytes:
     if not 0 <= within_ms <= 2550000:
         raise OutOfRangeError("OrderTo.within_ms", within_ms, 0, 2550000)
     return _Q.pack(
-        order + (x_mm & 0xFFFFF) * 0x10000 + (y_mm & 0xFFFFF) * 0x1000000000 + (within_ms // 10000) * 0x100000000000000
+        order + (x_mm & 0xFFFFF) * 0x10000 + ((y_mm & 0xFFFFF) + (within_ms // 10000) * 0x100000) * 0x1000000000
     )
 
 

@@ -178,8 +178,7 @@ def pack_shuttle_state(message: ShuttleState) -> bytes:
         + message.mode * 0x100
         + message.side * 0x1000
         + extension_mm * 0x2000
-        + load_kg * 0x4000000
-        + wheelbase_mm * 0x4000000000
+        + (load_kg + wheelbase_mm * 0x1000) * 0x4000000
     )
 
 
@@ -251,10 +250,8 @@ def pack_bay_state(message: BayState) -> bytes:
     return _Q.pack(
         load_kg
         + length_mm * 0x1000
-        + height_mm * 0x2000000
-        + wheelbase_mm * 0x2000000000
-        + message.person_inside * 0x4000000000000
-        + message.carrier_in_front * 0x8000000000000
+        + (height_mm + wheelbase_mm * 0x1000 + message.person_inside * 0x2000000 + message.carrier_in_front * 0x4000000)
+        * 0x2000000
     )
 
 

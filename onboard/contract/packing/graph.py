@@ -153,9 +153,7 @@ def pack_robot_at(message: RobotAt) -> bytes:
         + message.on_edge * 0x10000
         + message.robot_mode * 0x20000
         + ahead1 * 0x80000
-        + ahead2 * 0x8000000
-        + ahead3 * 0x800000000
-        + goal * 0x80000000000
+        + (ahead2 + ahead3 * 0x100 + goal * 0x10000) * 0x8000000
     )
 
 

@@ -46,7 +46,7 @@ def pack_step_round(message: StepRound) -> bytes:
     attempt = message.attempt
     if not 0 <= attempt <= 255:
         raise OutOfRangeError("StepRound.attempt", attempt, 0, 255)
-    return _Q.pack(step + open_tasks * 0x400000 + attempt * 0x4000000000 + message.bidding * 0x400000000000)
+    return _Q.pack(step + (open_tasks + attempt * 0x10000 + message.bidding * 0x1000000) * 0x400000)
 
 
 def unpack_step_round(sender: int, data: bytes) -> StepRound | None:
@@ -73,7 +73,7 @@ def pack_step_award(message: StepAward) -> bytes:
     task = message.task
     if not 0 <= task <= 65535:
         raise OutOfRangeError("StepAward.task", task, 0, 65535)
-    return _Q.pack(step + index * 0x400000 + changes * 0x40000000 + robot * 0x4000000000 + task * 0x400000000000)
+    return _Q.pack(step + index * 0x400000 + (changes + robot * 0x100) * 0x40000000 + task * 0x400000000000)
 
 
 def unpack_step_award(sender: int, data: bytes) -> StepAward | None:
@@ -126,9 +126,7 @@ def pack_path_head(message: PathHead) -> bytes:
     version = message.version
     if not 0 <= version <= 255:
         raise OutOfRangeError("PathHead.version", version, 0, 255)
-    return _Q.pack(
-        step + cell * 0x400000 + moves * 0x4000000000 + version * 0x4000000000000 + message.kept * 0x400000000000000
-    )
+    return _Q.pack(step + (cell + moves * 0x10000) * 0x400000 + (version + message.kept * 0x100) * 0x4000000000000)
 
 
 def unpack_path_head(sender: int, data: bytes) -> PathHead | None:
@@ -173,13 +171,7 @@ def pack_step_state(message: StepState) -> bytes:
     task = message.task
     if not 0 <= task <= 65535:
         raise OutOfRangeError("StepState.task", task, 0, 65535)
-    return _Q.pack(
-        step
-        + cell * 0x400000
-        + task * 0x4000000000
-        + message.loaded * 0x40000000000000
-        + message.served * 0x80000000000000
-    )
+    return _Q.pack(step + cell * 0x400000 + (task + message.loaded * 0x10000 + message.served * 0x20000) * 0x4000000000)
 
 
 def unpack_step_state(sender: int, data: bytes) -> StepState | None:

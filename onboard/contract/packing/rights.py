@@ -85,8 +85,7 @@ def pack_token_refusal(message: TokenRefusal) -> bytes:
     return _Q.pack(
         message.token_kind
         + token * 0x10
-        + version * 0x10000000
-        + requester * 0x1000000000000
+        + (version + requester * 0x100000) * 0x10000000
         + message.reason * 0x100000000000000
     )
 
@@ -123,8 +122,7 @@ def pack_token_request(message: TokenRequest) -> bytes:
     return _Q.pack(
         message.token_kind
         + token * 0x10
-        + version_seen * 0x10000000
-        + itinerary_version * 0x1000000000000
+        + (version_seen + itinerary_version * 0x100000) * 0x10000000
         + predecessor * 0x100000000000000
     )
 
@@ -301,11 +299,7 @@ def pack_regeneration_state(message: RegenerationState) -> bytes:
     if not 0 <= digest <= 65535:
         raise OutOfRangeError("RegenerationState.digest", digest, 0, 65535)
     return _Q.pack(
-        message.regeneration_phase
-        + epoch * 0x10
-        + tokens * 0x1000
-        + digest * 0x10000000
-        + message.reason * 0x100000000000
+        message.regeneration_phase + epoch * 0x10 + tokens * 0x1000 + (digest + message.reason * 0x10000) * 0x10000000
     )
 
 

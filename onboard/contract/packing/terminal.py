@@ -201,8 +201,7 @@ def pack_plan_task(message: PlanTask) -> bytes:
         + part * 0x100
         + pick * 0x800
         + put * 0x10000
-        + box * 0x200000
-        + task_origin * 0x2000000000
+        + (box + task_origin * 0x10000) * 0x200000
         + task_number * 0x200000000000
     )
 

@@ -158,11 +158,8 @@ def pack_mission_key(message: MissionKey) -> bytes:
         mission
         + message.verb * 0x100
         + what * 0x400
-        + count * 0x4000000
-        + source * 0x80000000
-        + target * 0x8000000000
-        + before_s * 0x800000000000
-        + message.urgent * 0x4000000000000000
+        + (count + source * 0x20 + target * 0x2000) * 0x4000000
+        + (before_s + message.urgent * 0x8000) * 0x800000000000
     )
 
 
