@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Mapping
 
+from onboard.contract.base import Stamp
+
 #: Bus time on the wire is in milliseconds modulo this.
 BUS_MS_MODULUS = 1 << 32
 
@@ -29,6 +31,15 @@ def ms_after(bus_ms: int, other_ms: int) -> int:
     Every comparison of two such times is one of this with 0: they wrap after 49.7 days, and ``<`` then lies.
     """
     return away(bus_ms, other_ms, BUS_MS_MODULUS)
+
+
+def ranks_before(one: Stamp, other: Stamp) -> bool:
+    """Whether ``one`` plan keeps its windows before the ``other``; of two that differ always exactly one does."""
+    after_ms = ms_after(one.award_ms, other.award_ms)
+    if after_ms == ms_after(other.award_ms, one.award_ms):
+        # The same time, or half the way round, where nobody can say which came first.
+        return one < other
+    return after_ms < 0
 
 
 def away(value: int, other: int, modulus: int) -> int:

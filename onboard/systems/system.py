@@ -6,18 +6,16 @@ from dataclasses import dataclass, field
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
 from onboard.core.compaction import Rules
-from onboard.core.messages import Message
 
 
 @dataclass(frozen=True, slots=True)
 class System:
     """One kind of site: ``name`` as site files say it, and what drives each kind of machine there.
 
-    ``messages`` are the classes of what the system's own DBC file adds to the contracts of all. ``records`` say what of
-    its journal outlives compaction, beside the core's own; a record that is not named is kept for good.
+    ``records`` say what of its journal outlives compaction, beside the core's own; a record that is not named is kept
+    for good.
     """
 
     name: str
     factories: Mapping[KindCode, BehaviourFactory]
-    messages: tuple[type[Message], ...] = ()
     records: Rules = field(default_factory=dict)
