@@ -5,36 +5,23 @@ calls for nothing twice: it listens first, because whoever has an order in hand 
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
-from enum import Enum
-from typing import ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.journal_records import records_in
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
 from onboard.core.negotiation.winners import STANDS_AFTER_US
+from onboard.work.counter_records import OVER, OrderRecord, OrderState, OrderStateRecord
 
 #: After power-up a desk listens so long before it calls: who has an order in hand says so. Ours.
 LISTEN_US = 3_000_000
 #: The counter is told how an order stands this often, us (dbc/cell.dbc, dbc/turning.dbc).
 ANSWER_US = 2_000_000
-
-
-class OrderState(Enum):
-    """How an order stands; each is journalled."""
-
-    HEARD = "not called for yet"
-    CALLED = "bids may come"
-    IN_HAND = "somebody has it"
-    DONE = "done"
-    REFUSED = "nobody can do it"
-
-
-#: States that nothing follows.
-OVER = (OrderState.DONE, OrderState.REFUSED)
 
 
 @dataclass
@@ -67,6 +54,8 @@ class Counter(ABC, Generic[AnOrder]):
     ask_us: ClassVar[int]
     #: An order that nobody can do is refused after so many calls of several attempts each.
     max_calls: ClassVar[int]
+    #: What it journals of an order when it comes, and when it stands otherwise.
+    record_types: ClassVar[tuple[type[OrderRecord], type[OrderStateRecord]]]
 
     fleet: Fleet
     kind: KindCode = KindCode.DESK
@@ -74,12 +63,12 @@ class Counter(ABC, Generic[AnOrder]):
     _listen_until_us: int | None = None
 
     def __post_init__(self) -> None:
-        for entry in self.fleet.entries:
-            if entry.get("record") == "order":
-                order = self.noted_order(entry)
+        for record in records_in(self.fleet.entries, *self.record_types):
+            if isinstance(record, OrderStateRecord):
+                self._replay(self.orders[Reference(self.fleet.node_id, record.number)], record)
+            else:
+                order = self.noted_order(record)
                 self.orders[order.task] = order
-            elif entry.get("record") == "order_state":
-                self._replay(self.orders[Reference(self.fleet.node_id, int(entry["number"]))], entry)
 
     # --- what differs from desk to desk ------------------------------------------------------------------------
 
@@ -92,15 +81,15 @@ class Counter(ABC, Generic[AnOrder]):
         """Note what the winner asks for an order."""
 
     @abstractmethod
-    def price_entry(self, order: AnOrder) -> Mapping[str, str | int]:
-        """The price as the journal keeps it."""
+    def state_record(self, order: AnOrder) -> OrderStateRecord:
+        """How it stands, with its price."""
 
     @abstractmethod
-    def noted_price(self, order: AnOrder, entry: Mapping[str, str | int]) -> None:
-        """Take the price from the journal."""
+    def noted_price(self, order: AnOrder, record: Any) -> None:
+        """Take the price from what ``state_record`` gave."""
 
     @abstractmethod
-    def noted_order(self, entry: Mapping[str, str | int]) -> AnOrder:
+    def noted_order(self, record: Any) -> AnOrder:
         """An order from the journal."""
 
     @abstractmethod
@@ -240,18 +229,17 @@ class Counter(ABC, Generic[AnOrder]):
         if state in OVER:
             self.fleet.winners.over(order.task)
         order.ask_at_us = now_us + self.ask_us if state is OrderState.IN_HAND else None
-        entry: dict[str, str | int] = {"record": "order_state", "number": order.task.number, "state": state.name}
-        return [Record({**entry, "winner": order.winner, **self.price_entry(order)}), *self.say(order, now_us)]
+        return [Record(self.state_record(order)), *self.say(order, now_us)]
 
     def say(self, order: AnOrder, now_us: int) -> list[Effect]:
         """Tell the counter, and again until the order is over."""
         order.answer_at_us = None if order.state in OVER else now_us + ANSWER_US
         return [Actuate(self.answer(order))]
 
-    def _replay(self, order: AnOrder, entry: Mapping[str, str | int]) -> None:
-        state = OrderState[str(entry["state"])]
+    def _replay(self, order: AnOrder, record: OrderStateRecord) -> None:
+        state = record.state
         # A call does not outlive its desk: it is made again, unless somebody says that it has the order.
         order.state = OrderState.HEARD if state is OrderState.CALLED else state
         order.may_be_won = state is OrderState.CALLED
-        order.winner = int(entry["winner"])
-        self.noted_price(order, entry)
+        order.winner = record.winner
+        self.noted_price(order, record)

@@ -1,14 +1,47 @@
-"""What of a counter's records outlives compaction (counter.py reads them); the same for each such desk."""
+"""What a desk at which orders come in writes of them; a desk's order adds its own fields to both records."""
 
-from onboard.core.compaction import MOST_OVER, End, Keep, Rules
-from onboard.work.counter import OVER
+from dataclasses import dataclass
+from enum import Enum
+
+from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep
 
 _NUMBER = ("number",)
 
-RECORDS: Rules = {
-    "order": (Keep("order", _NUMBER),),
-    "order_state": (
+
+class OrderState(Enum):
+    """How an order stands; each is journalled."""
+
+    HEARD = "not called for yet"
+    CALLED = "bids may come"
+    IN_HAND = "somebody has it"
+    DONE = "done"
+    REFUSED = "nobody can do it"
+
+
+#: States that nothing follows.
+OVER = (OrderState.DONE, OrderState.REFUSED)
+
+
+@dataclass(frozen=True, slots=True)
+class OrderRecord(JournalRecord):
+    """An order came in under ``number``, 16 bits."""
+
+    NAME = "order"
+    RULES = (Keep("order", _NUMBER),)
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class OrderStateRecord(JournalRecord):
+    """How an order stands, and who has it: a node-ID, 0 for nobody."""
+
+    NAME = "order_state"
+    RULES = (
         Keep("order_state", _NUMBER),
-        End(("order", "order_state"), _NUMBER, ("state", tuple(one.name for one in OVER)), MOST_OVER),
-    ),
-}
+        End(("order", "order_state"), _NUMBER, ("state", OVER), MOST_OVER),
+    )
+
+    number: int
+    state: OrderState
+    winner: int

@@ -31,6 +31,7 @@ from onboard.core.codes import (
     TokenKind,
 )
 from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.journal_records import records_in
 from onboard.core.messages import (
     BayState,
     CarAt,
@@ -53,6 +54,7 @@ from onboard.systems.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, S
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.program import Program
+from onboard.systems.car_park.records import NumberRecord
 from onboard.systems.car_park.site import car_park
 from onboard.systems.car_park.stewardship import Stewardship
 
@@ -85,9 +87,8 @@ class Compartment:
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
-        for entry in self.fleet.entries:
-            if entry.get("record") == "number":
-                self._number = int(entry["number"])
+        for record in records_in(self.fleet.entries, NumberRecord):
+            self._number = record.number
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,
@@ -375,7 +376,7 @@ class Compartment:
         self._number = car.number
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
         # The number first: one that is not used is no harm, one used twice would be.
-        effects: list[Effect] = [Record({"record": "number", "number": self._number})]
+        effects: list[Effect] = [Record(NumberRecord(self._number))]
         effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
         effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
@@ -410,7 +411,7 @@ class Compartment:
         self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
         job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
-        return [Record({"record": "number", "number": self._number}), job, *self._fetch(self.job, now_us)]
+        return [Record(NumberRecord(self._number)), job, *self._fetch(self.job, now_us)]
 
     def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
         where = self._place_of(job.car)

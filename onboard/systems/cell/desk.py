@@ -4,7 +4,7 @@ Rows C03, C05 and C18. It names the parts and is their first custodian: a part's
 its goal and to nobody else, and comes back when the part lies where it was wanted.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -22,7 +22,9 @@ from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import Hearsay
 from onboard.systems.cell.messages import ArmProgress, OrderAnswer, OrderFrom, OrderResult, OrderTo, PartAt
-from onboard.work.counter import Counter, CounterOrder, OrderState
+from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
+from onboard.work.counter import Counter, CounterOrder
+from onboard.work.counter_records import OrderState
 
 
 @dataclass
@@ -54,6 +56,7 @@ class GoalManager(Counter[Order]):
     ask_us: ClassVar[int] = 20_000_000
     #: A goal that nobody can achieve is refused after so many calls of several attempts each. Ours.
     max_calls: ClassVar[int] = 3
+    record_types = GoalOrderRecord, GoalStateRecord
 
     hearsay: Hearsay = field(default_factory=Hearsay)
     _half_told: dict[int, OrderFrom] = field(default_factory=dict)
@@ -110,10 +113,9 @@ class GoalManager(Counter[Order]):
         limit_ms = to_bus_ms(now_us + wanted.within_ms * 1000) if wanted.within_ms else 0
         start, end = Point(begin.x_mm, begin.y_mm), Point(wanted.x_mm, wanted.y_mm)
         order = self.orders[task] = Order(task, Goal(task, task, start, end, (), limit_ms))
-        entry: dict[str, str | int] = {"record": "order", "number": task.number, "limit": limit_ms}
-        entry |= {"from_x": start.x_mm, "from_y": start.y_mm, "to_x": end.x_mm, "to_y": end.y_mm}
+        record = GoalOrderRecord(task.number, limit_ms, start.x_mm, start.y_mm, end.x_mm, end.y_mm)
         said = Send(PartAt(self.fleet.node_id, task, *start, False))
-        return [Record(entry), *self.say(order, now_us), said]
+        return [Record(record), *self.say(order, now_us), said]
 
     # --- the Counter -------------------------------------------------------------------------------------------
 
@@ -146,20 +148,19 @@ class GoalManager(Counter[Order]):
         offer = self.hearsay.offer(order.winner, order.goal.task)
         order.cost = offer.cost if offer is not None else 0.0
 
-    def price_entry(self, order: Order) -> Mapping[str, str | int]:
-        """To the last bit."""
-        return {"cost": order.cost.hex()}
+    def state_record(self, order: Order) -> GoalStateRecord:
+        """With the contract's cost."""
+        return GoalStateRecord(order.task.number, order.state, order.winner, order.cost)
 
-    def noted_price(self, order: Order, entry: Mapping[str, str | int]) -> None:
-        """To the last bit."""
-        order.cost = float.fromhex(str(entry["cost"]))
+    def noted_price(self, order: Order, record: GoalStateRecord) -> None:
+        """The contract's cost."""
+        order.cost = record.cost
 
-    def noted_order(self, entry: Mapping[str, str | int]) -> Order:
+    def noted_order(self, record: GoalOrderRecord) -> Order:
         """As it was noted when it came."""
-        task = Reference(self.fleet.node_id, int(entry["number"]))
-        start = Point(int(entry["from_x"]), int(entry["from_y"]))
-        end = Point(int(entry["to_x"]), int(entry["to_y"]))
-        return Order(task, Goal(task, task, start, end, (), int(entry["limit"])))
+        task = Reference(self.fleet.node_id, record.number)
+        start, end = Point(record.from_x, record.from_y), Point(record.to_x, record.to_y)
+        return Order(task, Goal(task, task, start, end, (), record.limit))
 
     def answer(self, order: Order) -> Message:
         """With the cost."""

@@ -15,13 +15,14 @@ from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import last_boot, successor
+from onboard.core.records import last_boot
+from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
 from onboard.systems.cell.contracts import Contract
 from onboard.systems.cell.generation import ArmGeneration, call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import contract_messages
-from onboard.systems.cell.memory import Stage, Undertaking, lost_record, stage_record, undertakings, won_record
+from onboard.systems.cell.memory import Undertaking, lost_record, stage_record, undertakings, won_record
 from onboard.systems.cell.messages import (
     ArmMode,
     ArmPhase,
@@ -34,6 +35,7 @@ from onboard.systems.cell.messages import (
     PartAt,
 )
 from onboard.systems.cell.motion import Driver
+from onboard.systems.cell.records import Stage
 from onboard.systems.cell.site import Cell
 
 #: Where a robot is, is told this often while it moves, us (dbc/cell.dbc).

@@ -1,13 +1,13 @@
 """The order desk: orders for a robot by name go to it, all others are called for (rows G11, G28)."""
 
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from functools import partial
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.journal_records import records_in
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Closed, Estimator, NegotiationEvent
@@ -25,7 +25,9 @@ from onboard.systems.graph.messages import (
     stops_of,
 )
 from onboard.systems.graph.planning import call_terms, least_finish_ms
+from onboard.systems.graph.records import VisitRecord
 from onboard.systems.graph.site import FactoryGraph
+from onboard.work.counter_records import OVER, OrderState
 
 #: After power-up the desk listens so long before it calls: who has an order in hand says so, us. Ours.
 LISTEN_US = 3_000_000
@@ -40,32 +42,22 @@ NAMED_STANDS_US = 600_000_000
 ASK_US = 20_000_000
 
 
-class Stage(Enum):
-    """How an order stands; each is journalled."""
-
-    HEARD = "not given to anybody"
-    CALLED = "bids may come"
-    IN_HAND = "a robot has it"
-    DONE = "done"
-    REFUSED = "refused"
-
-
 _RESULTS = {
-    Stage.HEARD: VisitResult.RECEIVED,
-    Stage.CALLED: VisitResult.RECEIVED,
-    Stage.IN_HAND: VisitResult.IN_HAND,
-    Stage.DONE: VisitResult.DONE,
-    Stage.REFUSED: VisitResult.REFUSED,
+    OrderState.HEARD: VisitResult.RECEIVED,
+    OrderState.CALLED: VisitResult.RECEIVED,
+    OrderState.IN_HAND: VisitResult.IN_HAND,
+    OrderState.DONE: VisitResult.DONE,
+    OrderState.REFUSED: VisitResult.REFUSED,
 }
 
 
 #: What an order from outside is told as.
 _PHASES = {
-    Stage.HEARD: TaskPhase.OPEN,
-    Stage.CALLED: TaskPhase.OPEN,
-    Stage.IN_HAND: TaskPhase.AWARDED,
-    Stage.DONE: TaskPhase.DONE,
-    Stage.REFUSED: TaskPhase.REFUSED,
+    OrderState.HEARD: TaskPhase.OPEN,
+    OrderState.CALLED: TaskPhase.OPEN,
+    OrderState.IN_HAND: TaskPhase.AWARDED,
+    OrderState.DONE: TaskPhase.DONE,
+    OrderState.REFUSED: TaskPhase.REFUSED,
 }
 
 
@@ -77,7 +69,7 @@ class DeskOrder:
     stops: tuple[int, ...]
     robot: int
     named: bool
-    stage: Stage = Stage.HEARD
+    stage: OrderState = OrderState.HEARD
     answer_at_us: int | None = None
     due_us: int | None = None
     #: Whether a call of an earlier life of the desk may have found a winner that the desk has forgotten.
@@ -87,13 +79,8 @@ class DeskOrder:
 
     def record(self) -> Record:
         """All of it, for the journal."""
-        entry: dict[str, str | int] = {"record": "visit", "number": self.task.number, "robot": self.robot}
-        entry |= {
-            "origin": self.task.origin,
-            "named": int(self.named),
-            "stops": " ".join(str(one) for one in self.stops),
-        }
-        return Record(entry | {"stage": self.stage.name})
+        origin, number = self.task
+        return Record(VisitRecord(number, self.robot, self.named, self.stops, self.stage, origin))
 
 
 @dataclass(frozen=True)
@@ -119,23 +106,20 @@ class OrderDesk:
     _listen_until_us: int | None = None
 
     def __post_init__(self) -> None:
-        for entry in self.fleet.entries:
-            if entry.get("record") == "visit":
-                task = Reference(int(entry.get("origin", self.fleet.node_id)), int(entry["number"]))
-                stops = tuple(int(one) for one in str(entry["stops"]).split())
-                order = DeskOrder(task, stops, int(entry["robot"]), bool(entry["named"]), Stage[str(entry["stage"])])
-                # A call of an earlier life may still find a winner: it tells by its report.
-                order.may_be_won = order.stage in (Stage.HEARD, Stage.CALLED)
-                order.stage = Stage.HEARD if order.stage is Stage.CALLED else order.stage
-                self.orders[task] = order
+        for record in records_in(self.fleet.entries, VisitRecord):
+            task = Reference(record.origin or self.fleet.node_id, record.number)
+            order = DeskOrder(task, record.stops, record.robot, record.named, record.stage)
+            # A call of an earlier life may still find a winner: it tells by its report.
+            order.may_be_won = order.stage in (OrderState.HEARD, OrderState.CALLED)
+            order.stage = OrderState.HEARD if order.stage is OrderState.CALLED else order.stage
+            self.orders[task] = order
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
     @property
     def state(self) -> MachineState:
         """Heartbeat state."""
-        over = (Stage.DONE, Stage.REFUSED)
-        busy = any(order.stage not in over for order in self.orders.values())
+        busy = any(order.stage not in OVER for order in self.orders.values())
         return MachineState.WORKING if busy else MachineState.IDLE
 
     @property
@@ -149,7 +133,7 @@ class OrderDesk:
         for order in self.orders.values():
             order.answer_at_us = now_us
             order.due_us = now_us + LISTEN_US
-            if order.stage is Stage.IN_HAND or (order.named and order.stage is Stage.HEARD):
+            if order.stage is OrderState.IN_HAND or (order.named and order.stage is OrderState.HEARD):
                 self._watch(order, now_us)
         return []
 
@@ -181,7 +165,7 @@ class OrderDesk:
         if machine is None or machine.kind is not KindCode.VEHICLE:
             self.fleet.drops[Reason.NOT_OF_KIND] += 1
             return []
-        if order.stage in (Stage.DONE, Stage.REFUSED):
+        if order.stage in OVER:
             return []
         if self._may_say(order, message.sender, now_us):
             return self._on_report(order, message, now_us)
@@ -191,28 +175,28 @@ class OrderDesk:
     def _on_report(self, order: DeskOrder, report: TaskReport, now_us: int) -> list[Effect]:
         """How an order stands, by who may say it."""
         match report.phase:
-            case TaskPhase.AWARDED if order.stage is not Stage.IN_HAND:
+            case TaskPhase.AWARDED if order.stage is not OrderState.IN_HAND:
                 return self._withdraw(order, now_us) + self._in_hand(order, report.sender, now_us)
             case TaskPhase.DONE:
                 order.robot = report.sender
-                return self._withdraw(order, now_us) + self._set(order, Stage.DONE, now_us, None)
-            case TaskPhase.FORFEITED if order.stage is Stage.IN_HAND and not order.named:
+                return self._withdraw(order, now_us) + self._set(order, OrderState.DONE, now_us, None)
+            case TaskPhase.FORFEITED if order.stage is OrderState.IN_HAND and not order.named:
                 self.fleet.winners.over(order.task)
-                return self._set(order, Stage.HEARD, now_us, 0)
+                return self._set(order, OrderState.HEARD, now_us, 0)
             case TaskPhase.REFUSED if order.named:
-                return self._set(order, Stage.REFUSED, now_us, None)
+                return self._set(order, OrderState.REFUSED, now_us, None)
         return []
 
     def _may_say(self, order: DeskOrder, robot: int, now_us: int) -> bool:
         """Whether a robot's word about an order counts: it has it, is named, or may have won it in my earlier life."""
-        if order.named or order.stage is Stage.IN_HAND:
+        if order.named or order.stage is OrderState.IN_HAND:
             return robot == order.robot
         return order.may_be_won and self.fleet.winners.may_claim(order.task, robot, now_us)
 
     def _on_robot(self, at: RobotAt, now_us: int) -> None:
         self.fleet.winners.works(at.sender, (at.behind, at.node, at.on_edge, at.robot_mode), now_us)
         for order in self.orders.values():
-            if order.stage is Stage.IN_HAND and order.robot == at.sender and not order.named:
+            if order.stage is OrderState.IN_HAND and order.robot == at.sender and not order.named:
                 order.is_begun |= at.goal == order.stops[-1] or (
                     at.robot_mode is RobotMode.LOADING and at.node == order.stops[0]
                 )
@@ -224,11 +208,11 @@ class OrderDesk:
     def _in_hand(self, order: DeskOrder, robot: int, now_us: int, call: int = 0) -> list[Effect]:
         order.robot, order.may_be_won, order.is_begun = robot, False, False
         self._watch(order, now_us, call)
-        return self._set(order, Stage.IN_HAND, now_us, ASK_US)
+        return self._set(order, OrderState.IN_HAND, now_us, ASK_US)
 
     def _withdraw(self, order: DeskOrder, now_us: int) -> list[Effect]:
         """Close the call for what somebody has already."""
-        if order.stage is not Stage.CALLED:
+        if order.stage is not OrderState.CALLED:
             return []
         said = self.fleet.negotiation.withdraw(self._terms(order), now_us)
         return [item for item in said if not isinstance(item, NegotiationEvent)]
@@ -239,24 +223,24 @@ class OrderDesk:
             if not self.fleet.winners.stands(order.task, now_us):
                 return []
             taken_back = Send(VisitList(self.fleet.node_id, order.task.number, order.robot, *five(())))
-            return [taken_back, *self._set(order, Stage.REFUSED, now_us, None)]
+            return [taken_back, *self._set(order, OrderState.REFUSED, now_us, None)]
         reason = self.fleet.winners.lost(order.task, now_us)
         if reason is not Reason.NONE and order.is_begun:
             self.fleet.winners.keeps(order.task)
         if reason is Reason.NONE or order.is_begun:
             return []
-        return self.fleet.winners.take_back(order.task, reason, now_us) + self._set(order, Stage.HEARD, now_us, 0)
+        return self.fleet.winners.take_back(order.task, reason, now_us) + self._set(order, OrderState.HEARD, now_us, 0)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """A call is over: somebody has the order, or nobody."""
         order = self.orders.get(event.call.task) if isinstance(event, Closed) else None
-        if not isinstance(event, Closed) or order is None or order.stage is not Stage.CALLED:
+        if not isinstance(event, Closed) or order is None or order.stage is not OrderState.CALLED:
             return []
         if event.winner:
             return self._in_hand(order, event.winner, now_us, event.call.call)
         if event.result is CallResult.REFUSED:
-            return self._set(order, Stage.HEARD, now_us, LIST_AGAIN_US)
-        return self._set(order, Stage.HEARD, now_us, 0)
+            return self._set(order, OrderState.HEARD, now_us, LIST_AGAIN_US)
+        return self._set(order, OrderState.HEARD, now_us, 0)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """A desk keeps no rights."""
@@ -268,12 +252,12 @@ class OrderDesk:
         if self._listen_until_us is not None and self._listen_until_us <= now_us:
             self._listen_until_us = None
         for order in self.orders.values():
-            if order.stage not in (Stage.DONE, Stage.REFUSED):
+            if order.stage not in OVER:
                 effects += self._look_after(order, now_us)
             if self._listen_until_us is None and order.due_us is not None and order.due_us <= now_us:
                 effects += self._go_on(order, now_us)
             if order.answer_at_us is not None and order.answer_at_us <= now_us:
-                over = order.stage in (Stage.DONE, Stage.REFUSED)
+                over = order.stage in OVER
                 order.answer_at_us = None if over else now_us + ANSWER_US
                 if order.task.origin != self.fleet.node_id:
                     # It did not come in at the counter.
@@ -312,11 +296,11 @@ class OrderDesk:
     def _go_on(self, order: DeskOrder, now_us: int) -> list[Effect]:
         """What is due for an order: to be given, to be called for, or to be asked after."""
         me = self.fleet.node_id
-        if order.stage is Stage.HEARD and order.named:
+        if order.stage is OrderState.HEARD and order.named:
             order.due_us = now_us + LIST_AGAIN_US
             return [Send(VisitList(me, order.task.number, order.robot, *five(order.stops)))]
-        if order.stage is Stage.HEARD:
-            effects = self._set(order, Stage.CALLED, now_us, None)
+        if order.stage is OrderState.HEARD:
+            effects = self._set(order, OrderState.CALLED, now_us, None)
             return effects + self.fleet.negotiation.open(self._terms(order), now_us)
         order.due_us = now_us + ASK_US
         return [Send(SyncRequest(me, order.robot))]
@@ -327,9 +311,9 @@ class OrderDesk:
         assert isinstance(site, FactoryGraph)
         return replace(call_terms(order.task, *order.stops[:2]), floor=partial(least_finish_ms, site))
 
-    def _set(self, order: DeskOrder, stage: Stage, now_us: int, due_in_us: int | None) -> list[Effect]:
+    def _set(self, order: DeskOrder, stage: OrderState, now_us: int, due_in_us: int | None) -> list[Effect]:
         order.stage = stage
-        if stage in (Stage.DONE, Stage.REFUSED):
+        if stage in OVER:
             self.fleet.winners.over(order.task)
         order.answer_at_us = now_us
         order.due_us = None if due_in_us is None else now_us + due_in_us

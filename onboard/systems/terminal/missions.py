@@ -1,13 +1,15 @@
 """Missions at a desk: orders become transports, one box each (rows M04 to M06, M23); kept in the journal."""
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import TaskPhase
+from onboard.core.journal_records import Entry, records_in
 from onboard.core.messages import Reference
 from onboard.systems.terminal.messages import MissionKey, Verb
 from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.records import OrdersRecord
 from onboard.systems.terminal.site import EntityKind, Terminal
 
 #: Tasks from outside that are remembered once they are over.
@@ -212,7 +214,7 @@ class Orders:
 
     # --- journal -----------------------------------------------------------------------------------------------
 
-    def record(self) -> dict[str, str | int]:
+    def record(self) -> OrdersRecord:
         """All that is not over, as one entry: the newest counts."""
         missions = ";".join(
             f"{one.number},{one.target},{one.left},{one.type},{one.source},{one.before_us},{int(one.urgent)},"
@@ -227,20 +229,19 @@ class Orders:
         )
         over = ";".join(f"{one.origin},{one.number}" for one in self.over)
         taken = ";".join(str(number) for number in self.taken)
-        told: dict[str, str | int] = {"record": "orders", "missions": missions, "tasks": tasks, "over": over}
-        return told | {"taken": taken, "last": self.last_task, "done": self.done}
+        return OrdersRecord(missions, tasks, self.last_task, self.done, over, taken)
 
-    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+    def replay(self, entries: Iterable[Entry]) -> None:
         """What the newest entry says."""
-        newest = next((one for one in reversed(list(entries)) if one.get("record") == "orders"), None)
+        newest = next(iter([*records_in(entries, OrdersRecord)][-1:]), None)
         if newest is None:
             return
-        self.last_task, self.done = int(newest["last"]), int(newest["done"])
-        for row in str(newest.get("over", "")).split(";"):
+        self.last_task, self.done = newest.last, newest.done
+        for row in newest.over.split(";"):
             if row:
                 self.over.append(Reference(*(int(one) for one in row.split(","))))
-        self.taken.extend(int(number) for number in str(newest.get("taken", "")).split(";") if number)
-        for row in str(newest["missions"]).split(";"):
+        self.taken.extend(int(number) for number in newest.taken.split(";") if number)
+        for row in newest.missions.split(";"):
             if row:
                 number, target, left, kind, source, before, is_urgent, named, *name = row.split(",")
                 boxes = [int(box) for box in named.split("+") if box]
@@ -248,7 +249,7 @@ class Orders:
                     int(number), int(target), int(left), kind, int(source), boxes, int(before), is_urgent == "1"
                 )
                 self.missions[int(number)].task = Reference(int(name[0]), int(name[1])) if name else None
-        for row in str(newest["tasks"]).split(";"):
+        for row in newest.tasks.split(";"):
             if row:
                 numbers = [int(one) for one in row.split(",")]
                 _, mission, box, to, before_us, urgent, winner, *origin = numbers

@@ -1,6 +1,5 @@
 """The order desk of a turning cell: calls for each order, tells the winner's price, and hears of completion."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -23,7 +22,9 @@ from onboard.systems.turning.messages import (
     LathePhase,
     LatheProgress,
 )
-from onboard.work.counter import Counter, CounterOrder, OrderState
+from onboard.systems.turning.records import JobOrderRecord, JobOrderStateRecord
+from onboard.work.counter import Counter, CounterOrder
+from onboard.work.counter_records import OrderState
 
 
 @dataclass
@@ -55,6 +56,7 @@ class OrderDesk(Counter[Order]):
     ask_us: ClassVar[int] = 60_000_000
     #: An order that no lathe can make is refused after so many calls of several attempts each. Ours.
     max_calls: ClassVar[int] = 2
+    record_types = JobOrderRecord, JobOrderStateRecord
 
     _prices: dict[tuple[int, Reference], int] = field(default_factory=dict)
     #: Orders of which their winner has told that it has begun.
@@ -77,9 +79,8 @@ class OrderDesk(Counter[Order]):
         face_mm = message.face_um / 1000
         job = Job(message.drawing, message.material, message.bar_mm, message.batch, face_mm)
         order = self.orders[task] = Order(task, job)
-        entry: dict[str, str | int] = {"record": "order", "number": task.number, "drawing": job.drawing}
-        entry |= {"material": job.material, "bar_mm": message.bar_mm, "batch": job.batch, "face_um": message.face_um}
-        return [Record(entry), *self.say(order, now_us)]
+        record = JobOrderRecord(task.number, job.drawing, job.material, message.bar_mm, job.batch, message.face_um)
+        return [Record(record), *self.say(order, now_us)]
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Prices, and lathes' reports."""
@@ -136,19 +137,17 @@ class OrderDesk(Counter[Order]):
         """As the winner's bill says."""
         order.total_ct = self._prices.get((order.winner, order.task), 0)
 
-    def price_entry(self, order: Order) -> Mapping[str, str | int]:
-        """In cents."""
-        return {"total_ct": order.total_ct}
+    def state_record(self, order: Order) -> JobOrderStateRecord:
+        """With its price in cents."""
+        return JobOrderStateRecord(order.task.number, order.state, order.winner, order.total_ct)
 
-    def noted_price(self, order: Order, entry: Mapping[str, str | int]) -> None:
+    def noted_price(self, order: Order, record: JobOrderStateRecord) -> None:
         """In cents."""
-        order.total_ct = int(entry["total_ct"])
+        order.total_ct = record.total_ct
 
-    def noted_order(self, entry: Mapping[str, str | int]) -> Order:
+    def noted_order(self, record: JobOrderRecord) -> Order:
         """As ``sense`` noted it."""
-        bar_mm, face_mm = int(entry["bar_mm"]), int(entry["face_um"]) / 1000
-        job = Job(int(entry["drawing"]), int(entry["material"]), bar_mm, int(entry["batch"]), face_mm)
-        return Order(Reference(self.fleet.node_id, int(entry["number"])), job)
+        return Order(Reference(self.fleet.node_id, record.number), record.job)
 
     def answer(self, order: Order) -> Message:
         """With the lathe and its price."""

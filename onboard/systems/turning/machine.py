@@ -1,13 +1,12 @@
 """A lathe's steps: program to the control, set up, make the batch, one order after the other (rows P20, P23, P25)."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from enum import Enum
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.journal_records import JournalRecord, records_in
 from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
@@ -26,6 +25,7 @@ from onboard.systems.turning.messages import (
     text_frames,
 )
 from onboard.systems.turning.process import Process
+from onboard.systems.turning.records import JobLostRecord, JobOverRecord, JobRecord, JobStageRecord, Stage
 from onboard.systems.turning.site import Turning
 
 #: What the control does not confirm is said again after this, us. Ours.
@@ -34,14 +34,6 @@ AGAIN_US = 3_000_000
 PROGRESS_US = 10_000_000
 #: Finished orders that are remembered, to say again that they are over.
 MAX_OVER = 32
-
-
-class Stage(Enum):
-    """How far an order is, each a point from which a lathe that starts again can go on."""
-
-    WON = "not begun"
-    SETTING = "program loaded; being set up, or about to be"
-    MAKING = "set up; parts are made"
 
 
 @dataclass
@@ -89,8 +81,8 @@ class LatheMachine:
 
     def __post_init__(self) -> None:
         self.fleet.negotiation.is_sound = self.generation.is_sound
-        for entry in self.fleet.entries:
-            self._replay(entry)
+        for record in records_in(self.fleet.entries, JobRecord, JobStageRecord, JobLostRecord, JobOverRecord):
+            self._replay(record)
         self._engage()
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
@@ -194,7 +186,7 @@ class LatheMachine:
             return []
         del self.in_hand[one.task]
         self._engage()
-        return [Record(_named("job_lost", one))]
+        return [Record(JobLostRecord(one.task))]
 
     def _forfeit(self, one: Undertaking) -> list[Effect]:
         """A journal from before the site file lost a drawing, say: nobody can make what is not drawn."""
@@ -292,22 +284,18 @@ class LatheMachine:
     def _word(self, one: Undertaking, phase: LathePhase, made: int) -> Send:
         return Send(LatheProgress(self.fleet.node_id, *one.task, made, one.job.batch, phase))
 
-    def _replay(self, entry: Mapping[str, str | int]) -> None:
-        if entry.get("record") not in ("job", "job_stage", "job_over", "job_lost"):
-            return
-        task = Reference(int(entry["origin"]), int(entry["number"]))
-        if entry["record"] == "job":
-            bar_mm, face_mm = int(entry["bar_mm"]), int(entry["face_um"]) / 1000
-            job = Job(int(entry["drawing"]), int(entry["material"]), bar_mm, int(entry["batch"]), face_mm)
-            self.in_hand[task] = Undertaking(task, job)
-        elif entry["record"] == "job_lost":
-            self.in_hand.pop(task, None)
-        elif entry["record"] == "job_over":
-            self.in_hand.pop(task, None)
-            self.over.add(task)
-        elif task in self.in_hand and entry["stage"] == Stage.MAKING.name:
-            # Whether an order to set up was obeyed is not known: it is given again.
-            self.in_hand[task].stage = Stage.MAKING
+    def _replay(self, record: JournalRecord) -> None:
+        match record:
+            case JobRecord(task=task):
+                self.in_hand[task] = Undertaking(task, record.job)
+            case JobLostRecord(task=task):
+                self.in_hand.pop(task, None)
+            case JobOverRecord(task=task):
+                self.in_hand.pop(task, None)
+                self.over.add(task)
+            case JobStageRecord(task=task, stage=Stage.MAKING) if task in self.in_hand:
+                # Whether an order to set up was obeyed is not known: it is given again.
+                self.in_hand[task].stage = Stage.MAKING
 
 
 def _program_number(task: Reference) -> int:
@@ -315,19 +303,15 @@ def _program_number(task: Reference) -> int:
     return (task.origin * 31 + task.number) % 255 + 1
 
 
-def _named(record: str, one: Undertaking) -> dict[str, str | int]:
-    return {"record": record, "origin": one.task.origin, "number": one.task.number}
-
-
 def _won_record(one: Undertaking) -> Record:
     job = one.job
-    entry = _named("job", one) | {"drawing": job.drawing, "material": job.material, "bar_mm": round(job.bar_mm)}
-    return Record(entry | {"batch": job.batch, "face_um": round(job.face_mm * 1000)})
+    face_um = round(job.face_mm * 1000)
+    return Record(JobRecord(one.task, job.drawing, job.material, round(job.bar_mm), job.batch, face_um))
 
 
 def _stage_record(one: Undertaking) -> Record:
-    return Record(_named("job_stage", one) | {"stage": one.stage.name})
+    return Record(JobStageRecord(one.task, one.stage))
 
 
 def _over_record(one: Undertaking) -> Record:
-    return Record(_named("job_over", one))
+    return Record(JobOverRecord(one.task))
