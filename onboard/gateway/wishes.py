@@ -12,7 +12,8 @@ from typing import Any, Protocol
 from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, Operation, OperatorAction
 from onboard.core.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference, SyncRequest
 from onboard.core.site import Site
-from onboard.gateway.order import Life, Order, Wish
+from onboard.gateway.order import Order, Wish
+from onboard.gateway.records import Life
 from onboard.systems.car_park.site import CarPark
 from onboard.systems.graph.messages import VisitList, five
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
