@@ -14,8 +14,10 @@ from pathlib import Path
 CORE_TYPES = (
     "onboard.core.codes",
     "onboard.core.frame",
+    "onboard.core.journal_records",
     "onboard.core.journal_state",
     "onboard.core.messages",
+    "onboard.core.records",
     "onboard.core.recovery_messages",
     "onboard.core.remedies",
     "onboard.core.serial",
