@@ -5,7 +5,7 @@ from enum import Enum
 
 from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes, Which, stored_as
 from onboard.core.messages import Reference
-from onboard.work.counter_records import OrderRecord, OrderStateRecord
+from onboard.work.order_records import OrderRecord, OrderStateRecord
 
 
 class Stage(Enum):

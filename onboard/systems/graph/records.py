@@ -16,7 +16,7 @@ from onboard.core.journal_records import (
     stored_as,
 )
 from onboard.core.messages import Reference
-from onboard.work.counter_records import OVER, OrderState
+from onboard.work.order_life import OVER, OrderState
 
 _TASK = ("task",)
 

@@ -6,7 +6,7 @@ from enum import Enum
 from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes, stored_as
 from onboard.core.messages import Reference
 from onboard.systems.turning.lathe import Job
-from onboard.work.counter_records import OrderRecord, OrderStateRecord
+from onboard.work.order_records import OrderRecord, OrderStateRecord
 
 _TASK = ("task",)
 

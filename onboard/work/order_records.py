@@ -1,25 +1,11 @@
 """What a desk at which orders come in writes of them; a desk's order adds its own fields to both records."""
 
 from dataclasses import dataclass
-from enum import Enum
 
 from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep
+from onboard.work.order_life import OVER, OrderState
 
 _NUMBER = ("number",)
-
-
-class OrderState(Enum):
-    """How an order stands; each is journalled."""
-
-    HEARD = "not called for yet"
-    CALLED = "bids may come"
-    IN_HAND = "somebody has it"
-    DONE = "done"
-    REFUSED = "nobody can do it"
-
-
-#: States that nothing follows.
-OVER = (OrderState.DONE, OrderState.REFUSED)
 
 
 @dataclass(frozen=True, slots=True)
