@@ -15,13 +15,11 @@ from onboard.core.codes import (
     Criterion,
     KindCode,
     LegAction,
-    Reason,
     ShuttleMode,
-    TaskPhase,
 )
-from onboard.core.effects import Effect, Record, Send
+from onboard.core.effects import Effect, Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
-from onboard.core.messages import Award, CallForProposals, CarAt, Reference, ShuttleState, TaskReport
+from onboard.core.messages import Award, CallForProposals, CarAt, Reference, ShuttleState
 from onboard.core.records import BootRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
@@ -36,6 +34,7 @@ from onboard.systems.car_park.records import (
     SinkRecord,
     StepRecord,
 )
+from onboard.work.undertaking import gives_back
 
 
 def award_record(call: CallForProposals, source: Station, sink: Station, version: int) -> Record:
@@ -205,11 +204,11 @@ class Recovery:
     ) -> list[Effect]:
         """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
         mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED
-        if not mine or not self.is_restart or fleet.negotiation.knows(award.sender, award.call):
+        if not mine or not self.is_restart:
             return []
         if any(work.call.task == award.task for work in known) or award.task in done:
             return []
-        return [Send(TaskReport(fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
+        return gives_back(fleet, award)
 
     def is_newer(self, award: Award) -> bool:
         """Whether an award for a task of mine is of a later version than that under which I took it on."""
