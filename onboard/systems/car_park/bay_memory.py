@@ -10,14 +10,21 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import Operation
+from onboard.core.codes import OUTSIDE, Operation
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
 from onboard.core.messages import CarAt, Reference
 from onboard.core.records import CarLeftRecord, TokenGivenRecord
 from onboard.core.serial import successor
 from onboard.systems.car_park.bay_task import queue_ticket
-from onboard.systems.car_park.records import BayFreeRecord, BayJobRecord, CarAtRecord, TicketRecord, WinnerRecord
+from onboard.systems.car_park.records import (
+    BayFreeRecord,
+    BayJobRecord,
+    CarAtRecord,
+    NumberRecord,
+    TicketRecord,
+    WinnerRecord,
+)
 
 
 def car_record(statement: CarAt) -> Record:
@@ -50,7 +57,7 @@ def job_over_record() -> Record:
     return Record(BayFreeRecord())
 
 
-def next_reference(last: int, fleet: Fleet) -> Reference:
+def _next_reference(last: int, fleet: Fleet) -> Reference:
     """The next number of a car or task of this node; one under which a token was ever heard of is passed over.
 
     It goes to the journal before its token: whatever happens between the two writes, it is never used again.
@@ -62,7 +69,16 @@ def next_reference(last: int, fleet: Fleet) -> Reference:
     return Reference(fleet.node_id, last)
 
 
-_READ = (CarAtRecord, WinnerRecord, CarLeftRecord, TicketRecord, BayJobRecord, BayFreeRecord, TokenGivenRecord)
+_READ = (
+    CarAtRecord,
+    WinnerRecord,
+    CarLeftRecord,
+    TicketRecord,
+    BayJobRecord,
+    BayFreeRecord,
+    NumberRecord,
+    TokenGivenRecord,
+)
 
 
 @dataclass
@@ -76,6 +92,8 @@ class BayMemory:
     #: For which task, and under which version of it, somebody may fetch a car, or might.
     tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     tickets: deque[Reference] = field(default_factory=deque)
+    #: The last number that was given to a car or a task; 0 before any.
+    number: int = 0
     #: Task, operation, car and wheelbase of the task in hand, or None.
     job: tuple[Reference, Operation, Reference, int] | None = None
     #: Whether the winner has had the bay since the task began.
@@ -96,20 +114,35 @@ class BayMemory:
             case CarAtRecord(car=car):
                 self.cars[car] = CarAt(self.node_id, car, record.station, record.version, record.wheelbase_mm)
                 self.winners.pop(car, None)
+                if record.station == OUTSIDE and car in self.tickets:
+                    self.tickets.remove(car)
             case WinnerRecord():
                 self._take_winner(record)
             case CarLeftRecord():
                 self._forget(record.car)
             case TicketRecord():
                 queue_ticket(self.tickets, record.car, urgent=record.urgent)
+            case _:
+                self._take_task(record)
+
+    def _take_task(self, record: JournalRecord) -> None:
+        match record:
             case BayJobRecord(operation=operation, car=car):
                 self.job, self.was_granted = (record.task, operation, car, record.wheelbase_mm), False
                 if operation is Operation.RETRIEVE and car in self.tickets:
                     self.tickets.remove(car)
+            case NumberRecord():
+                self.number = record.number
             case BayFreeRecord():
                 self.job = None
             case TokenGivenRecord() if self.bay == (record.kind, record.number):
                 self.was_granted = True
+
+    def next_reference(self, fleet: Fleet) -> tuple[Reference, Record]:
+        """The name of the next car or task of this node, and what is to be written before it is used."""
+        name = _next_reference(self.number, fleet)
+        self.number = name.number
+        return name, Record(NumberRecord(name.number))
 
     def _forget(self, car: Reference) -> None:
         """It left long ago."""

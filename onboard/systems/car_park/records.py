@@ -183,7 +183,7 @@ class BayFreeRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class NumberRecord(JournalRecord):
-    """The last number that a compartment gave to a car or a task; compartment.py reads it."""
+    """The last number that a compartment gave to a car or a task; bay_memory.py reads it."""
 
     NAME = "number"
     RULES = (Keep("number"),)
