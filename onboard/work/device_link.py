@@ -50,6 +50,10 @@ class DeviceLink(Generic[AnOrder]):
         self.due_us = now_us + self.again_us
         return [Actuate(self.message(self.sequence, wanted))]
 
+    def again(self, now_us: int) -> list[Effect]:
+        """The order that is wanted, where it is due."""
+        return self.order(self.wanted, now_us) if self.wanted is not None else []
+
     def pause(self) -> None:
         """The device is at it: nothing is due, and the next word of the same order is said at once."""
         self.due_us = None

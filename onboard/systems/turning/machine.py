@@ -195,7 +195,7 @@ class LatheMachine:
         if self.link.is_obeyed(self.nc.sequence):
             self.link.rest()
         elif self.link.wanted is not None:
-            return self.link.order(self.link.wanted, now_us)
+            return self.link.again(now_us)
         if one.stage is Stage.WON:
             return self._load(one, process, now_us)
         if one.stage is Stage.SETTING:
