@@ -191,12 +191,10 @@ class OrderDesk(ABC, Generic[AnOrder]):
 
     def put(self, order: AnOrder, event: OrderEvent, now_us: int, due_in_us: int = 0) -> list[Effect]:
         """What an event does to an order; the counter is told. ``due_in_us``: when it is called for, if it is again."""
-        following = NEXT.get((order.state, event))
-        if following is None:
+        if not order.meet(event):
             return []
-        order.state = following
         order.answer_at_us = now_us
-        match following:
+        match order.state:
             case OrderState.HEARD:
                 order.due_us = now_us + due_in_us
             case OrderState.IN_HAND:

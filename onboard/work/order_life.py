@@ -74,6 +74,13 @@ class WorkOrder:
     #: Whether its winner has told that it has begun.
     is_begun: bool = field(default=False, kw_only=True)
 
+    def meet(self, event: OrderEvent) -> bool:
+        """Whether an event changes how it stands; it does then."""
+        following = NEXT.get((self.state, event))
+        if following is not None:
+            self.state = following
+        return following is not None
+
     @property
     def is_over(self) -> bool:
         """Whether nothing follows."""

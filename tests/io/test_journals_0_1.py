@@ -23,6 +23,7 @@ from onboard.io.journal import FileJournal
 from onboard.systems.cell.messages import OrderAnswer
 from onboard.systems.graph.messages import VisitAnswer
 from onboard.systems.registry import condition_for, factory_for
+from onboard.systems.terminal.desk import Desk
 from onboard.systems.terminal.messages import PlanStep
 from onboard.systems.turning.messages import JobAnswer
 
@@ -75,6 +76,14 @@ def test_a_journal_of_version_0_1_is_gone_on_with(name: str, tmp_path: Path) -> 
     words = [one for one in said if isinstance(one, kind)]
     assert (len(words) if isinstance(expected, int) else words) == expected
     assert holon.boot == 2
+
+
+def test_a_terminals_desk_goes_on_with_its_tasks(tmp_path: Path) -> None:
+    """Their rows are shorter in version 0.1; who has a task is heard of it no sooner than it is done."""
+    holon, _ = started("terminal.Desk", tmp_path)
+    assert isinstance(holon.behaviour, Desk) and holon.journal.state is JournalState.INTACT
+    won = {Reference(1, number): winner for number, winner in ((3, 14), (4, 13), (5, 11), (6, 12), (7, 14))}
+    assert holon.behaviour.orders.won == won
 
 
 def test_a_record_that_has_not_its_form_makes_a_journal_short_and_is_named(tmp_path: Path) -> None:

@@ -11,9 +11,12 @@ from onboard.systems.terminal.messages import MissionKey, Verb
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.records import OrdersRecord
 from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.work.order_life import OrderEvent, OrderState, WorkOrder
 
 #: Tasks from outside that are remembered once they are over.
 MOST_OVER = 64
+#: Numbers at the beginning of a task's row in the journal.
+TASK_NUMBERS = 7
 #: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
 KNOWN = 127
 
@@ -39,11 +42,10 @@ class Order:
         return not self.urgent, self.before_us or 1 << 62, self.number
 
 
-@dataclass(frozen=True, slots=True)
-class Transport:
+@dataclass
+class Transport(WorkOrder):
     """One box of a mission under a task's name; ``type`` and ``source`` where any of that type from there will do."""
 
-    task: Reference
     mission: int
     box: int
     target: int
@@ -61,7 +63,6 @@ class Orders:
     node_id: int
     missions: dict[int, Order] = field(default_factory=dict)
     open: dict[Reference, Transport] = field(default_factory=dict)
-    won: dict[Reference, int] = field(default_factory=dict)
     done: int = 0
     last_task: int = 0
     #: Tasks from outside that are done, the newest so many: who asks for one again is told so.
@@ -127,8 +128,8 @@ class Orders:
                 self.last_task += 1
                 task = Reference(self.node_id, self.last_task)
             terms = order.target, order.before_us, order.urgent, order.type, order.source
-            transport = Transport(task, order.number, box, *terms)
-            self.open[task] = transport
+            transport = self.open[task] = Transport(task, order.number, box, *terms)
+            transport.meet(OrderEvent.CALL)
             return transport
         return None
 
@@ -166,12 +167,25 @@ class Orders:
                 found.append((box, above[-1]))
         return found
 
-    def give_back(self, task: Reference) -> None:
+    @property
+    def won(self) -> dict[Reference, int]:
+        """Who has which task in hand."""
+        return {one.task: one.winner for one in self.open.values() if one.state is OrderState.IN_HAND}
+
+    def goes_to(self, task: Reference, winner: int) -> bool:
+        """Somebody has a task; False for one that was not called for."""
+        transport = self.open.get(task)
+        if transport is None or not transport.meet(OrderEvent.WON):
+            return False
+        transport.winner = winner
+        return True
+
+    def give_back(self, task: Reference, event: OrderEvent) -> None:
         """Nobody does it: its box, or another of its type, is a mission of its own again."""
-        transport = self.open.pop(task, None)
-        self.won.pop(task, None)
-        if transport is None:
+        transport = self.open.get(task)
+        if transport is None or not transport.meet(event):
             return
+        del self.open[task]
         order = self.missions.setdefault(
             transport.mission,
             Order(
@@ -191,9 +205,10 @@ class Orders:
 
     def finish(self, task: Reference) -> bool:
         """A transport is over; True where it was open."""
-        self.won.pop(task, None)
-        if self.open.pop(task, None) is None:
+        transport = self.open.get(task)
+        if transport is None or not transport.meet(OrderEvent.CARRIED_OUT):
             return False
+        del self.open[task]
         self.done += 1
         if task.origin != self.node_id:
             self.over.append(task)
@@ -206,7 +221,7 @@ class Orders:
         if task in self.over:
             return TaskPhase.DONE
         if task in self.open:
-            return TaskPhase.AWARDED if task in self.won else TaskPhase.OPEN
+            return TaskPhase.AWARDED if self.open[task].state is OrderState.IN_HAND else TaskPhase.OPEN
         return TaskPhase.OPEN if any(one.task == task for one in self.missions.values()) else None
 
     def may_order(self, box: int, target: int) -> bool:
@@ -234,7 +249,7 @@ class Orders:
         )
         tasks = ";".join(
             f"{one.task.number},{one.mission},{one.box},{one.target},{one.before_us},{int(one.urgent)},"
-            f"{self.won.get(one.task, 0)},{one.task.origin},{one.type},{one.source}"
+            f"{one.winner},{one.task.origin},{one.type},{one.source}"
             for one in self.open.values()
         )
         over = ";".join(f"{one.origin},{one.number}" for one in self.over)
@@ -261,12 +276,17 @@ class Orders:
                 self.missions[int(number)].task = Reference(int(name[0]), int(name[1])) if name else None
         for row in newest.tasks.split(";"):
             if row:
-                *words, origin, kind, source = row.split(",")
-                task_number, mission, box, to, before_us, urgent, winner = (int(one) for one in words)
-                task = Reference(int(origin), task_number)
-                self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent), kind, int(source))
-                if winner:
-                    self.won[task] = winner
+                self._replay_task(row.split(","))
+
+    def _replay_task(self, row: list[str]) -> None:
+        """One that was called for. Version 0.1 wrote neither who named it, which was the desk, nor type and source."""
+        number, mission, box, to, before_us, urgent, winner = (int(one) for one in row[:TASK_NUMBERS])
+        origin, kind, source = (*row[TASK_NUMBERS:], *(str(self.node_id), "", "0")[len(row) - TASK_NUMBERS :])
+        task = Reference(int(origin), number)
+        one = self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent), kind, int(source))
+        one.meet(OrderEvent.CALL)
+        if winner:
+            self.goes_to(task, winner)
 
 
 def types_of(site: Terminal) -> list[str]:
