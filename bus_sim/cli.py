@@ -39,9 +39,9 @@ exit status:
   2  a mistake in the command line or in a file; one line for each says where and what to do
 
 examples:
-  bus-sim run                          the busiest hour of a real day on the standard site, a minute a second
+  bus-sim run                          an hour of a real day on the standard site, a minute a second
   bus-sim run standard                 that whole day, as fast as possible
-  bus-sim run standard --hour 16:30    from 16:30 to 17:30, after a hurried warm-up
+  bus-sim run standard --hour 16:30    from 16:30 to 17:30, after a short hurried warm-up
   bus-sim run level1                   a day on the one-floor site
   bus-sim run level1 --one-car 300     one car by hand, fetched after five minutes
   bus-sim run small --by-hand          press i for a car in, o for a car out
@@ -87,7 +87,7 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "site",
         nargs="?",
-        help="name of a shipped site, or a site file (default: standard, and of the shipped day its busiest hour)",
+        help="name of a shipped site, or a site file (default: standard, and an hour in which cars come and go)",
     )
     demand = run.add_argument_group("who comes (default: the shipped real day, 2019-07-24)")
     demand.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file (columns as in bus_sim/data)")
@@ -198,7 +198,8 @@ def _add_when(when: argparse._ArgumentGroup) -> None:
     window.add_argument(
         "--hour",
         metavar="HH:MM",
-        help="this hour of the first day, or busiest; what happens before is hurried through. "
+        help="this hour of the first day, or busiest, or two-way: that in which cars come and go; who is inside by "
+        "then is parked before, as fast as possible. "
         "With 2019-07-25T07:00 an hour of another day",
     )
     window.add_argument("--window", metavar="FROM-TO", help="the same with an end of its own, such as 06:30-09:00")

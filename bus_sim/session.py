@@ -95,6 +95,8 @@ class _Session:
         self._begin_s = 0.0
         self._hand: Hand | None = None
         self._is_interrupted = False
+        #: Whether what a person asked to see has begun; what is measured is of it alone.
+        self._is_warm = False
         self._processes = ProcessFleet(self._run, plan, options.without, self._console) if plan is not None else None
 
     async def play(self) -> Summary:
@@ -111,7 +113,7 @@ class _Session:
             stack.enter_context(ended_by(self._loop, self._interrupt))
             stack.callback(run.close)
             if options.web is not None:
-                await stack.enter_async_context(self._page(options.web))
+                show.address = await stack.enter_async_context(self._page(options.web))
             if stage.shown_us is None:
                 await stack.enter_async_context(outside)
                 await stack.enter_async_context(self._publishing(outside))
@@ -129,13 +131,15 @@ class _Session:
                 run.start()
                 stack.enter_context(show)
                 await self._warm_up(stage.shown_us[0], show)
-                # Guests come for what is shown: they could not follow a warm-up that is hurried.
-                await stack.enter_async_context(outside)
-                await stack.enter_async_context(self._publishing(outside))
-                await self._until(self._limit_us(stage.shown_us[1]), show)
+                if self._is_warm:
+                    # Guests come for what is shown: they could not follow a warm-up that is hurried.
+                    await stack.enter_async_context(outside)
+                    await stack.enter_async_context(self._publishing(outside))
+                    await self._until(self._limit_us(stage.shown_us[1]), show)
         failures = tuple(self._processes.failures) if self._processes is not None else ()
-        summary = stage.summary(Ended(time.monotonic() - self._begin_s, self._begin_us, failures))
-        self._say(*summary.lines())
+        wall_s = time.monotonic() - self._begin_s
+        summary = stage.summary(Ended(wall_s, self._begin_us, stage.shown_us is None or self._is_warm, failures))
+        self._say(*summary.lines(self._console.width if self._console.is_terminal else None))
         return summary
 
     def _say(self, *lines: str) -> None:
@@ -150,11 +154,12 @@ class _Session:
         return Publishing(self._run.site, options.site_text, options.mqtt, outside.served, self._console)
 
     @asynccontextmanager
-    async def _page(self, where: str) -> AsyncIterator[None]:
+    async def _page(self, where: str) -> AsyncIterator[str]:
         from bus_sim.web.page import Page  # noqa: PLC0415  # its libraries are an extra
 
-        async with Page(self.stage.source(), where, self._console):
-            yield
+        page = Page(self.stage.source(), where, self._console)
+        async with page:
+            yield page.address
         # While the server came to its end, the machines went on: what they began is not waited for.
         begun = asyncio.all_tasks() - {asyncio.current_task()}
         for task in begun:
@@ -202,6 +207,9 @@ class _Session:
         self._say(self.stage.warming_up(None))
         self._loop.set_pace(None)
         await self._until(until_us, show)
+        if self._is_ended():
+            return
+        self._is_warm = True
         self._begin_us = self._loop.now_us()
         self.stage.measure_from(self._begin_us)
         self._say(self.stage.warming_up(time.monotonic() - self._begin_s))

@@ -21,6 +21,8 @@ class LiveText:
         shown = wanted and console.is_terminal and not console.quiet
         self._live = Live(console=console, auto_refresh=False, transient=True) if shown else None
         self._next_s = 0.0
+        #: Of the page, if one is served: shown below every picture.
+        self.address: str | None = None
 
     def __enter__(self) -> Self:
         if self._live is not None:
@@ -38,4 +40,5 @@ class LiveText:
         if self._live is None or time.perf_counter() < self._next_s:
             return
         self._next_s = time.perf_counter() + 1 / PICTURES_S
-        self._live.update(Text(self._picture(), no_wrap=True), refresh=True)
+        where = f"\npicture at {self.address}" if self.address is not None else ""
+        self._live.update(Text(self._picture() + where, no_wrap=True), refresh=True)

@@ -59,8 +59,8 @@ class Summary(Protocol):
     def is_good(self) -> bool:
         """Nothing broke, nobody stopped, and everybody was served or told why."""
 
-    def lines(self) -> list[str]:
-        """For people."""
+    def lines(self, width: int | None = None) -> list[str]:
+        """For people; for a terminal of so many columns, None where it is none."""
 
     def to_json(self) -> dict[str, object]:
         """Plain values for ``json.dump``."""
@@ -68,6 +68,9 @@ class Summary(Protocol):
 
 class Show(Protocol):
     """What a person sees of a run while it goes on."""
+
+    #: Of the page, if one is served: shown in every picture.
+    address: str | None
 
     def __enter__(self) -> Self:
         """From now on."""
@@ -98,10 +101,14 @@ class Hand(Protocol):
 
 
 class Ended(NamedTuple):
-    """How a run ended: wall time in s, what it measured from loop time ``begin_us`` on, and processes that failed."""
+    """How a run ended: wall time in s, what it measured from loop time ``begin_us`` on, and processes that failed.
+
+    ``is_warm``: what a person asked to see has begun; a run may be ended before.
+    """
 
     wall_s: float
     begin_us: int = 0
+    is_warm: bool = True
     failures: tuple[str, ...] = ()
 
 
@@ -114,7 +121,7 @@ class Figures:
     wall_s: float
     told: tuple[str, ...] = ()
 
-    def lines(self) -> list[str]:
+    def lines(self, width: int | None = None) -> list[str]:
         """See ``Summary``."""
         figures = (f"{name.replace('_', ' ')}: {_shown(value)}" for name, value in self.figures.items())
         return [*self.told, *figures, f"wall time: {self.wall_s:.1f} s"]

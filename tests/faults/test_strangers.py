@@ -25,6 +25,16 @@ def test_orders_are_served_or_told_why_beside_a_stranger(name: str, how: Strange
     assert pair.strange.served, "not all of them refused"
 
 
+def test_two_desks_that_want_one_box_get_two() -> None:
+    """Who had won it for one desk dropped it as the other called for it, and one mission got a box too few."""
+    site = find_site("terminal")
+    system = simulated_of(site)
+    orders = system.usual(site, {})
+    limit_s = system.patience_s(site, orders, 5)
+    pair = play_pair(StrangerPlan("terminal", Stranger.LIAR, orders, limit_s), 5)
+    assert pair.is_good, pair.line()
+
+
 def test_a_site_without_calls_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "made.toml"
     path.write_text(site_text(2, [(0, "1,2", "3,5")]), encoding="utf-8")

@@ -21,6 +21,8 @@ class Day:
     random_s: tuple[float, float] | None = None
     cars: int = 50
     window: str | None = None
+    #: Of what was before the window only who is still inside is played, shortly before it.
+    short_eve: bool = False
     #: Cars come and go by keys of the terminal, and nobody comes otherwise.
     by_hand: bool = False
 
@@ -77,17 +79,18 @@ def asked_day(args: Namespace, *, live: bool) -> Day:
         random_s=tuple(args.random) if args.random is not None else None,
         cars=args.cars,
         window=window,
+        short_eve=True,
         by_hand=args.by_hand,
     )
 
 
 def _window(args: Namespace, *, live: bool) -> str | None:
-    """The window asked for; without a site and without anything that asks for a whole run the busiest hour."""
-    if args.hour is not None and "-" in args.hour and "T" not in args.hour:
+    """The window asked for; without a site and anything that asks for a whole run the two-way hour."""
+    if args.hour not in {None, "two-way"} and "-" in args.hour and "T" not in args.hour:
         raise DemandError(f"--hour {args.hour}: one time of day, such as 06:30; a window is --window {args.hour}")
     if args.window is not None and "-" not in args.window:
         raise DemandError(f"--window {args.window}: must be FROM-TO, such as 06:30-09:00")
     asked: str | None = args.hour or args.window
     whole = args.site is not None or args.one_car is not None or args.random is not None or args.limit_s is not None
     whole = whole or args.by_hand
-    return asked if asked is not None or whole or live or args.without else "busiest"
+    return asked if asked is not None or whole or live or args.without else "two-way"

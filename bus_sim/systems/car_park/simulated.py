@@ -18,7 +18,7 @@ from bus_sim.systems.car_park.planted.registry import find_bug
 from bus_sim.systems.car_park.simulation import build
 from bus_sim.systems.car_park.stage import ORIGIN_US, CarParkStage, Coming
 from bus_sim.systems.car_park.stranger import factories_with
-from bus_sim.systems.car_park.window import choose_window
+from bus_sim.systems.car_park.window import choose_window, with_short_eve
 from bus_sim.systems.stranger import Stranger
 from bus_sim.systems.system import HAND_SPEED, Action, Faulted, Occasion, SimulatedSystem
 from bus_sim.virtual_time import VirtualTimeLoop
@@ -143,6 +143,8 @@ def _coming(site: CarPark, options: RunOptions) -> Coming:
         return Coming((wanted or Arrivals()).demand(options.seed))
     demand = choose_demand(wanted, site, options.seed)
     window = choose_window(demand, wanted.window) if wanted.window is not None else None
+    if window is not None and wanted.short_eve:
+        demand = with_short_eve(demand, window, len(site.compartments))
     # The first to come, or what is shown, is so long after power-up.
     first_us = min((stay.arrival_us for stay in demand.stays), default=0)
     first_us = first_us if window is None else min(first_us, window.begin_us)

@@ -171,14 +171,14 @@ class CarParkStage(Stage[Plant]):
         run, now_us = self.run, self.run.loop.now_us()
         street, fleet = self._street.summary(ended.begin_us), self._indicators.figures(now_us)
         frames, errors, mean_load, worst_load = bus_figures(run.fleet.statistics())
-        window, trace = self._coming.window, run.options.trace
+        trace = run.options.trace
         drops: Counter[str] = Counter()
         for controller in run.controllers.values():
             drops.update({reason.name: count for reason, count in controller.all_drops().items()})
         return RunSummary(
             site=run.site.name,
             seed=run.options.seed,
-            window=window.told(self._coming.demand) if window is not None else None,
+            window=self._played(ended),
             simulated_s=(now_us - ended.begin_us) / 1e6,
             wall_s=ended.wall_s,
             cars_in=street.parked,
@@ -189,7 +189,7 @@ class CarParkStage(Stage[Plant]):
             unserved=unserved(street),
             wait_in=Durations.of(street.in_wait_us),
             wait_out=Durations.of(street.out_wait_us),
-            burst=self._burst(),
+            burst=self._burst(ended),
             fleet=fleet,
             messages=sum(fleet.messages.values()),
             frames=frames,
@@ -202,11 +202,22 @@ class CarParkStage(Stage[Plant]):
             trace=str(trace) if trace is not None else None,
         )
 
-    def _burst(self) -> BurstFigures | None:
-        burst = densest(self._coming.demand, self._coming.window)
+    def _played(self, ended: Ended) -> str | None:
+        """What of the window the figures are of, as far as it was played; None for a whole run."""
+        coming = self._coming
+        if coming.window is None:
+            return None
+        begin_us = coming.window.begin_us if ended.is_warm else ended.begin_us - coming.origin_us
+        played = Window(begin_us, self.run.loop.now_us() - coming.origin_us).told(coming.demand)
+        return played if ended.is_warm else f"warm-up, {played}"
+
+    def _burst(self, ended: Ended) -> BurstFigures | None:
+        coming = self._coming
+        played = Window(ended.begin_us - coming.origin_us, self.run.loop.now_us() - coming.origin_us)
+        burst = densest(coming.demand, played if coming.window is not None else None)
         if burst is None:
             return None
-        begin_us = burst.begin_us + self._coming.origin_us
+        begin_us = burst.begin_us + coming.origin_us
         waits_us = self._street.in_waits_us(begin_us, begin_us + BURST_US)
         return BurstFigures(self._clock.at(begin_us), BURST_US / 1e6, burst.count, Durations.of(waits_us))
 

@@ -22,6 +22,7 @@ class _Looking:
 
     def __init__(self, run: TerminalRun, look: Callable[[TerminalRun], None]) -> None:
         self._run, self._look = run, look
+        self.address: str | None = None
 
     def __enter__(self) -> Self:
         return self

@@ -20,6 +20,8 @@ class TerminalShow:
         wanted = console.is_terminal and not console.quiet
         self._live = Live(console=console, refresh_per_second=10) if wanted else None
         self._told = 0
+        #: Of the page, if one is served: shown below every picture.
+        self.address: str | None = None
         self._tables: set[int] = set()
 
     def __enter__(self) -> Self:
@@ -40,6 +42,7 @@ class TerminalShow:
         run = self._run
         if self._live is not None:
             lines = [f"{now_us / 1e6:.0f} s", *picture(self._site, run.spectator, now_us)]
+            lines += [f"picture at {self.address}"] if self.address is not None else []
             self._live.update(Group(*(Text(line) for line in lines)))
         for time_us, source, text in run.log.lines[self._told :]:
             self._say(f"{time_us / 1e6:8.1f} s  {source}: {text}")

@@ -30,7 +30,7 @@ class TerminalSummary:
         """See ``Summary``."""
         return self.found.is_good and not self.failures
 
-    def lines(self) -> list[str]:
+    def lines(self, width: int | None = None) -> list[str]:
         """See ``Summary``."""
         return summary_lines(self.site, self.found) + [f"halted: {what}" for what in self.failures]
 
