@@ -58,7 +58,7 @@ class Deed(Enum):
     FINISH = "tell that the order is over"
 
 
-#: (stage, control) -> (stage that follows, deed). The control keeps one program. It counts parts anew when it is set up:
+#: (stage, control) -> (stage that follows, deed). The control counts parts anew when it is set up:
 #: until then the count is of the order before.
 TABLE: dict[tuple[Stage, Control], tuple[Stage, Deed]] = {
     (Stage.WON, Control.BUSY): (Stage.WON, Deed.WAIT),
