@@ -1,5 +1,7 @@
 """Serial-number arithmetic for counters and times that wrap (RFC 1982)."""
 
+from onboard.contract.base import Stamp
+
 #: Bus time on the wire is in milliseconds modulo this.
 BUS_MS_MODULUS = 1 << 32
 
@@ -27,6 +29,15 @@ def ms_after(bus_ms: int, other_ms: int) -> int:
     Every comparison of two such times is one of this with 0: they wrap after 49.7 days, and ``<`` then lies.
     """
     return away(bus_ms, other_ms, BUS_MS_MODULUS)
+
+
+def ranks_before(one: Stamp, other: Stamp) -> bool:
+    """Whether ``one`` plan keeps its windows before the ``other``; of two that differ always exactly one does."""
+    after_ms = ms_after(one.award_ms, other.award_ms)
+    if after_ms == ms_after(other.award_ms, one.award_ms):
+        # The same time, or half the way round, where nobody can say which came first.
+        return one < other
+    return after_ms < 0
 
 
 def away(value: int, other: int, modulus: int) -> int:

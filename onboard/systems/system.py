@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
 from onboard.core.journal_records import RecordTypes
-from onboard.core.messages import Message
 
 
 @dataclass(frozen=True, slots=True)
 class System:
     """One kind of site: ``name`` as site files say it, and what drives each kind of machine there.
 
-    ``messages`` are the classes of what the system's own DBC file adds to the contracts of all. ``records``
-    are what its machines write into their journals beside the core's own; a type that is not there is kept for good.
+    ``records`` are what its machines write into their journals beside the core's own; a type that is not there is kept
+    for good.
     """
 
     name: str
     factories: Mapping[KindCode, BehaviourFactory]
-    messages: tuple[type[Message], ...] = ()
     records: RecordTypes = ()
