@@ -15,6 +15,12 @@ from onboard.core.serial import successor
 _BITS = 8
 
 AnOrder = TypeVar("AnOrder", bound=Hashable)
+Say = Callable[[Message], list[Effect]]
+
+
+def say(message: Message) -> list[Effect]:
+    """To the device bus, as it is; who needs a permit for what moves gives its own way."""
+    return [Actuate(message)]
 
 
 @dataclass
@@ -38,7 +44,7 @@ class DeviceLink(Generic[AnOrder]):
         """Whether the device, which names the last order that it obeyed, has obeyed the one that is wanted."""
         return self.wanted is not None and sequence == self.sequence
 
-    def order(self, wanted: AnOrder, now_us: int, *, anew: bool = False) -> list[Effect]:
+    def order(self, wanted: AnOrder, now_us: int, by: Say = say, *, anew: bool = False) -> list[Effect]:
         """Say an order: at once where it is another than before, else when it is due; ``anew``: under a new number."""
         if wanted == self.wanted:
             if self.due_us is not None and now_us < self.due_us:
@@ -48,11 +54,11 @@ class DeviceLink(Generic[AnOrder]):
         else:
             self.wanted, self.sequence = wanted, successor(self.sequence, _BITS)
         self.due_us = now_us + self.again_us
-        return [Actuate(self.message(self.sequence, wanted))]
+        return by(self.message(self.sequence, wanted))
 
-    def again(self, now_us: int) -> list[Effect]:
+    def again(self, now_us: int, by: Say = say) -> list[Effect]:
         """The order that is wanted, where it is due."""
-        return self.order(self.wanted, now_us) if self.wanted is not None else []
+        return self.order(self.wanted, now_us, by) if self.wanted is not None else []
 
     def pause(self) -> None:
         """The device is at it: nothing is due, and the next word of the same order is said at once."""
