@@ -12,7 +12,7 @@ from typing import ClassVar, Generic, TypeVar
 
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
 from onboard.core.negotiation.winners import STANDS_AFTER_US
@@ -246,7 +246,7 @@ class Counter(ABC, Generic[AnOrder]):
     def say(self, order: AnOrder, now_us: int) -> list[Effect]:
         """Tell the counter, and again until the order is over."""
         order.answer_at_us = None if order.state in OVER else now_us + ANSWER_US
-        return [Actuate(self.answer(order))]
+        return [Tell(self.answer(order))]
 
     def _replay(self, order: AnOrder, entry: Mapping[str, str | int]) -> None:
         state = OrderState[str(entry["state"])]

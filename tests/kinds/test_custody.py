@@ -18,7 +18,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.holon import Holon
 from onboard.core.messages import (
     BayState,
@@ -184,7 +184,7 @@ def test_who_presses_again_inside_gets_the_ticket_that_the_power_failed_to_print
 
 
 def tickets(effects: list[Effect]) -> list[Reference]:
-    orders = [effect.message for effect in effects if isinstance(effect, Actuate)]
+    orders = [effect.message for effect in effects if isinstance(effect, Tell)]
     return [one.car for one in orders if isinstance(one, DeskOrder) and one.text is DeskText.TAKE_TICKET]
 
 

@@ -11,8 +11,9 @@ from enum import Enum
 from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
-from onboard.core.effects import Actuate, Effect, Record
+from onboard.core.effects import Effect, Record
 from onboard.core.messages import ShuttleOrder, ShuttleState
+from onboard.core.motion_authority import Permit, authorised
 from onboard.core.serial import successor
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.program import Handling, Work
@@ -109,7 +110,7 @@ class ShuttleWork:
         if order is None or not self.is_out or state.sequence == order.sequence:
             self.stall.rests()
             return []
-        return [Actuate(order)] if self._unheard.is_due("shuttle", now_us, heard=False) else []
+        return self._permit().order(order) if self._unheard.is_due("shuttle", now_us, heard=False) else []
 
     def advance(self, now_us: int) -> list[Effect]:
         """Take the next step of the table where its condition is met."""
@@ -122,7 +123,7 @@ class ShuttleWork:
             is_taken = self.work.handling is Handling.LEAVE and custody.others_in(
                 self.fleet.mirror, self.work.station, self.work.car
             )
-            if is_taken or not self._has_rights():
+            if is_taken:
                 return effects
             return effects + self._next(now_us)
         if self.sensed is None or self.sensed.sequence != self.sequence or self.sensed.mode is not ENDS[self.phase]:
@@ -148,8 +149,8 @@ class ShuttleWork:
         assert self.work is not None
         return [station_token(self.work.station), car_token(*self.work.car)]
 
-    def _has_rights(self) -> bool:
-        return all(self.fleet.tokens.holds(key) for key in self._rights())
+    def _permit(self) -> Permit:
+        return authorised(self.fleet.motion, self._rights())
 
     def _acquire(self, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -159,9 +160,14 @@ class ShuttleWork:
 
     def _next(self, now_us: int) -> list[Effect]:
         assert self.work is not None
-        order, self.phase = TABLE[self.phase, self.work.handling]
+        order, following = TABLE[self.phase, self.work.handling]
         if order is None:
+            self.phase = following
             return self._finish(self.work, now_us)
+        permit = self._permit()
+        if not permit:
+            return []
+        self.phase = following
         self.sequence = successor(self.sequence, 8)
         entry = {"record": "step", "phase": self.phase.value, "handling": self.work.handling.value}
         side, wheelbase_mm = self.work.station.side, self.work.wheelbase_mm
@@ -170,7 +176,7 @@ class ShuttleWork:
         self.stall.ordered(now_us)
         return [
             Record({**entry, "station": self.work.station.number, "car": self.work.car.number}),
-            Actuate(self._ordered),
+            *permit.order(self._ordered),
         ]
 
     def _finish(self, work: Work, now_us: int) -> list[Effect]:

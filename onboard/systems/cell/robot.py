@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
-from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import last_boot, successor
 from onboard.core.site import Machine, Site
@@ -89,7 +90,7 @@ class ArmRobot:
 
     def __post_init__(self) -> None:
         site = self.generation.site
-        self.driver = Driver(self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
+        self.driver = Driver(self.fleet.motion, self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
         self.fleet.negotiation.is_sound = self.generation.hearsay.is_sound
         # Names of goals of an earlier life may still be about.
         self.generation.number = last_boot(self.fleet.entries) << 8
@@ -410,7 +411,7 @@ class ArmRobot:
 
     def _when_going_there(self, one: Undertaking, now_us: int) -> list[Effect]:
         if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, now_us)
+            return self.driver.go(one.contract.goal.start, car_token(*one.contract.goal.part), now_us)
         one.stage = Stage.TAKEN
         self._engage()
         return [*self.driver.rest(), stage_record(one), *self._to(ArmPhase.TAKING, now_us)]
@@ -427,12 +428,12 @@ class ArmRobot:
         if self.driver.stands_at(one.contract.move.via) and self._lies_here():
             return self._put(one, now_us)
         if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, now_us)
+            return self.driver.go(one.contract.goal.start, car_token(*one.contract.goal.part), now_us)
         return self._order(GripAction.TAKE, part, now_us)
 
     def _when_carrying(self, one: Undertaking, now_us: int) -> list[Effect]:
         if not self.driver.stands_at(one.contract.move.via):
-            return self.driver.go(one.contract.move.via, now_us)
+            return self.driver.go(one.contract.move.via, car_token(*one.contract.goal.part), now_us)
         return [*self.driver.rest(), *self._to(ArmPhase.PUTTING, now_us)]
 
     def _when_putting(self, one: Undertaking, now_us: int) -> list[Effect]:
@@ -468,7 +469,7 @@ class ArmRobot:
             self._grip_sequence = successor(self._grip_sequence, 8)
         self._ordered = GripOrder(self.fleet.node_id, self._grip_sequence, action, part)
         self._order_again_us = now_us + 1_000_000
-        return [Actuate(self._ordered)]
+        return authorised(self.fleet.motion, [car_token(*part)]).order(self._ordered)
 
     def _grip_over(self) -> list[Effect]:
         self._ordered = None

@@ -7,7 +7,7 @@ from functools import partial
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Closed, Estimator, NegotiationEvent
@@ -279,7 +279,7 @@ class OrderDesk:
                     # It did not come in at the counter.
                     continue
                 result = _RESULTS[order.stage]
-                effects.append(Actuate(VisitAnswer(self.fleet.node_id, order.task.number, result, order.robot)))
+                effects.append(Tell(VisitAnswer(self.fleet.node_id, order.task.number, result, order.robot)))
         return effects
 
     def next_wake(self) -> int | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Plain
 from onboard.core.codes import KindCode, MachineState, Reason
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.messages import Message, SyncRequest
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.systems.mapd.auction import Task
@@ -138,13 +138,13 @@ class OrderDesk(Plain):
 
     def _on_key(self, key: TransportKey) -> list[Effect]:
         if key.task in self.served:
-            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.DONE))]
-        answer = Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.RECEIVED))
+            return [Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.DONE))]
+        answer = Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.RECEIVED))
         if key.task in self.orders:
             return [answer]
         floor = self.site.floor
         if max(key.pickup, key.delivery) >= floor.size:
-            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.REFUSED))]
+            return [Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.REFUSED))]
         release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
         task = Task(key.task, release, key.pickup, key.delivery)
         self.orders[key.task] = task
@@ -162,7 +162,7 @@ class OrderDesk(Plain):
         """A robot had it aboard and has it no more."""
         self.orders.pop(task, None)
         self.served.add(task)
-        answer = Actuate(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
+        answer = Tell(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
         return [Record({"record": "served", "task": task}), answer]
 
     def _call(self, task: Task) -> Effect:

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from onboard.core.effects import Actuate, Effect
+from onboard.core.effects import Effect
+from onboard.core.motion_authority import Permit
 from onboard.core.serial import successor
 from onboard.systems.terminal.messages import (
     Action,
@@ -20,7 +21,10 @@ REPEAT_US = 500_000
 
 @dataclass
 class Body:
-    """One vehicle's devices. ``move`` and ``handler`` are what they said last, None before they spoke."""
+    """One vehicle's devices. ``move`` and ``handler`` are what they said last, None before they spoke.
+
+    What was ordered is said again only as far as what permitted it still does.
+    """
 
     node_id: int
     move: MoveState | None = None
@@ -29,6 +33,8 @@ class Body:
     handler_order: HandlerOrder | None = None
     due_us: int | None = None
     crossing: tuple[int, int] = (0, 0)
+    _move_permit: Permit | None = None
+    _handler_permit: Permit | None = None
 
     @property
     def is_known(self) -> bool:
@@ -73,29 +79,40 @@ class Body:
         if self.move_order is None and self.handler_order is None:
             self.due_us = None
 
-    def go(self, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
-        """Order one slot."""
+    def go(self, permit: Permit, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
+        """Order one slot, as far as that is permitted."""
         assert self.move is not None
+        if not permit:
+            return []
+        self._move_permit = permit
         self.move_order = MoveOrder(self.node_id, successor(self.move.sequence, 8), entity, slot, towards)
         self.due_us = now_us + REPEAT_US
         self.crossing = (entity, towards)
-        return [Actuate(self.move_order)]
+        return permit.order(self.move_order)
 
     def towards(self) -> int:
         """For which entity the one in hand is being crossed, as ordered; 0 for none, or for not known."""
         return self.crossing[1] if self.move is not None and self.crossing[0] == self.move.entity else 0
 
-    def handle(self, action: Action, box: int, now_us: int) -> list[Effect]:
-        """Order one action at a station."""
+    def handle(self, permit: Permit, action: Action, box: int, now_us: int) -> list[Effect]:
+        """Order one action at a station, as far as that is permitted."""
         assert self.handler is not None
+        if not permit:
+            return []
+        self._handler_permit = permit
         self.handler_order = HandlerOrder(self.node_id, successor(self.handler.sequence, 8), action, box)
         self.due_us = now_us + REPEAT_US
-        return [Actuate(self.handler_order)]
+        return permit.order(self.handler_order)
 
     def repeat(self, now_us: int) -> list[Effect]:
         """Say pending orders again where they are due."""
         if self.due_us is None or now_us < self.due_us:
             return []
         self.due_us = now_us + REPEAT_US
-        orders = (self.move_order, self.handler_order)
-        return [Actuate(order) for order in orders if order is not None]
+        pending = ((self._move_permit, self.move_order), (self._handler_permit, self.handler_order))
+        return [
+            effect
+            for permit, order in pending
+            if permit is not None and order is not None
+            for effect in permit.again().order(order)
+        ]

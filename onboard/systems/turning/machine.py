@@ -7,9 +7,10 @@ from enum import Enum
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import ALONE, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
@@ -228,7 +229,7 @@ class LatheMachine:
         if self._is_obeyed():
             self._ordered = None
         elif self._ordered is not None:
-            return self._say_again(now_us, (self._ordered,))
+            return self._order_again(self._ordered, now_us)
         if one.stage is Stage.WON:
             return self._load(one, process, now_us)
         if one.stage is Stage.SETTING:
@@ -248,7 +249,9 @@ class LatheMachine:
         assert self.nc is not None
         number = _program_number(one.task)
         if self.nc.program != number:
-            return self._say_again(now_us, text_frames(self.fleet.node_id, number, process.program))
+            if not self._is_due(now_us):
+                return []
+            return [Tell(message) for message in text_frames(self.fleet.node_id, number, process.program)]
         one.stage = Stage.SETTING
         self._again_us = None
         chuck = self.generation.lathe.chucks.index(process.clamping.chuck)
@@ -264,16 +267,20 @@ class LatheMachine:
         self._sequence = successor(self._sequence, 8)
         self._ordered = LatheOrder(self.fleet.node_id, self._sequence, action, chuck, edges)
         self._again_us = None
-        return self._say_again(now_us, (self._ordered,))
+        return self._order_again(self._ordered, now_us)
 
     def _is_obeyed(self) -> bool:
         return self._ordered is not None and self.nc is not None and self.nc.sequence == self._ordered.sequence
 
-    def _say_again(self, now_us: int, messages: tuple[Message, ...]) -> list[Effect]:
+    def _order_again(self, order: LatheOrder, now_us: int) -> list[Effect]:
+        return authorised(self.fleet.motion, ALONE).order(order) if self._is_due(now_us) else []
+
+    def _is_due(self, now_us: int) -> bool:
+        """Whether the control is to hear it (again) now."""
         if self._again_us is not None and self._again_us > now_us:
-            return []
+            return False
         self._again_us = now_us + AGAIN_US
-        return [Actuate(message) for message in messages]
+        return True
 
     # --- words and memory --------------------------------------------------------------------------------------
 
