@@ -39,15 +39,6 @@ class TransportResult(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class TransportCall(Message):
-    """A call for proposals that stands until somebody has picked ``task`` up: from cell ``pickup`` to ``delivery``."""
-
-    task: int
-    pickup: int
-    delivery: int
-
-
-@dataclass(frozen=True, slots=True)
 class StepRound(Message):
     """Step ``step`` begins, with ``open_tasks`` calls standing; bids are asked for where ``bidding``.
 
@@ -61,30 +52,26 @@ class StepRound(Message):
 
 
 @dataclass(frozen=True, slots=True)
-class TransportBid(Message):
-    """A bid for ``task``, better than every bid for it heard in this round; it takes the sender's former bid back.
+class TurnRequest(Message):
+    """A robot without a task asks for a turn to plan: others need the place where it rests."""
 
-    ``cost`` is in hundredths of a step. ``NO_TASK`` asks for a turn to plan without a task.
-    """
-
-    step_low: int
+    step: int
     attempt: int
-    task: int
-    cost: int
 
 
 @dataclass(frozen=True, slots=True)
-class StepAward(Message):
-    """One change that a round has brought, ``index`` of ``changes``: ``robot`` has ``task`` now, or none.
+class StepTurn(Message):
+    """One change that a round has brought, ``index`` of ``changes``: ``robot`` has ``won`` a task, or has none now.
 
-    Those named plan anew, in this order. A round without changes is closed by one with ``changes`` 0 and robot 0.
+    Those named plan anew, in this order. A round without changes is closed by one with ``changes`` 0 and robot 0. Which
+    task was won is in its award.
     """
 
     step: int
     index: int
     changes: int
     robot: int
-    task: int
+    won: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,10 +154,9 @@ class TransportAnswer(Message):
 
 
 MESSAGES: tuple[type[Message], ...] = (
-    TransportCall,
     StepRound,
-    TransportBid,
-    StepAward,
+    TurnRequest,
+    StepTurn,
     PathHead,
     PathMoves,
     StepState,
