@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey, car_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import Operation
+from onboard.core.codes import OUTSIDE, Operation
 from onboard.core.effects import Record
 from onboard.core.messages import CarAt, Reference
 from onboard.core.serial import successor
@@ -95,6 +95,8 @@ class BayMemory:
                 numbers = int(entry["station"]), int(entry["version"]), int(entry["wheelbase_mm"])
                 self.cars[_car(entry)] = CarAt(self.node_id, _car(entry), *numbers)
                 self.winners.pop(_car(entry), None)
+                if numbers[0] == OUTSIDE and _car(entry) in self.tickets:
+                    self.tickets.remove(_car(entry))
             case "winner":
                 self._take_winner(entry)
             case "car_left":

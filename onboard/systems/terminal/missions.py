@@ -39,7 +39,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Transport:
-    """One box of a mission under a task's name."""
+    """One box of a mission under a task's name; ``type`` and ``source`` where any of that type from there will do."""
 
     task: Reference
     mission: int
@@ -47,6 +47,8 @@ class Transport:
     target: int
     before_us: int
     urgent: bool
+    type: str = ""
+    source: int = 0
 
 
 @dataclass
@@ -122,7 +124,8 @@ class Orders:
             if task is None:
                 self.last_task += 1
                 task = Reference(self.node_id, self.last_task)
-            transport = Transport(task, order.number, box, order.target, order.before_us, order.urgent)
+            terms = order.target, order.before_us, order.urgent, order.type, order.source
+            transport = Transport(task, order.number, box, *terms)
             self.open[task] = transport
             return transport
         return None
@@ -162,14 +165,21 @@ class Orders:
         return found
 
     def give_back(self, task: Reference) -> None:
-        """Nobody does it: its box is a mission of its own again."""
+        """Nobody does it: its box, or another of its type, is a mission of its own again."""
         transport = self.open.pop(task, None)
         self.won.pop(task, None)
         if transport is None:
             return
         order = self.missions.setdefault(
             transport.mission,
-            Order(transport.mission, transport.target, before_us=transport.before_us, urgent=transport.urgent),
+            Order(
+                transport.mission,
+                transport.target,
+                type=transport.type,
+                source=transport.source,
+                before_us=transport.before_us,
+                urgent=transport.urgent,
+            ),
         )
         order.task = None if task.origin == self.node_id else task
         if order.type:
@@ -222,7 +232,7 @@ class Orders:
         )
         tasks = ";".join(
             f"{one.task.number},{one.mission},{one.box},{one.target},{one.before_us},{int(one.urgent)},"
-            f"{self.won.get(one.task, 0)},{one.task.origin}"
+            f"{self.won.get(one.task, 0)},{one.task.origin},{one.type},{one.source}"
             for one in self.open.values()
         )
         over = ";".join(f"{one.origin},{one.number}" for one in self.over)
@@ -250,10 +260,10 @@ class Orders:
                 self.missions[int(number)].task = Reference(int(name[0]), int(name[1])) if name else None
         for row in str(newest["tasks"]).split(";"):
             if row:
-                numbers = [int(one) for one in row.split(",")]
-                _, mission, box, to, before_us, urgent, winner, *origin = numbers
-                task = Reference(origin[0] if origin else self.node_id, numbers[0])
-                self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent))
+                *words, origin, kind, source = row.split(",")
+                task_number, mission, box, to, before_us, urgent, winner = (int(one) for one in words)
+                task = Reference(int(origin), task_number)
+                self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent), kind, int(source))
                 if winner:
                     self.won[task] = winner
 
