@@ -45,7 +45,7 @@ def figures(played: Played) -> dict[str, object]:
     served = [one for one in plant.goods.values() if one.served_step is not None and one.served_us is not None]
     steps = [one.served_step - one.task.release for one in served if one.served_step is not None]
     seconds = [(one.served_us - one.ordered_us) / 1e6 for one in served if one.served_us is not None]
-    counts = {kind: sum(isinstance(one, kind) for one in said) for kind in (CallForProposals, Bid, Award, PathHead)}
+    counts = {kind: sum(isinstance(one, kind) for one in said) for kind in (Bid, Award, PathHead)}
     published = token_passing(site.name, len(site.tasks))
     return {
         "robots": len(site.homes),
@@ -57,7 +57,7 @@ def figures(played: Played) -> dict[str, object]:
         **({} if published is None else {"token_passing_published": published}),
         "makespan_steps": max((one.served_step or 0 for one in served), default=0),
         "mean_service_s": fmean(seconds) if seconds else 0.0,
-        "calls": counts[CallForProposals],
+        "calls": len({one.call for one in said if isinstance(one, CallForProposals)}),
         "bids": counts[Bid],
         "awards": counts[Award],
         "paths": counts[PathHead],

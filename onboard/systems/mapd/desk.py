@@ -174,8 +174,11 @@ class OrderDesk(Plain):
         return [Record({"record": "served", "task": task}), answer]
 
     def _call(self, task: Task, now_us: int) -> Effect:
-        until_us = self._close_us if self._close_us is not None else now_us + self.site.bid_window_us
-        return Send(call_of(self.fleet.node_id, task, until_us))
+        """The call for a task: said again, it is the same."""
+        calls = self.knowledge.calls
+        if task.number not in calls:
+            calls[task.number] = call_of(self.fleet.node_id, task, now_us + self.site.bid_window_us)
+        return Send(calls[task.number])
 
     # --- rounds ------------------------------------------------------------------------------------------------
 
