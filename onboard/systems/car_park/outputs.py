@@ -13,6 +13,7 @@ from onboard.core.effects import Effect, Record, Tell
 from onboard.core.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference
 from onboard.core.motion_authority import ALONE, MotionAuthority, Permit, authorised
 from onboard.core.serial import successor
+from onboard.systems.car_park.records import DoorRecord
 from onboard.systems.car_park.unheard import Unheard
 
 #: A desk tells nobody what it shows: its last order is said again with so many states of the bay (ours).
@@ -52,10 +53,7 @@ class BayOutputs:
             return []
         order = self._doors[door] = DoorOrder(self.node_id, self._next(), door, action)
         self._unheard.ordered(door)
-        return [
-            Record({"record": "door", "door": int(door), "action": int(action)}),
-            *self._permit(door, action).order(order),
-        ]
+        return [Record(DoorRecord(door, action)), *self._permit(door, action).order(order)]
 
     def _permit(self, door: DoorName, action: DoorAction) -> Permit:
         """A compartment that begins its first life opens to customers before others have confirmed its rights."""

@@ -48,11 +48,10 @@ class _Robot:
 class MapdScene:
     """Fed beside ``view``, which is told of tasks here."""
 
-    noun = "task"
-
     def __init__(self, site: Mapd, view: SiteView) -> None:
         self.site = site
         self.view = view
+        self.words = view.words
         self._spots = _spots(site)
         self._robots = {node: _Robot(cell, bound_for=cell) for node, cell in site.homes.items()}
         self._tasks: dict[int, CallForProposals] = {}
@@ -106,8 +105,8 @@ class MapdScene:
         self._tasks[call.task.number] = call
         if len(self._tasks) > MOST_TASKS:
             del self._tasks[next(iter(self._tasks))]
-        ways = f"from {self.place(call.from_station)} to {self.place(call.to_station)}"
-        self.view.say(time_us, f"{self.thing(call.task)}: {ways}")
+        ways = f"from {self.words.place(call.from_station)} to {self.words.place(call.to_station)}"
+        self.view.say(time_us, f"{self._thing(call.task.number)}: {ways}")
 
     def _on_change(self, node: int, task: int, time_us: int) -> None:
         """What a robot had and has not picked up is anybody's again, unless another has won it in the same round."""
@@ -155,7 +154,7 @@ class MapdScene:
             return {"where": "", "car": None}
         told = [] if robot.task == NO_TASK else [[None, f"{self._thing(robot.task)}, {self._ways(robot.task)}"]]
         return {
-            "where": f"{self.place(robot.cell)}, step {robot.step}",
+            "where": f"{self.words.place(robot.cell)}, step {robot.step}",
             "car": str(robot.task) if robot.loaded else None,
             "path": robot.path,
             "ahead": [[round(x, 1), round(y, 1)] for x, y in (self._spots[cell] for cell in self._ahead(robot))],
@@ -193,28 +192,13 @@ class MapdScene:
         return Reference(self.site.desk, task)
 
     def _thing(self, task: int) -> str:
-        return f"task {task}"
+        return self.words.thing(self._reference(task))
 
     def _ways(self, task: int) -> str:
         call = self._tasks.get(task)
-        return (
-            f"from {self.place(call.from_station)} to {self.place(call.to_station)}"
-            if call is not None
-            else "long called"
-        )
-
-    def thing(self, reference: Reference) -> str:
-        """As in the port."""
-        return self._thing(reference.number)
-
-    def place(self, number: int) -> str:
-        """A cell by its name on the map."""
-        names = self.site.floor.names
-        return names[number] if number < len(names) else f"cell {number}"
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """As in the port."""
-        return f"has delivered {self.thing(reference)}"
+        if call is None:
+            return "long called"
+        return f"from {self.words.place(call.from_station)} to {self.words.place(call.to_station)}"
 
 
 def _spots(site: Mapd) -> dict[int, Spot]:

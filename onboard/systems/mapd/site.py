@@ -36,6 +36,7 @@ class Mapd(Site):
     system: ClassVar[str] = "mapd"
     demand: ClassVar[frozenset[str]] = frozenset({"tasks"})
     moved_by: ClassVar[Mapping[str, Needs]] = {"CartOrder": Needs.RIGHT}
+    no_hold: ClassVar[str] = "these robots move in step, and one that is held would hold all"
 
     rows: tuple[str, ...] = ()
     points: tuple[str, ...] = ()
