@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from onboard.core.effects import Effect
+from onboard.core.motion_authority import Permit
 from onboard.systems.mapd.messages import CartAction, CartOrder, CartState
 from onboard.work.device_link import DeviceLink
 
@@ -33,12 +34,12 @@ class Cart:
         if self.link.is_obeyed(state.sequence):
             self.link.pause()
 
-    def order(self, action: CartAction, cell: int, task: int, step: int, now_us: int) -> list[Effect]:
-        """Give an order, or say it again where it is due."""
+    def order(self, permit: Permit, action: CartAction, cell: int, task: int, step: int, now_us: int) -> list[Effect]:
+        """Give an order, or say it again where it is due, as far as that is permitted."""
         assert self.state is not None
         wanted = (action, cell, task, step)
         if wanted == self.link.wanted and self.link.is_obeyed(self.state.sequence):
             return []
         if wanted != self.link.wanted:
             self.link.go_on_from(self.state.sequence)
-        return self.link.order(wanted, now_us)
+        return self.link.order(wanted, permit, now_us)

@@ -6,10 +6,11 @@ from enum import Enum
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord, records_in
 from onboard.core.messages import Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.site import Machine, Site
 from onboard.systems.turning.generation import LatheGeneration
@@ -248,7 +249,7 @@ class LatheMachine:
             case Deed.SET_UP:
                 self._program_again_us = None
                 chuck = self.generation.lathe.chucks.index(process.clamping.chuck)
-                return written + self.link.order((LatheAction.SET_UP, chuck, 0), now_us)
+                return written + self.link.order((LatheAction.SET_UP, chuck, 0), self._permit(), now_us)
             case Deed.BEGIN:
                 self.generation.state.set_up_for = (one.job.drawing, process.clamping.chuck.name)
                 return written + self._make(process, now_us)
@@ -271,7 +272,11 @@ class LatheMachine:
         """The next part; an edge that would not last for it is changed before, by what its sensor says."""
         left_min = self.generation.state.left_min
         worn = {tool.number for tool in process.tools if left_min(tool) < process.wear_min[tool.number]}
-        return self.link.order((LatheAction.MAKE, 0, sum(1 << number - 1 for number in worn)), now_us)
+        edges = sum(1 << number - 1 for number in worn)
+        return self.link.order((LatheAction.MAKE, 0, edges), self._permit(), now_us)
+
+    def _permit(self) -> Permit:
+        return authorised(self.fleet.motion, ALONE)
 
     def _load(self, one: Batch, process: Process, now_us: int) -> list[Effect]:
         """The program to the control, until the control names it."""
@@ -279,7 +284,7 @@ class LatheMachine:
             return []
         self._program_again_us = now_us + AGAIN_US
         frames = text_frames(self.fleet.node_id, _program_number(one.task), process.program)
-        return [Actuate(message) for message in frames]
+        return [Tell(message) for message in frames]
 
     # --- words and memory --------------------------------------------------------------------------------------
 
