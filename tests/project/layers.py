@@ -112,7 +112,7 @@ def _is_part(place: Path) -> bool:
 
 
 #: The one file that loads modules by computed names: parts of systems.
-FINDER = "onboard/systems/registry.py"
+FINDER = "onboard/systems/folders.py"
 
 #: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
