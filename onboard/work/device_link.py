@@ -60,7 +60,7 @@ class DeviceLink(Generic[AnOrder]):
         self.due_us = now_us + self.again_us
         return permit.order(self.message(self.sequence, wanted))
 
-    def again(self, now_us: int, by: Say = say) -> list[Effect]:
+    def again(self, now_us: int) -> list[Effect]:
         """The order that is wanted, where it is due."""
         if self.wanted is None or self._permit is None:
             return []

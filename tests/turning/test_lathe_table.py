@@ -5,10 +5,11 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Actuate, Effect, Record, Send, Tell
 from onboard.core.holon import Holon
 from onboard.core.journal_records import JournalRecord
 from onboard.core.messages import Reference, TaskReport
+from onboard.core.motion_authority import ALONE, acts, authorised
 from onboard.systems.registry import factory_for
 from onboard.systems.turning.machine import TABLE, Control, Deed, LatheMachine
 from onboard.systems.turning.messages import LatheAction, LatheOrder, NcMode, NcState
@@ -31,6 +32,7 @@ def machine_in(stage: Stage) -> LatheMachine:
     behaviour = Holon(site, machine, factory_for(site, machine.kind), boot=2, entries=entries).behaviour
     assert isinstance(behaviour, LatheMachine)
     behaviour.tasks.in_hand[TASK].stage = stage
+    behaviour.fleet.motion.why_still = acts
     return behaviour
 
 
@@ -52,7 +54,7 @@ def kind_of(effects: list[Effect]) -> list[object]:
         match one:
             case Actuate(LatheOrder() as order):
                 found.append(order.lathe_action)
-            case Actuate():
+            case Tell():
                 found += ["program"] if "program" not in found else []
             case Record(what):
                 found.append(type(what).__name__)
@@ -80,7 +82,7 @@ def test_every_stage_meets_every_word_of_the_control(
     machine = machine_in(stage)
     machine.sense(NcState(LATHE, 40, NcMode.READY, PROGRAMS[program], 0), 0)
     if not obeyed:
-        machine.link.order((LatheAction.MAKE, 0, 0), NOW_US)
+        machine.link.order((LatheAction.MAKE, 0, 0), authorised(machine.fleet.motion, ALONE), NOW_US)
     machine.sense(NcState(LATHE, 40, MODES[mode], PROGRAMS[program], PARTS[parts]), NOW_US)
     following, deed = TABLE[stage, expected(stage, mode, program, parts, obeyed=obeyed)]
     effects = machine.advance(LATER_US)
