@@ -7,7 +7,7 @@ from bus_sim.systems.graph.plant import ORIGIN_US, GraphPlant, make_plant
 from bus_sim.systems.orders import Orders, System, Tally, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.session import SystemPlant
 from onboard.core.site import Site
-from onboard.systems.graph.messages import VisitResult
+from onboard.systems.graph.messages import OrderResult
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph, Order
 
 #: So many orders name their robot. Ours.
@@ -39,7 +39,7 @@ def last_s(site: Site) -> float:
 def count(plant: SystemPlant) -> Tally:
     """What became of the orders."""
     graph = cast("GraphPlant", plant)
-    done, refused, expected = VisitResult.DONE, VisitResult.REFUSED, len(graph.site.orders)
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(graph.site.orders)
     return tally_of(graph.entries, done, refused, expected, graph.timers.now_us())
 
 

@@ -8,7 +8,7 @@ from bus_sim.systems.mapd.plant import UnitPlant, make_plant
 from bus_sim.systems.orders import Ended, Orders, System, Tally, nothing_to_draw, tally
 from bus_sim.systems.session import SystemPlant
 from onboard.core.site import Site
-from onboard.systems.mapd.messages import TransportResult
+from onboard.systems.mapd.messages import OrderResult
 from onboard.systems.mapd.site import FAR, Mapd, Task
 
 #: So many endpoints are looked at to see how long ways are. Ours.
@@ -40,7 +40,7 @@ def count(plant: SystemPlant) -> Tally:
     mapd.check_steps()
     ended = []
     for one in mapd.goods.values():
-        refused = one.answer is TransportResult.REFUSED and one.served_step is None
+        refused = one.answer is OrderResult.REFUSED and one.served_step is None
         ended.append(Ended(one.served_step is not None, refused, one.ordered_us, one.served_us))
     return tally(ended, len(mapd.site.tasks), mapd.timers.now_us())
 

@@ -7,7 +7,7 @@ from bus_sim.systems.orders import Orders, System, Tally, last_of, nothing_to_dr
 from bus_sim.systems.session import SystemPlant
 from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant, make_plant
 from onboard.core.site import Site
-from onboard.systems.turning.messages import JobResult
+from onboard.systems.turning.messages import OrderResult
 from onboard.systems.turning.site import Turning, Wanted
 
 #: Parts of an order, at least and at most. Ours.
@@ -38,7 +38,7 @@ def last_s(site: Site) -> float:
 def count(plant: SystemPlant) -> Tally:
     """What became of the orders."""
     turning = cast("TurningPlant", plant)
-    done, refused, expected = JobResult.DONE, JobResult.REFUSED, len(turning.site.orders)
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(turning.site.orders)
     return tally_of(turning.entries, done, refused, expected, turning.timers.now_us())
 
 

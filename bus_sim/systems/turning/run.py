@@ -9,7 +9,7 @@ from bus_sim.systems.turning.plant import TurningPlant, make_plant
 from bus_sim.systems.turning.show import board
 from onboard.core.messages import Bid
 from onboard.core.site import Site
-from onboard.systems.turning.messages import JobResult
+from onboard.systems.turning.messages import OrderResult
 from onboard.systems.turning.site import Turning
 
 if TYPE_CHECKING:
@@ -34,12 +34,12 @@ def run_turning(site: Site, options: "SystemOptions") -> int:
 def figures(played: Played) -> dict[str, object]:
     """What a turning cell is judged by: orders, money, use of the lathes, edges, bids, and how true the parts are."""
     plant = cast("TurningPlant", played.plant)
-    done = [entry for entry in plant.entries if entry.result is JobResult.DONE]
+    done = [entry for entry in plant.entries if entry.result is OrderResult.DONE]
     elapsed_us = max(1, played.run.loop.now_us())
     return {
         "orders": len(plant.entries),
         "made": len(done),
-        "refused": sum(entry.result is JobResult.REFUSED for entry in plant.entries),
+        "refused": sum(entry.result is OrderResult.REFUSED for entry in plant.entries),
         "parts": sum(sum(device.made.values()) for device in plant.devices.values()),
         "price_eur": sum(entry.total_ct * entry.wanted.job.batch for entry in done) / 100,
         "bids": sum(isinstance(message, Bid) for _, message in played.messages),

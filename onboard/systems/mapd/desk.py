@@ -20,6 +20,7 @@ from onboard.systems.mapd.bidding import Tally
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.messages import (
     NO_TASK,
+    OrderResult,
     PathHead,
     PathMoves,
     StepAward,
@@ -29,7 +30,6 @@ from onboard.systems.mapd.messages import (
     TransportBid,
     TransportCall,
     TransportKey,
-    TransportResult,
 )
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
 from onboard.systems.mapd.rights import resource_of
@@ -141,13 +141,13 @@ class OrderDesk(Plain):
 
     def _on_key(self, key: TransportKey) -> list[Effect]:
         if key.task in self.served:
-            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.DONE))]
-        answer = Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.RECEIVED))
+            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, OrderResult.DONE))]
+        answer = Actuate(TransportAnswer(self.fleet.node_id, key.task, OrderResult.RECEIVED))
         if key.task in self.orders:
             return [answer]
         floor = self.site.floor
         if max(key.pickup, key.delivery) >= floor.size:
-            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.REFUSED))]
+            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, OrderResult.REFUSED))]
         release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
         task = Task(key.task, release, key.pickup, key.delivery)
         self.orders[key.task] = task
@@ -164,7 +164,7 @@ class OrderDesk(Plain):
         """A robot had it aboard and has it no more."""
         self.orders.pop(task, None)
         self.served.add(task)
-        answer = Actuate(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
+        answer = Actuate(TransportAnswer(self.fleet.node_id, task, OrderResult.DONE))
         return [Record(ServedRecord(task)), answer]
 
     def _call(self, task: Task) -> Effect:

@@ -1,5 +1,6 @@
 """For imports that are not rewritten yet: ``onboard.contract.mapd``."""
 
+from onboard.contract.codes import OrderResult
 from onboard.contract.mapd import (
     CartAction,
     PathHead,
@@ -9,7 +10,6 @@ from onboard.contract.mapd import (
     StepState,
     TransportBid,
     TransportCall,
-    TransportResult,
 )
 from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
 from onboard.systems.mapd.fields import LAST_STEP, MOST_MOVES, MOST_WAYS, MOVE_BITS, MOVES_A_FRAME, NO_TASK
@@ -24,6 +24,7 @@ __all__ = [
     "CartAction",
     "CartOrder",
     "CartState",
+    "OrderResult",
     "PathHead",
     "PathMoves",
     "StepAward",
@@ -33,5 +34,4 @@ __all__ = [
     "TransportBid",
     "TransportCall",
     "TransportKey",
-    "TransportResult",
 ]
