@@ -8,7 +8,7 @@ import importlib
 import pkgutil
 from collections.abc import Callable
 from functools import cache, partial
-from importlib import metadata, util
+from importlib import util
 from types import ModuleType
 
 from onboard import systems
@@ -39,11 +39,18 @@ def remove_system(name: str) -> None:
     del _ADDED[name]
 
 
+def own_names() -> tuple[str, ...]:
+    """The names of the systems that are folders beside this file, in the order of the alphabet."""
+    folders = (module.name for module in pkgutil.iter_modules(systems.__path__) if module.ispkg)
+    return tuple(sorted(name.replace("_", "-") for name in folders))
+
+
 @cache
 def system_names() -> tuple[str, ...]:
     """The names of all systems as site files say them, in the order of the alphabet."""
-    own = (module.name.replace("_", "-") for module in pkgutil.iter_modules(systems.__path__) if module.ispkg)
-    return tuple(sorted({*own, *(entry.name for entry in metadata.entry_points(group=GROUP))}))
+    from importlib import metadata  # noqa: PLC0415  # see _package
+
+    return tuple(sorted({*own_names(), *(entry.name for entry in metadata.entry_points(group=GROUP))}))
 
 
 @cache
@@ -57,10 +64,15 @@ def part(system: str, noun: str) -> ModuleType | None:
 
 @cache
 def _package(system: str) -> str | None:
-    """The folder is looked for first: to read the entry points of all packages takes a board long."""
+    """The folder is looked for first: to read the entry points of all packages takes a board long.
+
+    So does what reads them: it is imported where it is needed.
+    """
     folder = f"{systems.__name__}.{system.replace('-', '_')}"
     if "_" not in system and system.replace("-", "").isalnum() and util.find_spec(folder) is not None:
         return folder
+    from importlib import metadata  # noqa: PLC0415  # see above
+
     return next((entry.value for entry in metadata.entry_points(group=GROUP, name=system)), None)
 
 
