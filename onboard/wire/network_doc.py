@@ -59,7 +59,7 @@ def _link(name: str) -> str:
 @cache
 def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
     """Name of each value table of the two contracts of all (``VAL_TABLE_``), by its content."""
-    named = {}
+    named: dict[tuple[tuple[int, str], ...], str] = {}
     for text in (fleet_dbc_text(), device_dbc_text()):
         named |= {choices: name for name, choices in read_annotations(text).tables.items()}
     return {**named, ((0, "NO"), (1, "YES")): "Answer"}
