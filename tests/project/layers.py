@@ -167,7 +167,7 @@ LAYERS: dict[str, Layer] = {
             *CORE_TYPES,
             *SYSTEM_TYPES,
             "onboard.config.problems",
-            *(f"onboard.core.{name}" for name in ("authority", "holding", "regeneration")),
+            *(f"onboard.core.{name}" for name in ("assignments", "authority", "holding", "regeneration")),
             "onboard.ways.lifts",
             "onboard.gateway.pauses",
             "onboard.gateway.whereabouts",
