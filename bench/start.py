@@ -4,9 +4,9 @@
 
 Each run is a new process with an empty journal; the bus is served over loopback in the socketcand protocol by this one.
 Wall time counts from just before the process is made to the arrival of the heartbeat; memory is the process's highest
-resident set by then
-(``VmHWM`` of proc(5), so Linux only), and its proportional set. One run that is not counted fills the caches. For comparison
-the table begins with an interpreter that does nothing but say that it runs, alone and with each library imported.
+resident set by then (``VmHWM`` of proc(5), so Linux only), and its proportional set. One run that is not counted fills
+the caches. For comparison the table begins with an interpreter that does nothing but say that it runs, alone and with
+each library imported.
 """
 
 import argparse

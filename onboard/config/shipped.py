@@ -20,8 +20,8 @@ _SUFFIX = ".toml"
 def shipped_sites() -> dict[str, "Traversable"]:
     """Site files of all installed packages by their names, in the order of these."""
     # A board names a file, and would wait for what reads archives and e-mail headers of packages.
-    from importlib.metadata import entry_points  # noqa: PLC0415
-    from importlib.resources import files  # noqa: PLC0415
+    from importlib.metadata import entry_points  # noqa: PLC0415  # see above
+    from importlib.resources import files  # noqa: PLC0415  # see above
 
     folders = [files(entry.load()) for entry in entry_points(group=GROUP)]
     found = {file.name.removesuffix(_SUFFIX): file for folder in folders for file in folder.iterdir() if _is_site(file)}
