@@ -1,7 +1,5 @@
 """Serial-number arithmetic for counters and times that wrap (RFC 1982)."""
 
-from collections.abc import Iterable, Mapping
-
 from onboard.contract.base import Stamp
 
 #: Bus time on the wire is in milliseconds modulo this.
@@ -57,17 +55,3 @@ def from_bus_ms(bus_ms: int, near_us: int) -> int:
     """The bus time in us nearest to ``near_us`` that reads ``bus_ms`` on the wire (within 24.8 days of it)."""
     near_ms = near_us // 1000
     return (near_ms + ms_after(bus_ms, near_ms)) * 1000
-
-
-def last_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
-    """The boot counter last journalled, 1 to 255; 0 where there is none."""
-    last = 0
-    for entry in entries:
-        if entry.get("record") == "boot":
-            last = int(entry["boot"])
-    return last
-
-
-def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
-    """The boot counter after the last one journalled, 1 to 255, going round."""
-    return successor(last_boot(entries), 8)

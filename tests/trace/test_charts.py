@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from onboard.core.messages import Progress, Reference
+from onboard.systems.car_park.diagram import Picture, watch
 from onboard.trace.chart.sequence import Chart, chart
-from onboard.trace.chart.time_space import Picture, watch
 from onboard.trace.cli import main
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
