@@ -15,30 +15,17 @@ PLUGIN = ROOT / "tests" / "plugin"
 PAGE = ROOT / "docs" / "new-system.md"
 #: A command that has not ended until then hangs, s.
 DEADLINE_S = 120
-#: Files that still name a system, with the systems that each names: the list only gets shorter, and then goes.
-STILL = {
-    "hil/board_device.py": {"car_park"},
-    "hil/play.py": {"car_park"},
-    "hil/process_device.py": {"car_park"},
-    "hil/simulated_device.py": {"car_park"},
-    "hil/stage.py": {"car_park"},
-}
 #: A site file of version 0.1 does not say what it is: the one place outside that may name a system.
 ONE = "onboard/systems/registry.py"
-#: How often files still ask ``isinstance`` of a site.
-STILL_ASK: dict[str, int] = {}
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_at_most_one_file_outside_its_folders_names_a_system(system: str) -> None:
-    allowed = {file for file, named in STILL.items() if system in named}
-    found = plugins.outsiders(system) - {ONE}
-    assert found <= allowed, sorted(found - allowed)
-    assert found >= allowed, f"no longer name it; take them off the list: {sorted(allowed - found)}"
+    assert plugins.outsiders(system) <= {ONE}
 
 
 def test_nobody_outside_asks_what_type_a_site_has() -> None:
-    assert plugins.asks_for_site_type() == STILL_ASK
+    assert plugins.asks_for_site_type() == {}
 
 
 def test_the_simulator_casts_nothing() -> None:
