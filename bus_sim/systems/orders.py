@@ -126,9 +126,9 @@ class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
         return Orders(usual.count if count is None else int(count), usual.apart_s if apart_s is None else apart_s)
 
     def on(self, occasion: Occasion, site: SiteT) -> Orders:
-        """One, three that overlap, or what is usual."""
-        if occasion is Occasion.ALONE:
-            return Orders(1, 1.0)
+        """One, three that overlap, the site's own where it has none, or what is usual."""
+        if occasion in (Occasion.ALONE, Occasion.NOBODY):
+            return Orders(int(occasion is Occasion.ALONE), 1.0)
         return Orders(3, self.order_s(site) / 4) if occasion is Occasion.OVERLAP else self.most(site)
 
     def count(self, demand: Orders | None) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, Protocol, 
 
 from rich.console import Console
 
+from bus_sim.demand import DemandError
 from bus_sim.devices.timers import Timers
 from bus_sim.run import BusRun
 from bus_sim.systems.picture import LiveText
@@ -207,6 +208,18 @@ class Stage(ABC, Generic[PlantT]):
     @abstractmethod
     def tally(self) -> Tally:
         """What became of everybody who came; asked when the run is over."""
+
+    # --- a machine under test ----------------------------------------------------------------------------------
+
+    def bring(self, site: Any, node: int) -> None:
+        """Something comes now that machine ``node`` can do alone; ``site`` is the run's own with all that it brings.
+
+        Raises ``DemandError`` where nobody can be brought so.
+        """
+        raise DemandError(f"{site.name}: a {site.system} has no order that one machine carries out at any time")
+
+    def power_up(self, node: int) -> None:
+        """The devices of one machine get their power: they tell how they stand, as at power-up."""
 
     # --- a person who watches ----------------------------------------------------------------------------------
 

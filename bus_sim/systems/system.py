@@ -49,6 +49,8 @@ class Occasion(StrEnum):
     FEW = "few"
     #: Beside an attack.
     ATTACK = "attack"
+    #: Whoever is wanted is brought by hand.
+    NOBODY = "nobody"
 
 
 class Faulted(NamedTuple):

@@ -151,3 +151,19 @@ def _inside(tree: ast.Module, own: str, known: set[str]) -> set[str]:
             below = {f"{node.module}.{one.name}" for one in node.names} & known
             found |= below or {node.module}
     return (found & known) - {own}
+
+
+def classes(top: str) -> list[tuple[str, str]]:
+    """Every class below a folder, and its file."""
+    return [
+        (node.name, file)
+        for file, tree in files().items()
+        if file.startswith(f"{top}/")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+    ]
+
+
+def makes_loop(tree: ast.Module) -> bool:
+    """Whether a file makes an event loop's time pass itself, so that it holds a run of its own."""
+    return any(isinstance(node, ast.Attribute) and node.attr == "run_until_complete" for node in ast.walk(tree))

@@ -45,6 +45,7 @@ _ON: Final[Mapping[Occasion, Arrivals]] = {
     Occasion.BUSY: Arrivals(6, 15.0, 5.0, 30.0),
     Occasion.FEW: Arrivals(2, 30.0, 5.0, 60.0),
     Occasion.ATTACK: Arrivals(6, 90.0, 45.0),
+    Occasion.NOBODY: Arrivals(0),
 }
 
 

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 
 from bus_sim.systems.car_park.by_hand import ByHand
-from bus_sim.systems.car_park.demand import Demand
-from bus_sim.systems.car_park.plant.customer import Customer, Outcome, State
+from bus_sim.systems.car_park.demand import Demand, Stay
+from bus_sim.systems.car_park.plant.bodies import random_car
+from bus_sim.systems.car_park.plant.customer import Customer, Event, Outcome, State
 from bus_sim.systems.car_park.plant.plant import Plant, looks_for_ticket
 from bus_sim.systems.car_park.show import Clock, TerminalShow
 from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
 from bus_sim.systems.car_park.window import BURST_US, Window, densest
 from bus_sim.systems.stage import Ended, Hand, Show, Stage, Tally
+from onboard.systems.car_park.site import CarPark
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import Indicators
 
@@ -28,6 +30,9 @@ ORIGIN_US = 10_000_000
 PATIENCE_US = 2 * 3_600_000_000
 #: Without a terminal a window is told line by line, one in so long, us of virtual time.
 WINDOW_LINE_US = 300_000_000
+
+#: A customer who is hurried does not walk or drive: these states end at once.
+_HURRIED = (State.DRIVING_IN, State.WALKING_OUT)
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,7 @@ class CarParkStage(Stage[Plant]):
         self._street.add_all(coming.demand, coming.origin_us)
         self._clock = Clock(coming.zero)
         self._indicators = Indicators(run.site)
+        self._hurried: list[Customer] = []
 
     # --- how it stands -----------------------------------------------------------------------------------------
 
@@ -97,6 +103,33 @@ class CarParkStage(Stage[Plant]):
             max((*summary.in_wait_us, *summary.out_wait_us), default=0) / 1e6,
             outcomes[Outcome.FULL],
         )
+
+    # --- a machine under test ----------------------------------------------------------------------------------
+
+    def bring(self, site: CarPark, node: int) -> None:
+        """A customer who does not walk or drive brings a car; it is not fetched again."""
+        if not self._hurried:
+            for compartment in self.plant.compartments.values():
+                compartment.watch(self._soon_hurry)
+                compartment.watch_desk(lambda _text, _car: self._soon_hurry())
+        stay = Stay(0, None, random_car(f"car {len(self._hurried) + 1}", self.run.options.seed))
+        self._hurried.append(self._street.add(stay, self.run.loop.now_us()))
+
+    def _soon_hurry(self) -> None:
+        """After the step that is under way."""
+        self.run.loop.call_soon(self._hurry)
+
+    def _hurry(self) -> None:
+        for customer in self._hurried:
+            if customer.state in _HURRIED:
+                customer.on(Event.TIMER)
+
+    def power_up(self, node: int) -> None:
+        """See ``Stage``."""
+        plant = self.plant
+        for devices in (plant.shuttles, plant.carriers, plant.lifts, plant.compartments):
+            if node in devices:
+                devices[node].start()
 
     # --- a person who watches ----------------------------------------------------------------------------------
 

@@ -1,18 +1,21 @@
 """A cell's run: goals come to the counter, robots negotiate, carry and hand over; what came of it."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from bus_sim.run import BusRun
-from bus_sim.systems.cell.orders import count
+from bus_sim.systems.cell.orders import count, draw
 from bus_sim.systems.cell.plant import CellPlant
 from bus_sim.systems.cell.show import plan
 from bus_sim.systems.cell.tree import ContractTree
 from bus_sim.systems.cell.view import CellView
+from bus_sim.systems.orders import Orders
 from bus_sim.systems.stage import Stage, Tally
 from onboard.core.messages import Reference
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.messages import OrderResult
 from onboard.systems.cell.robot import ArmRobot
+from onboard.systems.cell.site import Cell
 
 if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource
@@ -39,6 +42,16 @@ class CellStage(Stage[CellPlant]):
     def tally(self) -> Tally:
         """See ``Stage``."""
         return count(self.plant)
+
+    def bring(self, site: Cell, node: int) -> None:
+        """See ``Stage``."""
+        alone = replace(site, arms={node: site.arms[node]})
+        next(iter(self.plant.counters.values())).add(draw(alone, Orders(1, 1.0), self.run.options.seed).wishes[0])
+
+    def power_up(self, node: int) -> None:
+        """See ``Stage``."""
+        if node in self.plant.devices:
+            self.plant.devices[node].start()
 
     def picture(self) -> str:
         """See ``Stage``."""

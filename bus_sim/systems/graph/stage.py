@@ -10,6 +10,7 @@ from bus_sim.systems.graph.show import picture
 from bus_sim.systems.stage import Stage, Tally
 from onboard.core.messages import Bid, CallForProposals
 from onboard.systems.graph.messages import EdgeNotice, NodeAnswer, NodeVerdict, OrderResult, TurnSignal
+from onboard.systems.graph.site import FactoryGraph
 
 if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource
@@ -36,6 +37,16 @@ class GraphStage(Stage[GraphPlant]):
     def tally(self) -> Tally:
         """See ``Stage``."""
         return count(self.plant)
+
+    def bring(self, site: FactoryGraph, node: int) -> None:
+        """See ``Stage``."""
+        anybody = next(order for order in site.orders if not order.robot)
+        next(iter(self.plant.counters.values())).add(anybody)
+
+    def power_up(self, node: int) -> None:
+        """See ``Stage``."""
+        if node in self.plant.bodies:
+            self.plant.bodies[node].start()
 
     def picture(self) -> str:
         """See ``Stage``."""

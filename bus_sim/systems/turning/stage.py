@@ -7,7 +7,9 @@ from bus_sim.systems.turning.orders import count
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
 from onboard.core.messages import Bid
+from onboard.systems.turning.clamping import choose_clamping
 from onboard.systems.turning.messages import OrderResult
+from onboard.systems.turning.site import Turning
 
 if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource
@@ -23,6 +25,18 @@ class TurningStage(Stage[TurningPlant]):
     def tally(self) -> Tally:
         """See ``Stage``."""
         return count(self.plant)
+
+    def bring(self, site: Turning, node: int) -> None:
+        """See ``Stage``."""
+        lathe = site.lathes[node]
+        fits = (one for one in site.orders if choose_clamping(one.job, site.drawings[one.job.drawing], lathe))
+        wanted = next(fits)
+        next(iter(self.plant.counters.values())).add(wanted)
+
+    def power_up(self, node: int) -> None:
+        """See ``Stage``."""
+        if node in self.plant.devices:
+            self.plant.devices[node].start()
 
     def picture(self) -> str:
         """See ``Stage``."""
