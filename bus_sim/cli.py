@@ -14,6 +14,8 @@ from bus_sim.compare.command import add_compare, run_compare
 from bus_sim.demand import DemandError
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.importers.command import add_import, run_import
+from bus_sim.outputs import OutputError, check_outputs
+from bus_sim.outside import is_address
 from bus_sim.planted.bug import PlantedBug
 from bus_sim.planted.registry import find_bug
 from bus_sim.processes.fleet import ProcessesError
@@ -26,6 +28,7 @@ from bus_sim.systems.car_park.day import DayOptions, run_day
 from bus_sim.systems.registry import RUNNERS, SystemOptions
 from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
+from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
@@ -66,7 +69,7 @@ WINDOW_SPEED = 60.0
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``bus-sim``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="bus-sim",
         description="Run a site on a simulated CAN bus: all controllers, the plant and its customers in one process.",
         epilog=HELP,
@@ -215,6 +218,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
+        check_outputs(args)
         with terminated_as_interrupted():
             return COMMANDS[args.command](args)
     except (
@@ -227,6 +231,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         ProcessesError,
         PublishError,
         OptionError,
+        OutputError,
     ) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
@@ -251,6 +256,8 @@ def _dbc(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    if args.limit_s is not None and not 0 < args.limit_s < float("inf"):
+        raise OptionError(f"--for {args.limit_s:g}: must be seconds above 0")
     if args.scenario is not None:
         return _run_scenario(args)
     site = find_site(args.site or DEFAULT_SITE)
@@ -364,7 +371,7 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
     except ValueError as error:
         raise OptionError(str(error)) from error
     live = args.serve is not None or bool(args.bus) or processes is not None or mqtt is not None
-    if args.serve is not None and not args.serve.rpartition(":")[2].isdigit():
+    if args.serve is not None and not is_address(args.serve):
         raise OptionError(f"--serve {args.serve}: must be HOST:PORT, such as 127.0.0.1:29536")
     window = _window(args, live=live)
     if args.by_hand and (window is not None or (speed is None and args.speed is not None)):

@@ -179,8 +179,6 @@ class _Day:
 
     def _build(self, site: Site) -> Simulation:
         options = self._options
-        if options.trace is not None:
-            options.trace.parent.mkdir(parents=True, exist_ok=True)
         run_options = RunOptions(
             seed=options.seed,
             epoch_us=round(self._zero.timestamp() * 1_000_000),
