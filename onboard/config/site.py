@@ -56,7 +56,9 @@ def _read_system(root: Table, common: Common, system: str) -> Site:
 
 def site_digest(site: Site) -> int:
     """1 to 65535, over what a site is and not what comes to it; docs/site-file.md says how to compute it."""
-    text = json.dumps(_meaning(site, {"digest", "time_zone", *site.demand}), sort_keys=True, separators=(",", ":"), default=_plain)
+    text = json.dumps(
+        _meaning(site, {"digest", "time_zone", *site.demand}), sort_keys=True, separators=(",", ":"), default=_plain
+    )
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:2], "big") or 1
 
 

@@ -323,9 +323,12 @@ export class Stage {
 
   // A whole name or none; gives what was written.
   text(pen, words, box, colour) {
-    const size = Math.min(box.h * 0.8, (box.w / Math.max(2, words.length)) * 1.5);
-    pen.font = `600 ${Math.max(LEAST_FONT, size)}px system-ui`;
-    if (box.h < LEAST_FONT || pen.measureText(words).width > box.w) return null;
+    const font = (size) => { pen.font = `600 ${size}px system-ui`; };
+    const high = box.h * 0.8;
+    font(high);
+    const size = Math.min(high, (high * 0.94 * box.w) / Math.max(pen.measureText(words).width, box.w * 0.5));
+    if (size < LEAST_FONT) return null;
+    font(size);
     pen.fillStyle = colour;
     pen.fillText(words, box.x + box.w / 2, box.y + box.h / 2 + 0.5);
     return words;

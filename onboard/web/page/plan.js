@@ -220,6 +220,8 @@ export class Plan {
       pen.fillRect(left, y - size * 0.4, wide, size * 0.8);
       pen.fillStyle = css(share > 0.9 && name.startsWith("T") ? "--wait" : "--car");
       pen.fillRect(left, y - size * 0.4, wide * Math.max(0, Math.min(1, share)), size * 0.8);
+      pen.strokeStyle = css("--line");
+      pen.strokeRect(left, y - size * 0.4, wide, size * 0.8);
     }
     pen.textAlign = "center";
     this.hits.push({ ...box, what: "machine", id: one.node });
