@@ -23,6 +23,9 @@ export class Stage {
     this.longest = Math.max(1, ...this.alleys.map((alley) => alley.length));
     this.places = new Set(layout.places);
     this.bays = new Map(layout.machines.filter((one) => one.station !== null).map((one) => [one.station, one]));
+    const names = [...this.bays.values()].map((one) => one.name);
+    this.common = names.length ? [...names[0]].findIndex((letter, at) => names.some((name) => name[at] !== letter)) : 0;
+    if (this.common < 0) this.common = names[0].length;
     this.liftMachines = new Map(layout.machines.filter((one) => one.kind === "lift").map((one) => [one.home[0], one]));
     this.resize();
   }
@@ -316,9 +319,11 @@ export class Stage {
     this.hits.push({ ...box, what: "machine", id: machine.node, name, isCrossed: hasFailed(told) });
   }
 
-  // As the tables name it: who named it, and its number there. A number alone is a car's only where one names them.
+  // Who named it, without what the names of all compartments begin with, and its number there: IOC2/17 is 2/17 here. A
+  // number alone is a car's only where one compartment names them.
   carName(car) {
-    return this.bays.size > 1 ? car : car.split(".")[1];
+    const [who, number] = car.split("/");
+    return this.bays.size > 1 ? `${who.slice(this.common)}/${number}` : number;
   }
 
   // A whole name or none; gives what was written.
