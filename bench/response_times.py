@@ -71,7 +71,7 @@ def _summary(run: Measured) -> list[str]:
 
 
 def main() -> int:
-    """Command line."""
+    """Measure the named sites; exit status 1 where a measured response is longer than its bound."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sites", nargs="*", default=SITES, metavar="SITE")
     parser.add_argument("--minutes", type=float, default=60.0)

@@ -26,7 +26,7 @@ RUN_MS = 10_000
 
 
 class Stranger(Enum):
-    """How it fails."""
+    """How the machine that behaves against the protocol does so."""
 
     STANDS = "stands"
     SILENT = "silent"

@@ -66,26 +66,26 @@ class SystemStage:
 
     @property
     def is_broken(self) -> bool:
-        """See ``Stage``."""
+        """Whether the plant's oracle has seen what must never happen."""
         return bool(self._plant.violations)
 
     @property
     def is_over(self) -> bool:
-        """See ``Stage``."""
+        """Whether the plant has seen the end of every order."""
         return self._plant.is_over
 
     def arm(self, faults: Sequence[AnyFault]) -> None:
-        """See ``Stage``."""
+        """Set up the faults; which of them the system knows was checked before."""
         arm_all(self.run, faults)
 
     def violations(self) -> list[str]:
-        """See ``Stage``."""
+        """What the plant's oracle says, a line for each."""
         return list(self._plant.violations)
 
     def waits_since(self, time_us: int) -> int:
-        """See ``Stage``."""
+        """Always 0: these plants do not tell since when an order waits."""
         return 0
 
     def tally(self) -> Tally:
-        """See ``Stage``."""
+        """What became of the orders, as the system's own module counts them."""
         return self._system.tally(self._plant)

@@ -36,7 +36,7 @@ exit status: 0 certified; 1 not certified, or undecided; 2 a mistake in the comm
 
 
 def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The subcommand's options."""
+    """Add ``certify`` to the commands of ``bus-sim``, with its options."""
     parser = commands.add_parser(
         "certify",
         help="can robots ever stick on a graph? and how many robots are best?",

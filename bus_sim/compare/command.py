@@ -38,7 +38,7 @@ exit status: 0 all went well; 1 a run broke an invariant or left somebody waitin
 
 
 def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The subcommand's options."""
+    """Add ``compare`` to the commands of ``bus-sim``, with its options."""
     compare = commands.add_parser(
         "compare",
         help="our protocol beside central dispatchers, a bound and an optimum",

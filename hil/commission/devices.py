@@ -152,7 +152,7 @@ async def doors(setting: Setting) -> bool:
 
 
 async def light_and_desk(setting: Setting) -> bool:
-    """What a customer sees."""
+    """A person confirms that the light turns green and then red, and that the desk shows what it was told to."""
     setting.devices.say(LightOrder(setting.machine.node_id, LightColour.GREEN))
     setting.devices.say(DeskOrder(setting.machine.node_id, setting.sequence(), DeskText.OUT_OF_ORDER, NO_REFERENCE))
     green = await setting.devices.first(

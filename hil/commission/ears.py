@@ -39,7 +39,7 @@ class Ears:
         return len(self.heard)
 
     def say(self, message: Message) -> None:
-        """Say a message."""
+        """Send a message as its controller would, in as many frames as it needs."""
         for frame in self._codec.encode(message):
             self.bus.send(frame)
 

@@ -285,7 +285,7 @@ class DeskInput(IntEnum):
 
 
 class DeskText(IntEnum):
-    """What the desk shows."""
+    """What the desk shows a customer, by the number in ``DeskOrder``."""
 
     WELCOME = 0
     TAKE_TICKET = 1

@@ -77,7 +77,7 @@ class Regenerating:
         return self.phase is RegenerationPhase.READ_BACK
 
     def handlers(self) -> dict[type[Message], Callable[[Any, int], list[Effect]]]:
-        """Handler by message class."""
+        """Which method takes which message, with bus time in us as its second argument."""
         return {Regeneration: self.on_word, TokenAssigned: self.on_assigned}
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:

@@ -55,7 +55,7 @@ class Station(NamedTuple):
 
 
 class TrackKind(Enum):
-    """What a track is."""
+    """An alley runs along a floor, a lift between floors, a spur off an alley for one machine."""
 
     ALLEY = "alley"
     LIFT = "lift"

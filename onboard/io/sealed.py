@@ -95,7 +95,7 @@ class Tail:
         return Appending(Write(self.end, line), Write(place, slot), not copies)
 
     def take(self, appending: Appending) -> None:
-        """It is durable."""
+        """The record that ``appending`` made is on the medium: the next one is chained to it."""
         line = appending.line.data
         self.records, self.end, self.link = self.records + 1, self.end + len(line), line[:_LINK_CHARS]
         self.copies = deque(_as_fit([*self.copies, line], _room(self.owner)))

@@ -85,7 +85,7 @@ class Counter(ABC, Generic[AnOrder]):
 
     @abstractmethod
     def terms(self, order: AnOrder) -> CallTerms:
-        """What is called for."""
+        """The call by which this order finds its machine."""
 
     @abstractmethod
     def price(self, order: AnOrder) -> None:
@@ -127,12 +127,12 @@ class Counter(ABC, Generic[AnOrder]):
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """What the heartbeat says: IDLE once every order is over, else WORKING."""
         return MachineState.IDLE if all(o.state in OVER for o in self.orders.values()) else MachineState.WORKING
 
     @property
     def itinerary_version(self) -> int:
-        """A desk goes nowhere."""
+        """0: a desk has no plan of where to go."""
         return 0
 
     def start(self, now_us: int) -> list[Effect]:

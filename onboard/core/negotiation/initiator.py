@@ -323,7 +323,7 @@ class Initiator:
         return [Send(closing), *self._closed(NOBODY, CallResult.REFUSED, Reason.NO_BID)]
 
     def cancel(self, now_us: int) -> Outcome:
-        """The task is gone."""
+        """The task is no longer wanted: say WITHDRAWN, so that bidders give up what they keep for it."""
         closing = self._closing(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)
         return [Send(closing), *self._closed(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)]
 
