@@ -48,7 +48,7 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser = commands.add_parser(
         "attack",
         help="attack a site by a node that sees only the bus",
-        description=HELP + "\n".join(f"  {name:<14} {entry.told}" for name, entry in ATTACKS.items()),
+        description=HELP + "\n".join(f"  {name:<14} {entry.summary}" for name, entry in ATTACKS.items()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("site", help="name of a shipped site, or a site file")

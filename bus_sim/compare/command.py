@@ -90,8 +90,8 @@ def run_compare(args: argparse.Namespace) -> int:
             found[part] = _compare_small(small, seeds[:MOST_CASES])
         print("\n".join([*found[part].lines(), ""]), flush=True)
     if args.json is not None:
-        told = {part: table.to_json() for part, table in found.items()}
-        args.json.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        values = {part: table.to_json() for part, table in found.items()}
+        args.json.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
     tables = [table for table in found.values() if isinstance(table, Table)]
     return 1 if any(table.faults or table.left_out for table in tables) else 0
 

@@ -35,7 +35,7 @@ class Kind(NamedTuple):
     """One kind of fault: where it strikes, what it does in one line of help, and its settings by name."""
 
     group: Group
-    told: str
+    summary: str
     settings: Mapping[str, Setting]
 
 

@@ -10,7 +10,7 @@ YES, NO = frozenset({"y", "yes"}), frozenset({"n", "no"})
 TRIES = 3
 
 
-class PersonGoneError(Exception):
+class NoAnswerError(Exception):
     """Nobody answers any more: the terminal or the pipe has ended."""
 
 
@@ -21,7 +21,7 @@ class Person(Protocol):
         """Show one line without waiting for an answer."""
 
     async def ask(self, question: str) -> str:
-        """One line, without white space around it. Raises ``PersonGoneError``."""
+        """One line, without white space around it. Raises ``NoAnswerError``."""
 
 
 class ConsolePerson:
@@ -36,7 +36,7 @@ class ConsolePerson:
         print(f"{question} ", end="", flush=True)
         line: str = await asyncio.to_thread(sys.stdin.readline)
         if not line:
-            raise PersonGoneError
+            raise NoAnswerError
         if not sys.stdin.isatty():
             print(line.rstrip(), flush=True)
         return line.strip()

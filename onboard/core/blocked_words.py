@@ -23,8 +23,8 @@ class BlockedWords:
         for entry in entries:
             if entry.get("record") in ("blocked", "clear"):
                 word = Blocked if entry["record"] == "blocked" else Clear
-                told = word(self.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
-                self.mirror.on_word(told, 0)
+                blocked = word(self.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
+                self.mirror.on_word(blocked, 0)
 
     def hear(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
         """A segment is blocked, or clear again; what I am steward of is in my journal."""

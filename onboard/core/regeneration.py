@@ -195,8 +195,8 @@ class Regenerating:
         """What I hold, the last that I gave away of each, and what I know the lost machine to hold."""
         book, is_lost = self.tokens, self._lost == self.node_id
         known: dict[TokenKey, Message] = {}
-        for told, one in book.beliefs.verified.items():
-            key = TokenKey(*told)
+        for pair, one in book.beliefs.verified.items():
+            key = TokenKey(*pair)
             if one.holder not in (self.node_id, NOBODY) and (key in book.given or one.holder == self._lost):
                 known[key] = TokenSeen(self.node_id, *key, one.version, one.holder)
         cars: list[Message] = []

@@ -104,14 +104,14 @@ class LastingBus:
             self._tell(f"the bus {self.name} is back")
 
     async def _come(self) -> OpenBus:
-        told = ""
+        reason = ""
         while True:
             try:
                 return await self._opener(self._settings)
             except BusOpenError as error:
                 if not error.may_come:
                     raise
-                if str(error) != told:
-                    told = str(error)
-                    self._tell(f"waits for its bus: {told}")
+                if str(error) != reason:
+                    reason = str(error)
+                    self._tell(f"waits for its bus: {reason}")
             await asyncio.sleep(RETRY_S)

@@ -252,7 +252,7 @@ class Initiator:
             self.awards_sent = QUICK_AWARDS + 1
             self.due_us = min(self.due_us or now_us, now_us + self.timing.award_repeat_us)
 
-    def unheard(self, now_us: int) -> int:
+    def silent_winner(self, now_us: int) -> int:
         """The winner that was awarded the task long ago and has said nothing of it since; 0 for nobody."""
         is_late = self.state is State.AWARDING and now_us - self.awarded_us >= ACCEPT_WITHIN_US
         return self.best[1] if is_late and self.best is not None else NOBODY
