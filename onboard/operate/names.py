@@ -5,7 +5,6 @@ import re
 from onboard.config.problems import nearest
 from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, NOBODY, Reason
 from onboard.core.site import Machine, Segment, Site, TrackKind
-from onboard.systems.mapd.site import Mapd
 
 #: Node-IDs under which a person's tool may speak (dbc/fleet.dbc: kept for gateways and tools).
 FIRST_TOOL, LAST_TOOL = MAX_NODE_ID + 1, 255
@@ -27,8 +26,8 @@ def machine_of(site: Site, name: str) -> Machine:
 def movable_of(site: Site, name: str) -> Machine:
     """A machine that a person can hold: one that moves about (row M38). Raises ``OperateError``."""
     machine = machine_of(site, name)
-    if isinstance(site, Mapd):
-        raise OperateError(f"{name}: machines of a {site.system} move in step and cannot be held; use stop")
+    if site.no_hold:
+        raise OperateError(f"{name}: cannot be held: {site.no_hold}; use stop")
     if machine.kind not in MOBILE_KINDS:
         raise OperateError(f"{name}: a {machine.kind.name.lower()} does not move about; use block, or stop")
     return machine

@@ -20,10 +20,11 @@ _BACK_REFERENCE = re.compile(r"(?:As in the port|See (?:above|``[\w.]+``))\s*[.;
 LEFT = {
     "bus_sim/systems": 27,
     "bus_sim/web": 3,
-    "onboard/gateway": 24,
+    "onboard/contract": 8,
+    "onboard/gateway": 22,
     "onboard/operate": 30,
     "onboard/systems": 150,
-    "onboard/trace": 41,
+    "onboard/trace": 38,
     "onboard/web": 7,
 }
 
