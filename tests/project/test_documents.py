@@ -1,0 +1,27 @@
+"""What stands in the documents stands once: the table of layers, and it names every layer."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+TABLE = re.compile(r"^\| layer \|.*\| may import \|$", re.MULTILINE)
+
+
+def test_the_table_of_layers_stands_once() -> None:
+    documents = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")]
+    places = [file.relative_to(ROOT).as_posix() for file in documents if TABLE.search(file.read_text(encoding="utf-8"))]
+    assert places == ["docs/design.md"], (
+        "the table of layers stands in docs/design.md, section 2; elsewhere refer to it"
+    )
+
+
+def test_the_table_of_layers_names_every_folder() -> None:
+    text = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    begin = TABLE.search(text)
+    assert begin is not None
+    table = text[begin.start() :].split("\n\n", 1)[0]
+    below = [file.parent for file in (ROOT / "onboard").glob("*/__init__.py")]
+    folders = [*below, *(ROOT / name for name in ("bus_sim", "dbc", "deploy", "hil"))]
+    names = [folder.relative_to(ROOT).as_posix() for folder in folders]
+    missing = [name for name in names if f"| `{name}` |" not in table]
+    assert not missing, f"docs/design.md, section 2: say of these what they are, and what they may import: {missing}"
