@@ -46,7 +46,7 @@ class LiveSource:
             self.picture.feed_device(message.sender, message, time_us)
 
     def layout(self) -> dict[str, Any]:
-        """As in the port."""
+        """The drawing, without commands: a page may not move a live site."""
         return {**self.picture.layout(), "commands": []}
 
     def snapshot(self) -> dict[str, Any]:
@@ -55,7 +55,7 @@ class LiveSource:
         return {**self.picture.snapshot(), "pace": 1, "zero_s": self._zero_s}
 
     def figures(self) -> dict[str, Any]:
-        """As in the port."""
+        """The indicators of what was heard so far."""
         return self.picture.figures()
 
     async def command(self, name: str, arguments: Mapping[str, Any]) -> str:
@@ -63,7 +63,7 @@ class LiveSource:
         raise CommandError(f"{name}: this bus is not simulated; the page only listens")
 
     async def sleep(self, seconds: float) -> None:
-        """As in the port."""
+        """Wait in real time, in s: the bus does not wait either."""
         await asyncio.sleep(seconds)
 
 
@@ -91,7 +91,7 @@ class LogSource:
         self.picture = self._film.show(time_us)
 
     def layout(self) -> dict[str, Any]:
-        """As in the port."""
+        """The drawing, with the commands of a player: pause and speed."""
         return {**self.picture.layout(), "commands": ["pause", "speed"]}
 
     def snapshot(self) -> dict[str, Any]:
@@ -100,7 +100,7 @@ class LogSource:
         return {**self.picture.snapshot(), "pace": pace, "span_us": [self._first_us, self._last_us]}
 
     def figures(self) -> dict[str, Any]:
-        """As in the port."""
+        """The indicators of the log up to the moment shown."""
         return self.picture.figures()
 
     async def command(self, name: str, arguments: Mapping[str, Any]) -> str:
@@ -118,5 +118,5 @@ class LogSource:
         raise CommandError(f"{name}: a recorded log cannot be changed")
 
     async def sleep(self, seconds: float) -> None:
-        """As in the port."""
+        """Wait in real time, in s, whatever speed the log is played at."""
         await asyncio.sleep(seconds)

@@ -18,7 +18,7 @@ ORIGIN_US = 10_000_000
 
 
 class CarPark:
-    """See ``Stage``."""
+    """The stage of a campaign for car parks: customers come from the street, the oracle watches bodies."""
 
     who = "customers"
 
@@ -29,29 +29,29 @@ class CarPark:
 
     @property
     def is_broken(self) -> bool:
-        """See ``Stage``."""
+        """Whether the oracle has seen what must never happen."""
         return bool(self._oracle.violations)
 
     @property
     def customers(self) -> list[Customer]:
-        """All who come."""
+        """All customers of the run, those still to come included."""
         return self._street.customers
 
     @property
     def is_over(self) -> bool:
-        """See ``Stage``."""
+        """Whether every customer was served or told why."""
         return is_over(self._street)
 
     def arm(self, faults: Sequence[AnyFault]) -> None:
-        """See ``Stage``."""
+        """Set up the faults in this run; those of single frames are in the bus already."""
         arm(self.run, faults)
 
     def violations(self) -> list[str]:
-        """See ``Stage``."""
+        """What the oracle says, its last look included, a line for each."""
         return [str(one) for one in self._oracle.finish()]
 
     def waits_since(self, time_us: int) -> int:
-        """See ``Stage``."""
+        """How many customers wait now who waited at loop time ``time_us`` already."""
         return sum(_waits_since(customer, time_us) for customer in self._street.customers)
 
     def tally(self) -> Tally:
