@@ -19,7 +19,7 @@ _BACK_REFERENCE = re.compile(r"(?:As in the port|See (?:above|``[\w.]+``))\s*[.;
 #: How many are left, by folder; a folder that is not here has none. To be lowered with each that is mended.
 LEFT = {
     "onboard/contract": 8,
-    "onboard/systems": 150,
+    "onboard/systems": 58,
 }
 
 

@@ -12,10 +12,10 @@ from onboard.systems.car_park.compartment import Compartment
 
 @dataclass(frozen=True)
 class CompartmentFactory:
-    """Makes compartments."""
+    """Makes compartments: a bay with doors, a desk, and the custody of cars."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
-        """The compartment's task-generation function."""
+        """What a task at the bay costs: a compartment bids to receive cars."""
         return BayGeneration(site, machine)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:

@@ -12,10 +12,10 @@ from onboard.systems.car_park.lift_generation import LiftGeneration
 
 @dataclass(frozen=True)
 class LiftFactory:
-    """Makes lifts."""
+    """Makes lifts: machines that bid for rides."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LiftGeneration:
-        """The lift's task-generation function."""
+        """What a ride costs, around those that are planned."""
         return LiftGeneration(site, machine, mirror)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Lift:

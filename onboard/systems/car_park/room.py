@@ -16,7 +16,7 @@ from onboard.ways.refuges import open_refuges
 
 
 def robots_of(site: Site) -> int:
-    """Number of carriers."""
+    """How many carriers the site has."""
     return sum(1 for machine in site.machines.values() if machine.kind is KindCode.ROBOT)
 
 

@@ -22,17 +22,17 @@ class _Factory:
 
 @dataclass(frozen=True)
 class UnitRobotFactory(_Factory):
-    """Makes robots."""
+    """Makes robots that move in unit steps."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> UnitRobot:
-        """The robot's steps."""
+        """A robot at the cell where its cart says that it stands."""
         return UnitRobot(fleet)
 
 
 @dataclass(frozen=True)
 class OrderDeskFactory(_Factory):
-    """Makes the desk."""
+    """Makes the site's one desk, which calls for tasks."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> OrderDesk:
-        """The desk's steps."""
+        """A desk that begins with the tasks of its journal."""
         return OrderDesk(fleet)
