@@ -1,7 +1,9 @@
-"""What stands in the documents stands once: the table of layers, and it names every layer."""
+"""What stands in the documents stands once: the table of layers names each; changes are told by version and sort."""
 
 import re
 from pathlib import Path
+
+from onboard import __version__
 
 ROOT = Path(__file__).parents[2]
 TABLE = re.compile(r"^\| layer \|.*\| may import \|$", re.MULTILINE)
@@ -25,3 +27,15 @@ def test_the_table_of_layers_names_every_folder() -> None:
     names = [folder.relative_to(ROOT).as_posix() for folder in folders]
     missing = [name for name in names if f"| `{name}` |" not in table]
     assert not missing, f"docs/design.md, section 2: say of these what they are, and what they may import: {missing}"
+
+
+def test_changes_are_told_by_version_and_sort() -> None:
+    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    versions = re.findall(r"^## \[(.+?)\](?: - (\d{4}-\d{2}-\d{2}))?$", text, re.MULTILINE)
+    released = [version for version, day in versions if day]
+    assert [version for version, day in versions if not day] in ([], ["Unreleased"])
+    assert released[0] == __version__, "the newest version of CHANGELOG.md is not that of the package"
+    sorts = set(re.findall(r"^### (.+)$", text, re.MULTILINE))
+    assert sorts <= {"Added", "Changed", "Fixed"}, f"CHANGELOG.md sorts by Added, Changed and Fixed, not by {sorts}"
+    marked = re.findall(r"^- (?:Fixed|Changed|Added):.*$", text, re.MULTILINE)
+    assert not marked, f"CHANGELOG.md: these belong below the heading that they name: {marked}"
