@@ -34,7 +34,7 @@ class Readable(Protocol):
         """Its name, for error lines."""
 
     def read_text(self, encoding: str) -> str:
-        """Its whole content. Raises ``OSError`` where it cannot be read."""
+        """Its whole text."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,7 @@ RUN_MS = 10_000
 
 
 class Stranger(Enum):
-    """How the machine that behaves against the protocol does so."""
+    """How it fails."""
 
     STANDS = "stands"
     SILENT = "silent"

@@ -42,7 +42,7 @@ class _Repeated(Attack, ABC):
         """What is said."""
 
     def tick(self, now_us: int) -> None:
-        """Say all words again once ``every_us`` have passed."""
+        """See ``Attack``."""
         if now_us >= self._due_us:
             self._due_us = now_us + self.every_us
             for word in self.words(now_us):
@@ -55,7 +55,7 @@ class Stop(_Repeated):
     every_us = 10 * _SECOND_US
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """One emergency stop under the attacker's number."""
+        """See ``_Repeated``."""
         yield EmergencyStop(self.node.node_id, Reason.OPERATOR)
 
 
@@ -63,7 +63,7 @@ class OtherSite(_Repeated):
     """Several machines of another site, all of them made up."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """One heartbeat for each made-up machine, all with a digest that is not this site's."""
+        """See ``_Repeated``."""
         digest = self.node.site.digest % 0xFFFF + 1
         for ghost in range(self.node.node_id, self.node.node_id + _GHOSTS):
             yield Heartbeat(ghost, CONTRACT_VERSION, digest, 0, 1, KindCode.ROBOT, MachineState.IDLE)
@@ -77,12 +77,12 @@ class NewerBoot(_Repeated):
         self._boots: dict[int, int] = {}
 
     def hear(self, message: Message, now_us: int) -> None:
-        """Note each machine's boot counter."""
+        """See ``Attack``."""
         if isinstance(message, Heartbeat):
             self._boots[message.sender] = message.boot
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """One request a machine that names a boot counter newer than its own."""
+        """See ``_Repeated``."""
         for node in self.node.site.machines:
             yield SyncRequest(self.node.node_id, node, self._boots.get(node, 1) % 255 + 1)
 
@@ -91,7 +91,7 @@ class BlockAll(_Repeated):
     """Says of every slot that nobody can pass it."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """``Blocked`` for every segment of every track; nothing on sites without tracks."""
+        """See ``_Repeated``."""
         tracks = getattr(self.node.site, "tracks", {})
         for number, track in tracks.items():
             for index in range(1, min(track.length, 255) + 1):
@@ -102,7 +102,7 @@ class HoldAll(_Repeated):
     """Holds every machine, as a person would."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """One order a machine to hold, all under one number."""
+        """See ``_Repeated``."""
         number = self.node.chance.randint(1, 255)
         for node in self.node.site.machines:
             yield ManualOrder(self.node.node_id, node, number, ManualMode.HELD)
@@ -118,12 +118,12 @@ class WrongTime(_Repeated):
         self._ahead_us: int | None = None
 
     def hear(self, message: Message, now_us: int) -> None:
-        """Follow the true bus time, by how many us it is ahead of loop time."""
+        """See ``Attack``."""
         if isinstance(message, BusTime):
             self._ahead_us = message.bus_time_us - now_us
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """Bus time an hour ahead of the true one, once that was heard."""
+        """See ``_Repeated``."""
         if self._ahead_us is not None:
             yield BusTime(self.node.node_id, (now_us + self._ahead_us + 3_600 * _SECOND_US) % BUS_TIME_MODULUS)
 
@@ -139,12 +139,12 @@ class Orders(_Repeated):
         self._number = node.chance.randint(1, 10_000)
 
     def hear(self, message: Message, now_us: int) -> None:
-        """Note every car that is named on the bus."""
+        """See ``Attack``."""
         if isinstance(message, CarAt):
             self._cars.add(message.car)
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """An order for a box or a robot where the site has such, and every known car at every compartment."""
+        """See ``_Repeated``."""
         me, site, chance = self.node.node_id, self.node.site, self.node.chance
         self._number += 1
         if isinstance(site, Terminal):
@@ -164,7 +164,7 @@ class WrongAnswers(Attack):
     """In a factory graph every robot that comes near a node is told by the attacker that it may go on."""
 
     def hear(self, message: Message, now_us: int) -> None:
-        """Answer a robot's signal before a node with GO, as the node's agent would."""
+        """See ``Attack``."""
         if isinstance(message, TurnSignal):
             go = NodeAnswer(self.node.node_id, message.sender, message.node, NodeVerdict.GO, message.after, 0)
             self.node.say(go)

@@ -22,7 +22,7 @@ class Stage(Protocol):
 
     @property
     def run(self) -> BusRun:
-        """The run on its stage: buses, plant and controllers."""
+        """Buses, plant and controllers."""
 
     @property
     def is_broken(self) -> bool:

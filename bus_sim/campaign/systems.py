@@ -66,26 +66,26 @@ class SystemStage:
 
     @property
     def is_broken(self) -> bool:
-        """Whether the plant's oracle has seen what must never happen."""
+        """See ``Stage``."""
         return bool(self._plant.violations)
 
     @property
     def is_over(self) -> bool:
-        """Whether the plant has seen the end of every order."""
+        """See ``Stage``."""
         return self._plant.is_over
 
     def arm(self, faults: Sequence[AnyFault]) -> None:
-        """Set up the faults; which of them the system knows was checked before."""
+        """See ``Stage``."""
         arm_all(self.run, faults)
 
     def violations(self) -> list[str]:
-        """What the plant's oracle says, a line for each."""
+        """See ``Stage``."""
         return list(self._plant.violations)
 
     def waits_since(self, time_us: int) -> int:
-        """Always 0: these plants do not tell since when an order waits."""
+        """See ``Stage``."""
         return 0
 
     def tally(self) -> Tally:
-        """What became of the orders, as the system's own module counts them."""
+        """See ``Stage``."""
         return self._system.tally(self._plant)

@@ -6,7 +6,7 @@ import sys
 import time
 from pathlib import Path
 
-from bus_sim.certify.certificate import ROWS, Certificate, certify, count_stuck, stuck_lines
+from bus_sim.certify.certificate import ROWS, Certificate, certify, count_stuck, told
 from bus_sim.certify.counterexample import play_file, play_on_bus, write_counterexample
 from bus_sim.certify.model import Model
 from bus_sim.certify.throughput import Pace, measure
@@ -36,7 +36,7 @@ exit status: 0 certified; 1 not certified, or undecided; 2 a mistake in the comm
 
 
 def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add ``certify`` to the commands of ``bus-sim``, with its options."""
+    """The subcommand's options."""
     parser = commands.add_parser(
         "certify",
         help="can robots ever stick on a graph? and how many robots are best?",
@@ -109,7 +109,7 @@ def _say(found: Certificate, what: str, file: Path | None, graph: Graph, rules: 
     verdict = {True: "deadlock-free under these rules", False: "not certified", None: "undecided"}[found.certified]
     print(f"{what}: {verdict}\n{found.reason}")
     if found.stuck is not None:
-        print("\n".join(stuck_lines(found.stuck)))
+        print("\n".join(told(found.stuck)))
         if file is not None:
             write_counterexample(file, graph, rules, capacity, found.stuck)
             print(f"written to {file}; play it: bus-sim certify --play {file} [--bus [--rules edge-and-node]]")

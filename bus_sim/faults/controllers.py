@@ -102,7 +102,7 @@ def disk_full(simulation: Simulation, injection: Injection) -> None:
 
 
 def pause(simulation: Simulation, injection: Injection) -> None:
-    """Stop the process until the fault ends, as SIGSTOP does: it hears and does nothing meanwhile."""
+    """The process stands still."""
     holon = _holon(simulation, injection)
     if holon is not None:
         holon.pause(injection.until_us)

@@ -55,7 +55,7 @@ class Station(NamedTuple):
 
 
 class TrackKind(Enum):
-    """An alley runs along a floor, a lift between floors, a spur off an alley for one machine."""
+    """What a track is."""
 
     ALLEY = "alley"
     LIFT = "lift"

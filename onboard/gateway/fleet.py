@@ -48,11 +48,11 @@ class FleetTopics:
         self._hour: int | None = None
 
     def set_epoch(self, epoch_us: int) -> None:
-        """Wall time of loop time 0, in us since 1970: what timestamps are counted from."""
+        """As of the publisher."""
         self._epoch_us = epoch_us
 
     def feed(self, message: Message, now_us: int) -> Iterator[Told]:
-        """Take up one message of the fleet bus; what it changes is yielded as publications."""
+        """Take up one message."""
         before = self._phase(message)
         self.picture.count_frame()
         self.picture.feed(message, now_us)
@@ -79,7 +79,7 @@ class FleetTopics:
         return {"at": self._at(now_us), **self.picture.indicators.figures(now_us).to_json()}
 
     def task(self, reference: Reference, now_us: int) -> Json:
-        """The JSON of one task: what it is, its phase, who has it."""
+        """How a task stands."""
         view = self.picture.view
         told: Json = {"at": self._at(now_us), "task": reference_text(reference)}
         record = view.tasks.get(reference)

@@ -58,7 +58,7 @@ class TaskInHand:
 
 @dataclass(slots=True)
 class Body:
-    """What is known of one mobile machine: when it was heard (loop time, us), its state, task and load."""
+    """One mobile machine."""
 
     machine: Machine
     heard_us: int | None = None
@@ -98,7 +98,7 @@ class Machines:
         return self._tracker.where(node_id)
 
     def feed(self, message: Message, now_us: int) -> None:
-        """Take up one message of the fleet bus, and note which machines it changes."""
+        """Take up one message."""
         self._on_site(message)
         body = self.bodies.get(message.sender)
         if body is not None:

@@ -92,7 +92,7 @@ class Activities:
             body.busy_us = body.travel_mm = body.empty_mm = body.longest_wait_us = 0
 
     def feed(self, message: Message, time_us: int) -> None:
-        """Take up one message of the fleet bus, in order of time."""
+        """Take up one message."""
         match message:
             case Progress():
                 self._on_progress(message, time_us)

@@ -90,7 +90,7 @@ class Dealings:
         self.counts = Counts()
 
     def feed(self, message: Message, time_us: int) -> None:
-        """Take up one message of the fleet bus, in order of time."""
+        """Take up one message."""
         self.counts.messages[type(message).__name__] += 1
         match message:
             case BusTime():

@@ -85,7 +85,7 @@ class FleetIndicators:
     robots_empty_share: float
 
     def to_json(self) -> dict[str, object]:
-        """The fields as ``json.dump`` takes them; units stand in the keys."""
+        """Plain values for ``json.dump``."""
         return asdict(self)
 
     def lines(self) -> list[str]:
@@ -126,7 +126,7 @@ class Indicators:
         self._dealings = Dealings()
 
     def feed(self, message: Message, time_us: int) -> None:
-        """Take up one message of the fleet bus, in order of time."""
+        """Take up one message."""
         self._dealings.feed(message, time_us)
         self._activities.feed(message, time_us)
 

@@ -18,7 +18,7 @@ ORIGIN_US = 10_000_000
 
 
 class CarPark:
-    """The stage of a campaign for car parks: customers come from the street, the oracle watches bodies."""
+    """See ``Stage``."""
 
     who = "customers"
 
@@ -29,29 +29,29 @@ class CarPark:
 
     @property
     def is_broken(self) -> bool:
-        """Whether the oracle has seen what must never happen."""
+        """See ``Stage``."""
         return bool(self._oracle.violations)
 
     @property
     def customers(self) -> list[Customer]:
-        """All customers of the run, those still to come included."""
+        """All who come."""
         return self._street.customers
 
     @property
     def is_over(self) -> bool:
-        """Whether every customer was served or told why."""
+        """See ``Stage``."""
         return is_over(self._street)
 
     def arm(self, faults: Sequence[AnyFault]) -> None:
-        """Set up the faults in this run; those of single frames are in the bus already."""
+        """See ``Stage``."""
         arm(self.run, faults)
 
     def violations(self) -> list[str]:
-        """What the oracle says, its last look included, a line for each."""
+        """See ``Stage``."""
         return [str(one) for one in self._oracle.finish()]
 
     def waits_since(self, time_us: int) -> int:
-        """How many customers wait now who waited at loop time ``time_us`` already."""
+        """See ``Stage``."""
         return sum(_waits_since(customer, time_us) for customer in self._street.customers)
 
     def tally(self) -> Tally:

@@ -51,7 +51,7 @@ class CellView:
     _offers: dict[tuple[int, Reference], float] = field(default_factory=dict)
 
     def feed(self, message: Message) -> None:
-        """Take up one message of the fleet bus."""
+        """Take up one message."""
         match message:
             case GoalStart():
                 self._goal(message.sender, message.goal).start = Point(message.x_mm, message.y_mm)

@@ -12,10 +12,10 @@ from onboard.systems.car_park.compartment import Compartment
 
 @dataclass(frozen=True)
 class CompartmentFactory:
-    """Makes compartments: a bay with doors, a desk, and the custody of cars."""
+    """Makes compartments."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
-        """What a task at the bay costs: a compartment bids to receive cars."""
+        """The compartment's task-generation function."""
         return BayGeneration(site, machine)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:

@@ -12,10 +12,10 @@ from onboard.systems.car_park.lift_generation import LiftGeneration
 
 @dataclass(frozen=True)
 class LiftFactory:
-    """Makes lifts: machines that bid for rides."""
+    """Makes lifts."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LiftGeneration:
-        """What a ride costs, around those that are planned."""
+        """The lift's task-generation function."""
         return LiftGeneration(site, machine, mirror)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Lift:

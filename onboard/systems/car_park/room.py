@@ -16,7 +16,7 @@ from onboard.ways.refuges import open_refuges
 
 
 def robots_of(site: Site) -> int:
-    """How many carriers the site has."""
+    """Number of carriers."""
     return sum(1 for machine in site.machines.values() if machine.kind is KindCode.ROBOT)
 
 

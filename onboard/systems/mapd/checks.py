@@ -115,7 +115,7 @@ class TaskOnce(Rule):
         self._aboard: dict[int, int] = {}
 
     def handlers(self) -> Handlers:
-        """Reads calls, and robots' words of their tasks."""
+        """Calls and robots' words."""
         return {TransportCall: self._on_call, StepState: self._on_state}
 
     def _on_call(self, event: Event[TransportCall]) -> None:
@@ -172,7 +172,7 @@ class RoundsGoDown(Rule):
         self._round: _RoundSeen | None = None
 
     def handlers(self) -> Handlers:
-        """Reads rounds, bids and awards of each step."""
+        """Rounds, bids and awards."""
         return {StepRound: self._on_round, TransportBid: self._on_bid, StepAward: self._on_award}
 
     def _on_round(self, event: Event[StepRound]) -> None:
@@ -235,7 +235,7 @@ class PathsApart(_OnFloor):
         self._paths: dict[int, _Told] = {}
 
     def handlers(self) -> Handlers:
-        """Reads the paths that robots publish."""
+        """Paths."""
         return {PathHead: self._on_head, PathMoves: self._on_moves}
 
     def _on_head(self, event: Event[PathHead]) -> None:

@@ -22,17 +22,17 @@ class _Factory:
 
 @dataclass(frozen=True)
 class UnitRobotFactory(_Factory):
-    """Makes robots that move in unit steps."""
+    """Makes robots."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> UnitRobot:
-        """A robot at the cell where its cart says that it stands."""
+        """The robot's steps."""
         return UnitRobot(fleet)
 
 
 @dataclass(frozen=True)
 class OrderDeskFactory(_Factory):
-    """Makes the site's one desk, which calls for tasks."""
+    """Makes the desk."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> OrderDesk:
-        """A desk that begins with the tasks of its journal."""
+        """The desk's steps."""
         return OrderDesk(fleet)

@@ -27,7 +27,7 @@ class BusClock:
         self.offset_us: int | None = None
 
     def feed(self, message: BusTime, time_us: int) -> None:
-        """Take up the time source's word at ``time_us`` of the log."""
+        """Take up one."""
         self.offset_us = time_us - message.bus_time_us
 
     def log_us(self, bus_ms: int, now_us: int) -> int | None:

@@ -70,7 +70,7 @@ class Calls:
         self._offers: dict[tuple[int, int], Call] = {}
 
     def feed(self, message: Message, time_us: int) -> None:
-        """Take up one message of the fleet bus, in order of time."""
+        """Take up one message."""
         match message:
             case BusTime():
                 self._offset_us = time_us - message.bus_time_us
