@@ -73,7 +73,7 @@ async def _measure(load: Load, seconds: float, faults: tuple[Fault, ...]) -> tup
 
 
 def main() -> None:
-    """Print the table."""
+    """Print a row for each load: frames per wall second on the simulated bus."""
     seconds = float(sys.argv[1]) if len(sys.argv) > 1 else DURATION_S
     fault = parse_fault("omission:receivers=3,probability=0.01,seed=7")
     rows: tuple[tuple[str, Load, tuple[Fault, ...]], ...] = (

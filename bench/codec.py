@@ -100,7 +100,7 @@ def rows() -> list[Row]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print a row for each message: us to encode and decode, here and with cantools, and the ratios aimed at."""
     print("| message | ours: encode us | cantools: encode us | ratio | ours: decode us | cantools: decode us | ratio |")
     print("|---|---|---|---|---|---|---|")
     every = rows()

@@ -27,7 +27,7 @@ def row(name: str, site: str, options: RunOptions) -> RunSummary:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print a row for each shipped site: how many times faster than real time its day is played."""
     print("| what runs | cars in/out | wall s | times real time | fleet frames | fleet frames/s |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:

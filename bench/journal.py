@@ -110,7 +110,7 @@ async def started(site: Site, node: int, entries: list[Entry]) -> tuple[int, flo
 
 
 def main() -> None:
-    """See above."""
+    """Take site, cars played and cars asked for from the command line; print a row for each machine."""
     name, cars, wanted = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     site = find_site(name)
     journals = played(site, name, cars)

@@ -109,8 +109,8 @@ async def measure(part: list[tuple[int, Frame]], folder: Path) -> None:
     await asyncio.sleep(1)
     calm = list(lines[hello:])
     seconds = (part[cut - 1][0] - part[0][0]) / 1e6
-    told = f"{len(site.machines)} machines, {len(gateway.links)} sessions, {seconds:.0f} s of its bus in real time"
-    print(f"site {SITE}: {told}")
+    shape = f"{len(site.machines)} machines, {len(gateway.links)} sessions, {seconds:.0f} s of its bus in real time"
+    print(f"site {SITE}: {shape}")
     print(f"frames                        {cut / seconds:8.1f} /s")
     print(f"publications                  {len(calm) / seconds:8.1f} /s")
     kinds = Counter(line.split(b" ", 2)[1].rsplit(b"/", 1)[1].decode() for line in calm)
@@ -121,8 +121,8 @@ async def measure(part: list[tuple[int, Frame]], folder: Path) -> None:
     middle, slow = statistics.median(delays), percentile(delays, 0.99)
     print(f"bus frame to broker's reader  {middle:8.1f} ms median, {slow:.1f} ms 99 %")
     for name, one in (("without", alone), ("with", beside)):
-        told = f"{one.median:.2f} ms median, {one.p99:.2f} ms 99 %, {one.most:.2f} ms most"
-        print(f"frames late, {name:<8} gateway  {told}")
+        delay = f"{one.median:.2f} ms median, {one.p99:.2f} ms 99 %, {one.most:.2f} ms most"
+        print(f"frames late, {name:<8} gateway  {delay}")
     await outage(part[cut:], gateway, mosquitto)
     gateway.stop()
     await running
@@ -183,8 +183,8 @@ def check_day(log: Path, site: str) -> int:
                 name = one.publication.topic.rsplit("/", 1)[1]
                 count[name] += 1
                 wrong += not validator(version, name).is_valid(content(one))
-        told = ", ".join(f"{name} {number}" for name, number in sorted(count.items()))
-        print(f"VDA 5050 {version}: {sum(count.values())} messages ({told}), {wrong} not valid; made in {took_s:.1f} s")
+        each = ", ".join(f"{name} {number}" for name, number in sorted(count.items()))
+        print(f"VDA 5050 {version}: {sum(count.values())} messages ({each}), {wrong} not valid; made in {took_s:.1f} s")
     return wrong
 
 

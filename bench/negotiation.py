@@ -332,7 +332,7 @@ def _print_slower_boards(calls: int) -> None:
 
 
 def main() -> None:
-    """Print the tables."""
+    """Print bids and messages for each protocol and fleet size; calls a row from the command line."""
     calls = int(sys.argv[1]) if len(sys.argv) > 1 else CALLS
     timing = alley(FLEETS[0]).timing
     print(

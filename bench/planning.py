@@ -177,7 +177,7 @@ class Fleet:
         return route, took_us
 
     def take(self, node: int, start_us: int, route: Route) -> None:
-        """Make a plan firm."""
+        """Make a plan that begins at ``start_us`` the node's firm itinerary, so that later plans go around it."""
         home = self.ends[node]
         legs = [Leg(LegAction.STAND, home.track, home.index, home.index, Side.NEAR, start_us // 1000)]
         legs += [

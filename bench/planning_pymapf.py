@@ -224,7 +224,7 @@ def measure(site: Site, peer: Peer, busy: int, legs: int, queries: int, seed: in
     return row, unsolved
 
 
-def told(row: Row, unsolved: int) -> list[str]:
+def figures_of(row: Row, unsolved: int) -> list[str]:
     """The figures of one row."""
     medians = [statistics.median(times) for times in (row.ours_us, row.plain_us, row.true_us)]
     ratios = [statistics.median(peer / ours for peer, ours in zip(times, row.ours_us, strict=True))
@@ -269,7 +269,7 @@ def main() -> None:
     print("  ".join(f"{head:>10}" for head in heads))
     for busy in (0, 8):
         for legs in (1, 2):
-            figures = told(*measure(site, peer, busy, legs, options.queries, options.seed))
+            figures = figures_of(*measure(site, peer, busy, legs, options.queries, options.seed))
             print("  ".join(f"{cell:>10}" for cell in (str(busy), str(legs), *figures)))
 
 

@@ -43,8 +43,8 @@ def report(runs: list[Measured]) -> list[str]:
 
 
 def _row(name: str, cells: Sequence[tuple[int | None, int | None]]) -> str:
-    told = [("-" if measured is None else _ms(measured), _ms(bound)) for measured, bound in cells]
-    return f"| {name} | " + " | ".join(text for pair in told for text in pair) + " |"
+    texts = [("-" if measured is None else _ms(measured), _ms(bound)) for measured, bound in cells]
+    return f"| {name} | " + " | ".join(text for pair in texts for text in pair) + " |"
 
 
 def _worst(run: Measured, *, at_start: bool) -> int:
@@ -71,7 +71,7 @@ def _summary(run: Measured) -> list[str]:
 
 
 def main() -> int:
-    """Command line."""
+    """Measure the named sites; exit status 1 where a measured response is longer than its bound."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sites", nargs="*", default=SITES, metavar="SITE")
     parser.add_argument("--minutes", type=float, default=60.0)

@@ -66,17 +66,17 @@ class Ear:
         """Nothing is ever said to the client."""
 
     def send(self, frame: Frame) -> bool:
-        """A client says something."""
+        """Take a frame of the controller under test; its first heartbeat ends the wait."""
         if fleet_codec().name_of(frame) == "Heartbeat" and not self.heard.done():
             self.heard.set_result(time.perf_counter())
         return True
 
     def health(self) -> BusHealth:
-        """Always well."""
+        """All counters 0: nothing is ever lost on this bus."""
         return BusHealth()
 
     async def close(self) -> None:
-        """A client leaves."""
+        """Nothing is held open for a client that leaves."""
 
 
 async def start_onboard(interface: str, *program: str) -> Start:
@@ -134,7 +134,7 @@ def _memory_mb(pid: int) -> tuple[float, float]:
 
 
 async def measure(runs: int) -> None:
-    """Print the table."""
+    """Start each process ``runs`` times; print median and worst of wall s and peak MB."""
     print(f"median of {runs} runs, worst in brackets; aims {AIM_S} s and {AIM_MB:.0f} MB")
     print("| process | wall s | peak MB | PSS MB |")
     print("|---|---|---|---|")

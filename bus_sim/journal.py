@@ -55,7 +55,7 @@ class SimulatedJournal:
 
     @property
     def has_grown(self) -> bool:
-        """As in the port."""
+        """Whether the medium is beyond ``least_bytes``."""
         return self._tail is not None and self._tail.end > self.least_bytes
 
     def replay(self) -> list[Entry]:
@@ -84,7 +84,7 @@ class SimulatedJournal:
         self._written()
 
     async def compact(self, fewer: Compaction) -> None:
-        """As in the port, after ``COMPACT_US``."""
+        """Write anew, which takes ``COMPACT_US`` of virtual time. Raises ``OSError`` where it is not reliable."""
         if self._tail is None:
             raise OSError(errno.EIO, self.condition.why or "replay() comes first")
         await self._write(COMPACT_US)
@@ -94,14 +94,14 @@ class SimulatedJournal:
         self._written()
 
     async def renew(self, entries: Iterable[Entry]) -> None:
-        """As in the port, after ``COMPACT_US``."""
+        """Begin anew with ``entries``, which takes ``COMPACT_US`` of virtual time; the old ones are gone."""
         await self._write(COMPACT_US)
         self._write_whole(entries)
         self.condition = JournalCondition()
         self._written()
 
     async def close(self) -> None:
-        """Nothing to give back."""
+        """The medium is memory, so there is nothing to give back."""
 
     def after_power_cut(self) -> "SimulatedJournal":
         """What the next controller finds: a write under way is lost, and does not come later either."""

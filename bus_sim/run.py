@@ -52,13 +52,13 @@ class NoWatchdog:
     """A supervisor that looks away."""
 
     def ready(self) -> None:
-        """Nothing to tell."""
+        """Nobody is told that start-up is over."""
 
     def alive(self) -> None:
-        """Nothing to tell."""
+        """Nobody is told of progress, and nobody restarts the controller."""
 
     def status(self, text: str) -> None:
-        """Nothing to tell."""
+        """The line goes to nobody."""
 
 
 class PlantPort(Protocol):
@@ -181,7 +181,7 @@ class BusRun(Generic[PlantT]):
         return [one.holon.machine.name for one in self.controllers.values() if one.rest.is_broken]
 
     def close(self) -> None:
-        """Finish the log."""
+        """Finish the log, where one is written."""
         if self.writer is not None:
             self.writer.close()
 

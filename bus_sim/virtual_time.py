@@ -46,7 +46,7 @@ class Clock(Protocol):
     """A clock and calls at chosen times, in whole microseconds; calls of equal time are made in the order asked for."""
 
     def now_us(self) -> int:
-        """The present time."""
+        """The present in whole us, from an origin of the clock's own."""
 
     def at_us(self, when_us: int, callback: Callable[[int], None]) -> None:
         """Call ``callback(when_us)`` at ``when_us``, or as soon as possible where that is past. Cannot be cancelled."""
@@ -120,7 +120,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         return self._now_us / 1e6
 
     def now_us(self) -> int:
-        """Virtual microseconds."""
+        """Virtual time since the loop was made, in whole us."""
         return self._now_us
 
     def set_pace(self, pace: float | None) -> None:
@@ -146,7 +146,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         self._anchor = (time.monotonic(), self._now_us)
 
     def at_us(self, when_us: int, callback: Callable[[int], None]) -> None:
-        """See ``Clock``; about twice as fast as ``call_at``."""
+        """Call ``callback(when_us)`` at a virtual time; about twice as fast as ``call_at``."""
         heapq.heappush(self._timers, (max(when_us, self._now_us), next(self._sequence), None, callback))
 
     def call_at(
@@ -164,7 +164,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         return timer
 
     def stop(self) -> None:
-        """As asyncio's."""
+        """End ``run_forever`` after this turn, also from a wait for the wall clock."""
         self._stop_asked = True
         super().stop()
 
@@ -387,7 +387,7 @@ class LoopClock:
         return max(self._floor_us, now_us(self._loop))
 
     def at_us(self, when_us: int, callback: Callable[[int], None]) -> None:
-        """See ``Clock``."""
+        """Call ``callback(when_us)`` at this time of the loop, which may wake some us early."""
         self._loop.call_at(when_us / 1e6, self._call, when_us, callback)
 
     def _call(self, when_us: int, callback: Callable[[int], None]) -> None:

@@ -50,7 +50,7 @@ def release(secret: Path) -> Release:
 
 @pytest.fixture(scope="session")
 def image(release: Release, tmp_path_factory: pytest.TempPathFactory) -> Image:
-    """The image, freshly built."""
+    """One image for all tests of a session: to build it takes minutes."""
     return build_image(Path(tmp_path_factory.mktemp("image")) / "onboard.img", release)
 
 

@@ -31,14 +31,14 @@ def write_replacement(card: Path, journal: Path | None, to: Path) -> list[str]:
     files = [config.file, site, *(file for form in _KEYS for file in sorted(card.glob(form)))]
     for file in files:
         shutil.copyfile(file, folder / file.name)
-    told = [str(folder / file.name) for file in files]
+    lines = [str(folder / file.name) for file in files]
     if journal is None:
         return [
-            *told,
+            *lines,
             f"{name} has no journal: it holds until a person has regenerated its rights: docs/operate.md, regenerate",
         ]
     records = _take_over(journal, folder / "journal", journal_owner(config.site, config.machine))
-    return [*told, f"{folder / 'journal'}: {records} records of {name}, in order; the old board must not start again"]
+    return [*lines, f"{folder / 'journal'}: {records} records of {name}, in order; the old board must not start again"]
 
 
 def _take_over(journal: Path, to: Path, owner: str) -> int:

@@ -87,7 +87,7 @@ class Resources:
 
 @dataclass(frozen=True)
 class Target:
-    """One device under test."""
+    """One device under test: which machine of the site it is, how it is reached, and what can be done to it."""
 
     machine: Machine
     kind: TargetKind

@@ -48,7 +48,7 @@ class BoardDevice:
             self._bridges.append(bridge)
 
     async def power_on(self, site_text: str) -> None:
-        """See ``Device``."""
+        """Install both files with the bench's command where it has one, then switch the supply on."""
         files = self._resources.files
         if files is not None:
             text = machine_text(
@@ -61,32 +61,32 @@ class BoardDevice:
         await self._switch(Capability.POWER, on=True)
 
     async def power_off(self) -> None:
-        """See ``Device``."""
+        """Switch the supply off; without a switch for it nothing happens."""
         await self._switch(Capability.POWER, on=False)
 
     async def unplug(self) -> None:
-        """See ``Device``."""
+        """Open the relay in the cable of the fleet bus; without one nothing happens."""
         await self._switch(Capability.CABLE, on=False)
 
     async def plug(self) -> None:
-        """See ``Device``."""
+        """Close the relay in the cable of the fleet bus; without one nothing happens."""
         await self._switch(Capability.CABLE, on=True)
 
     async def force_bus_off(self) -> None:
-        """See ``Device``."""
+        """Short the fleet bus by the bench's command, and end that by its second one."""
         await self._switch(Capability.BUS_OFF, on=True)
         await self._switch(Capability.BUS_OFF, on=False)
 
     async def console(self) -> str:
-        """See ``Device``."""
+        """What the bench's command reads from the board's console, as the board has kept it."""
         return await _run(self._resources.readers[Capability.CONSOLE])
 
     async def counters(self) -> BusHealth:
-        """See ``Device``."""
+        """What the board's own ``ip link`` tells of its interface. Raises ``BenchError`` for any other text."""
         return read_counters(await _run(self._resources.readers[Capability.COUNTERS]))
 
     async def close(self) -> None:
-        """See ``Device``."""
+        """Close the bridges to the real interfaces, then switch the board off."""
         for bridge in self._bridges:
             await bridge.close()
         if Capability.POWER in self._resources.switches:

@@ -30,13 +30,13 @@ class Cable:
     # --- ports.Bus ---------------------------------------------------------------------------------------------
 
     def subscribe(self, on_frame: FrameHandler, on_sent: FrameHandler | None = None) -> None:
-        """See ``Bus``."""
+        """Also for each later node: handlers are handed on whenever the plug is put in."""
         self._handlers.append((on_frame, on_sent))
         if self.node is not None:
             self.node.subscribe(on_frame, on_sent)
 
     def send(self, frame: Frame) -> bool:
-        """See ``Bus``."""
+        """Queue in the node, or here while the plug is out; False, and counted, beyond ``QUEUE_LIMIT`` frames."""
         if self.node is not None:
             return self.node.send(frame)
         if self._closed or len(self._waiting) >= QUEUE_LIMIT:
@@ -60,7 +60,7 @@ class Cable:
         )
 
     async def close(self) -> None:
-        """See ``Bus``."""
+        """Leave for good: a plug that is put in afterwards joins no bus."""
         self._closed = True
         if self.node is not None:
             await self.node.close()

@@ -22,7 +22,7 @@ class Device(Protocol):
         """Pull its plug on the fleet bus."""
 
     async def plug(self) -> None:
-        """Put the plug back."""
+        """Put its plug on the fleet bus back in."""
 
     async def force_bus_off(self) -> None:
         """Destroy its frames until it is off the bus, then leave the bus alone."""

@@ -26,8 +26,8 @@ class Judgement:
 
 def judge(stage: Stage, scenario: Scenario, counters: BusHealth | None) -> Judgement:
     """Look at all that a run has left behind."""
-    told = stage.own(Diagnostic)
-    drops = {one.message.reason: one.message.count for one in told}
+    diagnostics = stage.own(Diagnostic)
+    drops = {one.message.reason: one.message.count for one in diagnostics}
     faults = [
         *_of_counters(counters, scenario),
         *(

@@ -14,7 +14,7 @@ class Notice:
         self._news = asyncio.Event()
 
     def tell(self) -> None:
-        """There is something new."""
+        """Make whoever waits look again."""
         self._news.set()
 
     async def until(self, look: Callable[[], T | None], within_s: float) -> T | None:

@@ -34,45 +34,45 @@ class ProcessDevice:
         self._process: Process | None = None
 
     async def open(self) -> None:
-        """Serve the buses."""
+        """Serve the simulated buses on a free port of this computer; the process joins them in ``power_on``."""
         self._port = await self._server.start()
 
     async def power_on(self, site_text: str) -> None:
-        """See ``Device``."""
+        """Write both files and start ``onboard``; the journal in the directory is that of its former life."""
         name = self._machine.name
         (self._directory / "site.toml").write_text(site_text, encoding="utf-8")
         (self._directory / f"{name}.toml").write_text(machine_file(name, _HOST, self._port), encoding="utf-8")
         self._process = await start_machine(self._directory, name)
 
     async def power_off(self) -> None:
-        """See ``Device``."""
+        """Kill the process (SIGKILL), which leaves the journal as a power cut would."""
         process, self._process = self._process, None
         if process is not None and process.returncode is None:
             process.kill()
             await process.wait()
 
     async def unplug(self) -> None:
-        """See ``Device``."""
+        """Take the process's node off the simulated bus; its connection to the server stays."""
         self._cable.unplug()
 
     async def plug(self) -> None:
-        """See ``Device``."""
+        """Attach a new node for the process's connection, and send what waited."""
         self._cable.plug()
 
     async def force_bus_off(self) -> None:
-        """See ``Device``."""
+        """Short the simulated bus in each of its frames until it is bus-off."""
         await self._short.force_bus_off()
 
     async def console(self) -> str:
-        """See ``Device``."""
+        """Its standard output and error, of all its lives."""
         return log_of(self._directory, self._machine.name).read_text(encoding="utf-8", errors="replace")
 
     async def counters(self) -> BusHealth:
-        """See ``Device``."""
+        """Those of its simulated node: the process itself sees only TCP."""
         return self._cable.health()
 
     async def close(self) -> None:
-        """See ``Device``."""
+        """End the process in order within ``GRACE_S``, else by SIGKILL, then the server."""
         process = self._process
         if process is not None and process.returncode is None:
             with contextlib.suppress(ProcessLookupError):

@@ -31,7 +31,7 @@ class SimulatedDevice:
         self._former: list[Controller] = []
 
     async def power_on(self, site_text: str) -> None:
-        """See ``Device``."""
+        """Start a controller from what the journal holds, as the program on a board does."""
         simulation, machine = self._simulation, self._machine
         site = parse_site(site_text, "site.toml")
         entries = self._journal.replay()
@@ -54,7 +54,7 @@ class SimulatedDevice:
         self._controller.start()
 
     async def power_off(self) -> None:
-        """See ``Device``; a journal write under way is lost."""
+        """Cut both cables and forget the controller; a journal write under way is lost."""
         controller, self._controller = self._controller, None
         if controller is None or self._cables is None:
             return
@@ -65,31 +65,31 @@ class SimulatedDevice:
         self._journal = self._journal.after_power_cut()
 
     async def unplug(self) -> None:
-        """See ``Device``."""
+        """Pull the cable of the fleet bus; the device bus stays."""
         assert self._cables is not None
         self._cables[0].unplug()
 
     async def plug(self) -> None:
-        """See ``Device``."""
+        """Put the cable of the fleet bus back; what waited is sent late."""
         assert self._cables is not None
         self._cables[0].plug()
 
     async def force_bus_off(self) -> None:
-        """See ``Device``."""
+        """Short the simulated bus in each of its frames until it is bus-off."""
         await self._short.force_bus_off()
 
     async def console(self) -> str:
-        """See ``Device``."""
+        """Its lines in the simulation's log, each with its time in s."""
         name = self._machine.name
         return "\n".join(f"{us / 1e6:.3f} {who}: {text}" for us, who, text in self._simulation.log.lines if who == name)
 
     async def counters(self) -> BusHealth:
-        """See ``Device``."""
+        """Those of the cable on the fleet bus, since the last ``power_on``."""
         assert self._cables is not None
         return self._cables[0].health()
 
     async def close(self) -> None:
-        """See ``Device``."""
+        """Cut the power, and let the controllers of all lives end their tasks."""
         await self.power_off()
         for controller in self._former:
             await controller.stop()

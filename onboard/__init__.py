@@ -1,3 +1,3 @@
 """On-board controllers for fleets of machines that run a site together with nobody in charge, over a CAN bus."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -52,8 +52,8 @@ class Life:
         """Tell how the last life ended, where that is worth telling."""
         last = self._lives.begin()
         self._befell = last.reason
-        if last.told:
-            self.tell(last.told)
+        if last.line:
+            self.tell(last.line)
 
     def tell(self, text: str) -> None:
         """One line for a person, on the console and as the service's state."""

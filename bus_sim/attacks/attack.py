@@ -38,7 +38,7 @@ class Attack:
         self.node = node
 
     def begin(self, now_us: int) -> None:
-        """It starts."""
+        """The attack begins at ``now_us``; from now on ``tick`` is called."""
 
     def hear(self, message: Message, now_us: int) -> None:
         """A message of somebody else."""
@@ -47,7 +47,7 @@ class Attack:
         """A frame of somebody else."""
 
     def tick(self, now_us: int) -> None:
-        """Called every ``TICK_US``."""
+        """Called every ``TICK_US`` while the attack is on."""
 
 
 class Tokens:

@@ -13,7 +13,7 @@ class Entry(NamedTuple):
     for_s: float = 60.0
 
     @property
-    def told(self) -> str:
+    def summary(self) -> str:
         """What it does, in one line."""
         return (self.attack.__doc__ or "").splitlines()[0]
 

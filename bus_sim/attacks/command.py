@@ -42,11 +42,11 @@ attacks:
 
 
 def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The subcommand."""
+    """Add ``attack`` to the commands of ``bus-sim``, with its options."""
     parser = commands.add_parser(
         "attack",
         help="attack a site by a node that sees only the bus",
-        description=HELP + "\n".join(f"  {name:<14} {entry.told}" for name, entry in ATTACKS.items()),
+        description=HELP + "\n".join(f"  {name:<14} {entry.summary}" for name, entry in ATTACKS.items()),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("site", help="name of a shipped site, or a site file")
@@ -126,7 +126,7 @@ def table(site: str, attacks: Sequence[str], results: Sequence[Result]) -> list[
 
 
 def to_json(plan: Plan, results: Sequence[Result]) -> dict[str, object]:
-    """Plain values for ``json.dump``."""
+    """The plan and one entry a run, as ``json.dump`` takes them; units stand in the keys."""
     return {
         "site": plan.site,
         "node": plan.node,

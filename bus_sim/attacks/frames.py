@@ -40,7 +40,7 @@ class BitOff(_Frames):
     """One frame in five is said again with one bit off."""
 
     def hear_frame(self, frame: Frame, now_us: int) -> None:
-        """See ``Attack``."""
+        """Say one frame in five again with one bit of its data turned."""
         if self.node.chance.random() < _SHARE:
             self.node.put(self.with_bit_off(self.as_mine(frame)))
 
@@ -53,11 +53,11 @@ class Mutated(_Frames):
         self._heard: deque[Frame] = deque(maxlen=500)
 
     def hear_frame(self, frame: Frame, now_us: int) -> None:
-        """See ``Attack``."""
+        """Keep the last 500 frames as material."""
         self._heard.append(frame)
 
     def tick(self, now_us: int) -> None:
-        """See ``Attack``."""
+        """Turn one to three bits each in frames that were heard; one in five also gets another identifier."""
         chance = self.node.chance
         for _ in range(_MUTATED if self._heard else 0):
             frame = chance.choice(self._heard)
@@ -78,17 +78,17 @@ class Replay(_Frames):
         self._to_say: deque[tuple[int, Frame]] = deque()
 
     def begin(self, now_us: int) -> None:
-        """See ``Attack``."""
+        """Take the frames of the last minute, and by how many us they are to come later."""
         self._shift_us = min(now_us, _PAST_US)
         self._to_say.extend(one for one in self._past if one[0] >= now_us - _PAST_US)
 
     def hear_frame(self, frame: Frame, now_us: int) -> None:
-        """See ``Attack``."""
+        """Record, until the attack begins."""
         if self._shift_us is None:
             self._past.append((now_us, frame))
 
     def tick(self, now_us: int) -> None:
-        """See ``Attack``."""
+        """Say what is due by now, in its old order and pace."""
         while self._to_say and self._shift_us is not None and self._to_say[0][0] + self._shift_us <= now_us:
             self.node.put(self.as_mine(self._to_say.popleft()[1]))
 
@@ -97,6 +97,6 @@ class Flood(Attack):
     """The identifier that wins every arbitration, back to back."""
 
     def tick(self, now_us: int) -> None:
-        """See ``Attack``."""
+        """Fill the transmit queue with frames of identifier 0."""
         for _ in range(_DEEP - self.node.waiting()):
             self.node.put(Frame(0, bytes(8)))

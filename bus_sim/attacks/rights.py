@@ -18,7 +18,7 @@ class _AboutTokens(Attack):
         self.tokens = Tokens()
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """Note the newest version and holder of each token that a message names."""
         self.tokens.hear(message)
 
     def grant(self, key: TokenKey, to: int, ahead: int = 1) -> None:
@@ -31,7 +31,7 @@ class GrantRefused(_AboutTokens):
     """Whoever was just refused a right is granted it."""
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """A refusal is followed by a forged grant under the next version."""
         super().hear(message, now_us)
         if isinstance(message, TokenRefusal):
             self.grant(TokenKey(message.token_kind, message.token), message.requester)
@@ -41,7 +41,7 @@ class GrantAsked(_AboutTokens):
     """Whoever asks for a right is granted it at once."""
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """A request is answered by a forged grant one to three versions ahead."""
         super().hear(message, now_us)
         if isinstance(message, TokenRequest):
             self.grant(
@@ -53,7 +53,7 @@ class GrantAway(_AboutTokens):
     """Rights that somebody asks for go to a holder who does not exist."""
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """A request is answered by a forged grant to the attacker itself, a thousand versions ahead."""
         super().hear(message, now_us)
         if isinstance(message, TokenRequest):
             self.grant(TokenKey(message.token_kind, message.token), self.node.node_id, ahead=1_000)
@@ -63,7 +63,7 @@ class Claim(_AboutTokens):
     """Whatever is granted, the attacker says at once that it holds it, under a newer version."""
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """A grant or a holder's word is answered by the attacker's own claim, one to three versions ahead."""
         super().hear(message, now_us)
         if isinstance(message, TokenGrant | TokenHeld):
             key = TokenKey(message.token_kind, message.token)
@@ -80,12 +80,12 @@ class SwapCars(Attack):
         self._due_us = 0
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """Note where each car was said to stand last."""
         if isinstance(message, CarAt):
             self._cars[message.car] = message
 
     def tick(self, now_us: int) -> None:
-        """See ``Attack``."""
+        """Every two seconds exchange the places of two cars by chance, under the present version and the next."""
         standing = [one for one in self._cars.values() if one.station not in (ANY_STATION, OUTSIDE)]
         if now_us < self._due_us or len(standing) < 2:
             return

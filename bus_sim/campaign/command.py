@@ -70,7 +70,7 @@ examples:
 
 
 def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The subcommand."""
+    """Add ``campaign`` to the commands of ``bus-sim``, with its options."""
     parser = commands.add_parser(
         "campaign",
         help="run a site under many seeds of faults",

@@ -156,7 +156,7 @@ class Moments:
         self._counts: dict[tuple[str, str], int] = defaultdict(int)
 
     def watch(self) -> None:
-        """Begin."""
+        """Count frames and journal writes from now on, and fork at each moment that was chosen."""
         for medium in (self._run.fleet, *self._run.devices.values()):
             medium.tap_queues(self._on_queue)
         for node, journal in self._run.journals.items():

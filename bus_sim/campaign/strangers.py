@@ -70,7 +70,7 @@ class Pair:
         return served and not self.strange.broken and self.longer_s <= MOST_LONGER_S
 
     def line(self) -> str:
-        """One line for people."""
+        """Served, told and waiting with the stranger, and the change of the mean wait in s, as one line."""
         one, other = self.strange, self.without
         told = f"served {one.served} of {other.served}, told {one.told}, waiting {one.waiting}"
         head = f"{'' if self.is_good else 'FAILED '}seed {self.seed}: {told}, mean wait"
@@ -84,7 +84,7 @@ def play_pairs(plan: StrangerPlan, seeds: range, jobs: int) -> Iterator[Pair]:
 
 
 def play_pair(plan: StrangerPlan, seed: int) -> Pair:
-    """One seed."""
+    """Play one seed with the stranger, and again with that machine left out."""
     site = find_site(plan.site)
     return Pair(seed, _play(plan, site, seed, strange=True), _play(plan, site, seed, strange=False))
 

@@ -94,7 +94,7 @@ def _failures(results: Sequence[Result]) -> list[str]:
 
 
 def to_json(plan: Plan, results: Sequence[Result]) -> dict[str, object]:
-    """Plain values for ``json.dump``."""
+    """The plan and one entry a run, as ``json.dump`` takes them; units stand in the keys."""
     return {
         "site": plan.site,
         "profile": plan.profile,

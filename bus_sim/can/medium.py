@@ -129,7 +129,7 @@ class Medium:
         return self._meter.snapshot(self.clock.now_us())
 
     def restart_statistics(self) -> None:
-        """Count from now on."""
+        """Count frames and load from this moment on, as before an hour that is to be measured."""
         self._meter = LoadMeter(self.bit_rate, self.clock.now_us())
 
     @property

@@ -156,7 +156,7 @@ class SimulatedBus:
     # --- ports.Bus ---------------------------------------------------------------------------------------------
 
     def subscribe(self, on_frame: FrameHandler, on_sent: FrameHandler | None = None) -> None:
-        """See ``Bus``; several subscribers are served in order."""
+        """Serve one more subscriber; several are called in the order in which they came."""
         self.frame_handlers.append(on_frame)
         if on_sent is not None:
             self._sent_handlers.append(on_sent)

@@ -67,7 +67,7 @@ class BusDeviceLink:
                 self.send_refused += 1
 
     def subscribe(self, on_message: MessageHandler) -> None:
-        """Add a subscriber."""
+        """Hand every message that reaches the device to one more handler."""
         self._handlers.append(on_message)
 
     def _on_frame(self, frame: Frame, time_us: int) -> None:

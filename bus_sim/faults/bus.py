@@ -165,7 +165,7 @@ class NoDevices:
     name = "nothing"
 
     def subscribe(self, on_frame: FrameHandler, on_sent: FrameHandler | None = None) -> None:
-        """Nobody will ever call."""
+        """No handler is ever called: nobody else is on this bus."""
 
     def send(self, frame: Frame) -> bool:
         """Taken, and heard by nobody."""
@@ -176,7 +176,7 @@ class NoDevices:
         return BusHealth(ErrorState.ERROR_ACTIVE, 0, 0, 0, 0, 0, 0)
 
     async def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing was opened, so there is nothing to give back."""
 
 
 def double_id(simulation: BusRun[Any], injection: Injection) -> None:

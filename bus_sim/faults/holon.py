@@ -37,14 +37,14 @@ class FaultyHolon(Holon):
         self._ppm = self._ppm if ppm is None else ppm
 
     def receive(self, message: Message, local_us: int) -> list[Effect]:
-        """See ``Holon``."""
+        """Keep the message while paused; else hand it on at the time of the faulty clock."""
         if self._held is not None and local_us < self._paused_until_us:
             self._hold(message, is_device=False)
             return []
         return self._resume(local_us) + super().receive(message, self._own_us(local_us))
 
     def sense(self, message: Message, local_us: int) -> list[Effect]:
-        """See ``Holon``."""
+        """Keep the device's message while paused; else hand it on at the time of the faulty clock."""
         if self._held is not None and local_us < self._paused_until_us:
             self._hold(message, is_device=True)
             return []
@@ -58,11 +58,11 @@ class FaultyHolon(Holon):
         return effects + self._resume(local_us)
 
     def start(self, local_us: int) -> list[Effect]:
-        """See ``Holon``."""
+        """Start at the time of the faulty clock."""
         return super().start(self._own_us(local_us))
 
     def bus_us(self, local_us: int) -> int:
-        """See ``Holon``."""
+        """Bus time in us as this machine believes it, by its faulty clock."""
         return super().bus_us(self._own_us(local_us))
 
     def next_wake(self) -> int | None:

@@ -11,7 +11,7 @@ Value = str | int | float
 
 
 class Group(StrEnum):
-    """Where a fault strikes."""
+    """Where a fault strikes; the table of a campaign counts by it."""
 
     BUS = "bus"
     CONTROLLER = "controller"
@@ -32,10 +32,10 @@ class Setting(NamedTuple):
 
 
 class Kind(NamedTuple):
-    """One kind of fault."""
+    """One kind of fault: where it strikes, what it does in one line of help, and its settings by name."""
 
     group: Group
-    told: str
+    summary: str
     settings: Mapping[str, Setting]
 
 

@@ -64,20 +64,20 @@ class Session(asyncio.Protocol):
     # --- asyncio's side ----------------------------------------------------------------------------------------
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """As asyncio asks."""
+        """Greet the client with ``hi``; it has opened no bus yet."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         self._counts["clients"] += 1
         self._say("hi")
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """As asyncio asks."""
+        """Give the client's node back, whoever ended the connection."""
         self._transport = None
         self._release()
         self._on_end(self, self._bus)
 
     def data_received(self, data: bytes) -> None:
-        """As asyncio asks."""
+        """Carry out every whole message; bytes that are none are counted and answered with an error."""
         garbage = self._splitter.garbage
         messages = self._splitter.feed(data)
         for _ in range(self._splitter.garbage - garbage):

@@ -167,11 +167,11 @@ class Answered(Protocol):
 
     @property
     def begun_us(self) -> int:
-        """When it came."""
+        """When the order came, loop time in us."""
 
     @property
     def ended_us(self) -> int | None:
-        """When it was over."""
+        """When it was over, loop time in us; None while it is not."""
 
 
 class Ended(NamedTuple):

@@ -73,17 +73,17 @@ class RunSource:
         return {**self.picture.layout(), "commands": sorted(self.acts)}
 
     def snapshot(self) -> dict[str, Any]:
-        """As in the port."""
+        """The picture at the present virtual time, with the run's pace (virtual s to a wall s, 0 while paused)."""
         self.picture.view.now_us = self._run.loop.now_us()
         pace = 0 if self._paused else self._run.loop.pace or MOST_SPEED
         return {**self.picture.snapshot(), "pace": pace, "zero_s": self._zero_s}
 
     def figures(self) -> dict[str, Any]:
-        """As in the port."""
+        """The indicators of the run so far."""
         return self.picture.figures()
 
     async def command(self, name: str, arguments: Arguments) -> str:
-        """As in the port."""
+        """Carry out one command and tell what it did. Raises ``CommandError`` for one that there is not."""
         act = self.acts.get(name)
         if act is None:
             raise CommandError(f"{name}: no such command; there are {', '.join(sorted(self.acts))}")

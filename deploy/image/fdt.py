@@ -39,7 +39,7 @@ class Node:
         return list(struct.unpack(f">{len(raw) // 4}I", raw))
 
     def text(self, name: str) -> str:
-        """A property as text."""
+        """A property as text, without the zero byte at its end. Raises ``KeyError`` where there is none of the name."""
         return self.properties[name].rstrip(b"\0").decode()
 
 

@@ -143,10 +143,10 @@ def _controller(chip: Chip, place: Place) -> list[_Fragment]:
     crystal = f'compatible = "fixed-clock"; #clock-cells = <0>; clock-frequency = <{chip.crystal_hz}>;'
     pins = f"brcm,pins = <{place.interrupt}>; brcm,function = <0>;"
     # 8: a low level (IRQ_TYPE_LEVEL_LOW), as both chips hold their pin down until all is read.
-    told = f'compatible = "microchip,{chip.name}"; reg = <{place.select}>; clocks = <&{key}_osc>;'
-    told += f" spi-max-frequency = <{chip.spi_hz}>; interrupt-parent = <&gpio>; interrupts = <{place.interrupt} 8>;"
-    told += f' pinctrl-names = "default"; pinctrl-0 = <&{key}_pins>;'
-    device = f"{key}: {chip.name}@{place.select} {{ {told} }};"
+    values = f'compatible = "microchip,{chip.name}"; reg = <{place.select}>; clocks = <&{key}_osc>;'
+    values += f" spi-max-frequency = <{chip.spi_hz}>; interrupt-parent = <&gpio>; interrupts = <{place.interrupt} 8>;"
+    values += f' pinctrl-names = "default"; pinctrl-0 = <&{key}_pins>;'
+    device = f"{key}: {chip.name}@{place.select} {{ {values} }};"
     return [
         _Fragment(f'target-path = "/"; __overlay__ {{ {key}_osc: {named}-osc {{ {crystal} }}; }};'),
         _Fragment(f"target = <&gpio>; __overlay__ {{ {key}_pins: {named}-pins {{ {pins} }}; }};"),

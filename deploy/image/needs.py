@@ -38,13 +38,13 @@ def check_needs(base: Path, *, is_root: bool) -> None:
     """Raise ``DeployError`` with everything that is missing. ``base`` is Debian's root file system, once it is made."""
     wanted = PACKAGES if base.exists() else {**PACKAGES, **BASE_PACKAGES}
     missing = missing_of(wanted)
-    told = []
+    remedies = []
     if missing:
-        told.append(f"apt-get install {' '.join(missing)}")
+        remedies.append(f"apt-get install {' '.join(missing)}")
     if not base.exists() and not is_root:
-        told.append("run this as root, with sudo: mmdebstrap makes the root file system")
-    if told:
-        raise DeployError(f"this computer cannot build an image yet: {'; '.join(told)}")
+        remedies.append("run this as root, with sudo: mmdebstrap makes the root file system")
+    if remedies:
+        raise DeployError(f"this computer cannot build an image yet: {'; '.join(remedies)}")
 
 
 def missing_of(wanted: dict[str, str], there: Collection[str] | None = None) -> list[str]:

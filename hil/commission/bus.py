@@ -84,8 +84,8 @@ async def digests(setting: Setting) -> bool:
     ours = f"contract {CONTRACT_VERSION}, site {setting.site.digest:04X}"
     if not wrong:
         return setting.note("digests", f"all have {ours}", passed=True)
-    told = ", ".join(f"{_name(setting, node)} {what}" for node, what in sorted(wrong.items()))
-    return setting.note("digests", f"here {ours}, but {told}: give all the same site file", passed=False)
+    others = ", ".join(f"{_name(setting, node)} {what}" for node, what in sorted(wrong.items()))
+    return setting.note("digests", f"here {ours}, but {others}: give all the same site file", passed=False)
 
 
 async def joins(setting: Setting) -> bool:
@@ -95,8 +95,8 @@ async def joins(setting: Setting) -> bool:
     beat = await setting.fleet.first(Heartbeat, JOIN_S, setting.is_own, since)
     if beat is None:
         return setting.note("joins", f"no heartbeat within {JOIN_S:g} s", passed=False)
-    told = (beat.contract, beat.site_digest, beat.kind)
-    if told != (CONTRACT_VERSION, setting.site.digest, setting.machine.kind):
+    heard = (beat.contract, beat.site_digest, beat.kind)
+    if heard != (CONTRACT_VERSION, setting.site.digest, setting.machine.kind):
         detail = f"it tells contract {beat.contract}, site {beat.site_digest:04X}, kind {beat.kind.name.lower()}"
         return setting.note("joins", detail, passed=False)
 

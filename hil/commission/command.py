@@ -6,7 +6,7 @@ import sys
 from datetime import datetime
 from pathlib import Path
 
-from hil.commission.ears import Ears
+from hil.commission.listener import BusListener
 from hil.commission.person import ConsolePerson
 from hil.commission.protocol import Protocol
 from hil.commission.setting import Setting
@@ -85,7 +85,12 @@ async def _commission(config: MachineConfig, settings: BusSettings) -> Protocol:
             datetime.now().astimezone().isoformat(sep=" ", timespec="seconds"),
         )
         setting = Setting(
-            site, machine, Ears(fleet, contract.fleet), Ears(devices, contract.device), ConsolePerson(), protocol
+            site,
+            machine,
+            BusListener(fleet, contract.fleet),
+            BusListener(devices, contract.device),
+            ConsolePerson(),
+            protocol,
         )
         await walk(setting)
         return protocol

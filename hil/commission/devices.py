@@ -46,14 +46,14 @@ Step = Callable[[Setting], Awaitable[bool]]
 # --- sensors -------------------------------------------------------------------------------------------------------
 
 
-def _senses(kind: type[Message], name: str, told: Callable[[Message], str]) -> Step:
+def _senses(kind: type[Message], name: str, in_words: Callable[[Message], str]) -> Step:
     """A step that waits for a state and asks whether it is true."""
 
     async def step(setting: Setting) -> bool:
         state = await setting.devices.first(kind, REPEAT_S, setting.is_own)
         if state is None:
             return setting.note(name, f"it has not said anything within {REPEAT_S:g} s", passed=False)
-        what = told(state)
+        what = in_words(state)
         true = await is_yes(setting.person, f"The {name} says: {what}. Is that so?")
         return setting.note(name, f"{what}: {'confirmed' if true else 'not so'}", passed=true)
 
@@ -121,9 +121,9 @@ async def drive(setting: Setting) -> bool:
 
 async def shuttle(setting: Setting) -> bool:
     """The order to retract, which moves nothing where it is home already."""
-    told = await setting.devices.first(ShuttleState, REPEAT_S, setting.is_own)
+    shuttle = await setting.devices.first(ShuttleState, REPEAT_S, setting.is_own)
     since = setting.devices.mark()
-    number = successor(told.sequence, 8) if told is not None else setting.sequence()
+    number = successor(shuttle.sequence, 8) if shuttle is not None else setting.sequence()
     order = ShuttleOrder(setting.machine.node_id, number, ShuttleAction.RETRACT, Side.NEAR, 0)
     setting.devices.say(order)
     home = await setting.devices.first(
@@ -152,7 +152,7 @@ async def doors(setting: Setting) -> bool:
 
 
 async def light_and_desk(setting: Setting) -> bool:
-    """What a customer sees."""
+    """A person confirms that the light turns green and then red, and that the desk shows what it was told to."""
     setting.devices.say(LightOrder(setting.machine.node_id, LightColour.GREEN))
     setting.devices.say(DeskOrder(setting.machine.node_id, setting.sequence(), DeskText.OUT_OF_ORDER, NO_REFERENCE))
     green = await setting.devices.first(
@@ -161,8 +161,8 @@ async def light_and_desk(setting: Setting) -> bool:
     seen = await is_yes(setting.person, 'Is the light green, and does the desk say "out of order"?')
     setting.devices.say(LightOrder(setting.machine.node_id, LightColour.RED))
     red = await is_yes(setting.person, "Is the light red now?")
-    told = f"green {'told' if green else 'not told'}, {'seen' if seen and red else 'not seen'}"
-    return setting.note("light and desk", told, passed=green is not None and seen and red)
+    detail = f"green {'told' if green else 'not told'}, {'seen' if seen and red else 'not seen'}"
+    return setting.note("light and desk", detail, passed=green is not None and seen and red)
 
 
 async def _order_door(setting: Setting, door: DoorName, action: DoorAction, wanted: DoorPosition) -> bool:

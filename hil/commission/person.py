@@ -10,33 +10,33 @@ YES, NO = frozenset({"y", "yes"}), frozenset({"n", "no"})
 TRIES = 3
 
 
-class PersonGoneError(Exception):
+class NoAnswerError(Exception):
     """Nobody answers any more: the terminal or the pipe has ended."""
 
 
 class Person(Protocol):
-    """Who answers."""
+    """The one who stands at the machine, reads what is shown and answers questions."""
 
     def tell(self, text: str) -> None:
-        """Show a line."""
+        """Show one line without waiting for an answer."""
 
     async def ask(self, question: str) -> str:
-        """One line, without white space around it. Raises ``PersonGoneError``."""
+        """One line, without white space around it. Raises ``NoAnswerError``."""
 
 
 class ConsolePerson:
     """Standard input and output; the loop goes on while the person thinks."""
 
     def tell(self, text: str) -> None:
-        """See ``Person``."""
+        """Print one line, at once even into a pipe."""
         print(text, flush=True)
 
     async def ask(self, question: str) -> str:
-        """See ``Person``."""
+        """Wait in a thread for a line of standard input; from a pipe the answer is printed too, for the record."""
         print(f"{question} ", end="", flush=True)
         line: str = await asyncio.to_thread(sys.stdin.readline)
         if not line:
-            raise PersonGoneError
+            raise NoAnswerError
         if not sys.stdin.isatty():
             print(line.rstrip(), flush=True)
         return line.strip()

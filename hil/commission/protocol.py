@@ -8,7 +8,7 @@ _WIDTH = 100
 
 
 class Verdict(Enum):
-    """How a step ended."""
+    """How one step ended; a protocol is passed only where every step is."""
 
     PASSED = "passed"
     FAILED = "FAILED"
@@ -35,7 +35,7 @@ class Protocol:
     entries: list[Entry] = field(default_factory=list)
 
     def note(self, step: str, verdict: Verdict, detail: str) -> None:
-        """Add a line."""
+        """Add one step at the end; a step that is done again gets a further line."""
         self.entries.append(Entry(step, verdict, detail))
 
     @property

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from hil.commission.ears import Ears
+from hil.commission.listener import BusListener
 from hil.commission.person import Person
 from hil.commission.protocol import Protocol, Verdict
 from onboard.core.messages import DriveState, Message
@@ -19,8 +19,8 @@ class Setting:
 
     site: Site
     machine: Machine
-    fleet: Ears
-    devices: Ears
+    fleet: BusListener
+    devices: BusListener
     person: Person
     protocol: Protocol
     _sequence: int = 0

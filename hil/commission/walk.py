@@ -2,7 +2,7 @@
 
 from hil.commission import bus
 from hil.commission.devices import steps_for
-from hil.commission.person import PersonGoneError
+from hil.commission.person import NoAnswerError
 from hil.commission.setting import Setting
 
 #: What must be in order before anything is said on either bus.
@@ -19,7 +19,7 @@ async def walk(setting: Setting) -> None:
                 return
         await _try_devices(setting)
         await bus.joins(setting)
-    except PersonGoneError:
+    except NoAnswerError:
         setting.leave_out("all further steps", "nobody answers any more")
 
 

@@ -4,7 +4,7 @@ import json
 import socket
 import sys
 
-from hil.guest.ears import Ears
+from hil.guest.listener import BusListener
 from hil.guest.mesh import bring_up, run
 from hil.guest.site_run import TOOLS, SiteRun, play
 from onboard.core.codes import MachineState, TaskPhase
@@ -28,8 +28,8 @@ _TAKING_PART = (MachineState.IDLE, MachineState.WORKING, MachineState.WAITING)
 class Watch:
     """What the heartbeats of a site say, as they come."""
 
-    def __init__(self, ears: Ears, nodes: set[int]) -> None:
-        self.ears = ears
+    def __init__(self, listener: BusListener, nodes: set[int]) -> None:
+        self.listener = listener
         self._nodes = nodes
         self._decoder = Decoder(fleet_codec())
         self._read = 0
@@ -40,7 +40,7 @@ class Watch:
 
     def take(self) -> None:
         """Look at all that has come."""
-        frames = self.ears.frames
+        frames = self.listener.frames
         while self._read < len(frames):
             identifier, _, data = frames[self._read].partition("#")
             message = self._decoder.feed(Frame(int(identifier, 16), bytes.fromhex(data), len(identifier) > 3), 0)
@@ -63,7 +63,7 @@ class Watch:
 
     def forget(self) -> None:
         """From now on only news counts."""
-        self.ears.read()
+        self.listener.read()
         self.take()
         self._last.clear()
 
@@ -109,13 +109,13 @@ class Cycles:
         """Seconds of the guest from now on."""
         begin_s = self._site.now_s()
         self._watch.forget()
-        self._site.wait(self._watch.ears, what, self._watch.all_agree, LIMIT_S)
+        self._site.wait(self._watch.listener, what, self._watch.all_agree, LIMIT_S)
         return round(self._site.now_s() - begin_s, 1)
 
     def _pass_beats(self, name: str, beats: int) -> None:
         node, before = self._nodes[name], self._watch.count(self._nodes[name])
         what = f"{beats} heartbeats of {name}"
-        self._watch.ears.wait(what, lambda: self._watch.count(node) >= before + beats, LIMIT_S)
+        self._watch.listener.wait(what, lambda: self._watch.count(node) >= before + beats, LIMIT_S)
 
 
 def scene(site: SiteRun) -> dict[str, object]:
@@ -126,16 +126,16 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.connect()
     run("ip", "netns", "add", DRAWER)
     site.record()
-    watch = Watch(Ears(TOOLS), set(nodes.values()))
+    watch = Watch(BusListener(TOOLS), set(nodes.values()))
     cycles = Cycles(site, nodes, watch)
     site.start_machines()
     here, keys = socket.socketpair()
     site.start_plant(stdin=here.fileno())
     keys.send(b"i")
     # Rights to the car and to its place live through all cycles.
-    site.wait(watch.ears, "the car is in", watch.is_car_in, LIMIT_S)
+    site.wait(watch.listener, "the car is in", watch.is_car_in, LIMIT_S)
     cycles.wait_until_all_agree("all take part")
-    told = [cycles.play(number) for number in range(plan["cycles"])]
+    outcomes = [cycles.play(number) for number in range(plan["cycles"])]
     keys.send(b"o")
     # Closing it would not do: the machines that were forked since have it too.
     keys.shutdown(socket.SHUT_WR)
@@ -143,7 +143,7 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.tell("the plant's run is over")
     status |= site.end(list(nodes))
     site.end(["candump"])
-    return {"cycles": told, "status": status}
+    return {"cycles": outcomes, "status": status}
 
 
 if __name__ == "__main__":

@@ -58,11 +58,11 @@ class Forked:
         return status
 
     def terminate(self) -> None:
-        """Tell it to end."""
+        """Ask it to end (SIGTERM); harmless where it has ended."""
         self._signal(signal.SIGTERM)
 
     def kill(self) -> None:
-        """End it at once."""
+        """End it at once and without warning (SIGKILL); harmless where it has ended."""
         self._signal(signal.SIGKILL)
 
     def _signal(self, number: signal.Signals) -> None:

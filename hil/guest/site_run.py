@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bus_sim.cli import main as bus_sim
-from hil.guest.ears import Ears, NotHeardError
 from hil.guest.forked import Forked, Main
 from hil.guest.initrd import WORK
+from hil.guest.listener import BusListener, NotHeardError
 from hil.guest.mesh import Mesh, hand_out_boards, inside, join_pair, run
 from onboard.cli import main as onboard
 from onboard.config.site import parse_site
@@ -121,9 +121,9 @@ class SiteRun:
         """Run a person's program on the fleet bus to its end."""
         return run(*inside(TOOLS), *words)
 
-    def wait(self, ears: Ears, what: str, is_there: Callable[[], bool], limit_s: float) -> None:
+    def wait(self, listener: BusListener, what: str, is_there: Callable[[], bool], limit_s: float) -> None:
         """Wait for something that the bus tells, and put it into the story. Raises ``NotHeardError``."""
-        ears.wait(what, is_there, limit_s)
+        listener.wait(what, is_there, limit_s)
         self.tell(what)
 
     def tell(self, what: str) -> None:

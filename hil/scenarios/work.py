@@ -44,8 +44,8 @@ async def joins(stage: Stage) -> None:
     """The first heartbeat tells contract, site and kind; then all mirrors agree and the device is ready to work."""
     await stage.power_on()
     first = (await stage.first_own(Heartbeat, "heartbeat of the device", JOIN_S)).message
-    told = (first.contract, first.site_digest, first.kind)
-    assert told == (CONTRACT_VERSION, stage.site.digest, stage.machine.kind), f"the first heartbeat tells {told}"
+    heard = (first.contract, first.site_digest, first.kind)
+    assert heard == (CONTRACT_VERSION, stage.site.digest, stage.machine.kind), f"the first heartbeat tells {heard}"
     await stage.takes_part(JOIN_S)
 
 

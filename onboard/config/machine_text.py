@@ -21,7 +21,7 @@ class BusTable:
     extra: Mapping[str, Value] = field(default_factory=dict)
 
     def lines(self, name: str) -> list[str]:
-        """The table as TOML."""
+        """Header and keys as lines of TOML; ``name`` is that of the table."""
         values: dict[str, Value] = {"interface": self.interface, "channel": self.channel, **self.extra}
         return [f"[{name}]", *(f"{key} = {_written(value)}" for key, value in values.items())]
 

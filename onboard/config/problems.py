@@ -85,7 +85,7 @@ class Problems:
     found: list[Problem] = field(default_factory=list)
 
     def add(self, line: int, key: str, value: object, what: str, remedy: str) -> None:
-        """Note one mistake."""
+        """Note one mistake in ``line`` (from 1); ``what`` is wrong with the value, ``remedy`` mends it."""
         self.found.append(Problem(self.file, line, key, value, what, remedy))
 
     def in_order(self) -> list[Problem]:

@@ -36,7 +36,7 @@ class Rest:
         return f"the machine's wakes do not come to rest: {self.wakes} in a row, all due at {at_s:.6f} s or before"
 
     def woke(self, now_us: int) -> None:
-        """The machine is woken."""
+        """The machine is woken at loop time ``now_us``; ``due`` says afterwards when it is next."""
         self._woke_us = now_us
 
     def due(self, due_us: int) -> None:

@@ -68,7 +68,7 @@ class Fleet:
 
     @property
     def node_id(self) -> int:
-        """This machine's node-ID."""
+        """This machine's node-ID, 1 to 250."""
         return self.machine.node_id
 
 
@@ -79,7 +79,7 @@ class Behaviour(Protocol):
 
     @property
     def state(self) -> MachineState:
-        """What the heartbeat says."""
+        """What the heartbeat says of this machine; others plan around one that is STOPPED or OBSTACLE."""
 
     @property
     def itinerary_version(self) -> int:
@@ -125,7 +125,7 @@ class BehaviourFactory(Protocol):
         """The task-generation function of a machine of this kind."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
-        """The machine's steps."""
+        """What one machine does from power-up on; ``estimator`` is the one that this factory made for it."""
 
 
 class NoEstimator:
@@ -158,7 +158,7 @@ class Plain:
         return []
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """No devices."""
+        """Whatever its device bus says changes nothing."""
         return []
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
@@ -174,13 +174,13 @@ class Plain:
         return Reason.NONE
 
     def advance(self, now_us: int) -> list[Effect]:
-        """Nothing is ever due."""
+        """Nothing is ever due by itself."""
         return []
 
     def next_wake(self) -> int | None:
-        """Never."""
+        """None: it waits for no moment in time."""
         return None
 
     def statements(self, now_us: int) -> list[Effect]:
-        """Nothing to vouch for."""
+        """It has no itinerary and keeps no cars, so there is nothing to say again."""
         return []

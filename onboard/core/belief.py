@@ -36,7 +36,7 @@ class Beliefs:
     hints: dict[Key, Belief] = field(default_factory=dict)
 
     def of(self, key: Key) -> Belief:
-        """The newest verified belief."""
+        """The newest belief that was verified; before the token first moves, version 0 and its first holder."""
         return self.verified.get(key) or Belief(0, self.first_holder(key))
 
     def latest(self, key: Key) -> Belief:

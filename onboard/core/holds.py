@@ -72,10 +72,10 @@ class Holds:
         match outcome:
             case Outcome.HOLDS:
                 reason, cause, needs_person = self.holding.why
-                told = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
+                line = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
                 is_lasting = self.holding.hold is Hold.PERSON
                 record: list[Effect] = [Record(self.holding.record())] if is_lasting else []
-                return [*record, Report(told), *self.words()]
+                return [*record, Report(line), *self.words()]
             case Outcome.GOES_ON:
                 self.presence.listen_anew(now_us)
                 return [Report("goes on"), *self.words()]

@@ -57,7 +57,7 @@ from onboard.core.witness import Doubt, Witness
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100
 #: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
-_OF_FOREIGNERS = (EmergencyStop, Heartbeat, Progress)
+_HEARD_FROM_STRANGERS = (EmergencyStop, Heartbeat, Progress)
 #: All that a machine hears while it is apart: what may end that, who lives, and why others do not act.
 _WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat, Regeneration)
 
@@ -156,7 +156,7 @@ class Holon:
         self._heartbeat_due_us = now_us
         self.presence.begins(now_us)
         if self.journal.is_foreign:
-            return [Report(self.journal.told), *self._beat(now_us)]
+            return [Report(self.journal.line), *self._beat(now_us)]
         effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self._beat(now_us)
         return self._settle(effects + self.witness.begin(now_us), now_us)
 
@@ -165,7 +165,7 @@ class Holon:
         boot = BootRecord(self.boot)
         if journal.is_reliable:
             return [Record(boot)]
-        return [Renew((*self.fleet.entries, boot.entry, self.holding.record().entry)), Report(journal.told)]
+        return [Renew((*self.fleet.entries, boot.entry, self.holding.record().entry)), Report(journal.line)]
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""
@@ -189,7 +189,7 @@ class Holon:
             return self._on_bus_time(message, local_us)
         if self.holding.is_apart and not isinstance(message, _WHILE_APART):
             return []
-        if message.sender in self.presence.foreign and not isinstance(message, _OF_FOREIGNERS):
+        if message.sender in self.presence.foreign and not isinstance(message, _HEARD_FROM_STRANGERS):
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
         effects = self._awake(now_us)

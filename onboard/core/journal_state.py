@@ -54,7 +54,7 @@ class JournalCondition:
         return self.state is JournalState.FOREIGN
 
     @property
-    def told(self) -> str:
+    def line(self) -> str:
         """One line for a person: what is the matter, and the remedy; empty where the journal is reliable."""
         if self.is_reliable:
             return ""

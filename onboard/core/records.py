@@ -38,7 +38,7 @@ class TokenRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class TokenHeldRecord(TokenRecord):
-    """This node holds it."""
+    """From this version on the node itself holds the token."""
 
     NAME = "token_held"
     RULES = (Keep("token", _TOKEN),)
@@ -85,7 +85,7 @@ class WayRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class BlockedRecord(WayRecord):
-    """It cannot."""
+    """A person or a sensor said that a segment cannot be passed."""
 
     NAME = "blocked"
     RULES = (Keep("blocked", _SEGMENT),)
@@ -93,7 +93,7 @@ class BlockedRecord(WayRecord):
 
 @dataclass(frozen=True, slots=True)
 class ClearRecord(WayRecord):
-    """It can again."""
+    """A segment that was blocked can be passed again."""
 
     NAME = "clear"
     RULES = (Keep("clear", _SEGMENT),)

@@ -79,7 +79,7 @@ class Regenerating:
         return self.phase is RegenerationPhase.READ_BACK
 
     def handlers(self) -> dict[type[Message], Callable[[Any, int], list[Effect]]]:
-        """Handler by message class."""
+        """Which method takes which message, with bus time in us as its second argument."""
         return {Regeneration: self.on_word, TokenAssigned: self.on_assigned}
 
     def replay(self, entries: Iterable[Entry]) -> None:
@@ -191,8 +191,8 @@ class Regenerating:
         """What I hold, the last that I gave away of each, and what I know the lost machine to hold."""
         book, is_lost = self.tokens, self._lost == self.node_id
         known: dict[TokenKey, Message] = {}
-        for told, one in book.beliefs.verified.items():
-            key = TokenKey(*told)
+        for pair, one in book.beliefs.verified.items():
+            key = TokenKey(*pair)
             if one.holder not in (self.node_id, NOBODY) and (key in book.given or one.holder == self._lost):
                 known[key] = TokenSeen(self.node_id, *key, one.version, one.holder)
         cars: list[Message] = []

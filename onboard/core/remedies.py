@@ -35,5 +35,5 @@ def remedy(site: Site, reason: Reason, name: str) -> str:
 
 
 def reason_words(reason: Reason) -> str:
-    """``emergency stop`` for ``EMERGENCY_STOP``."""
+    """A reason code in lower case with spaces, for lines that people read: ``emergency stop``."""
     return reason.name.lower().replace("_", " ")

@@ -40,7 +40,7 @@ class Edge:
         return NoWishes(self.site)
 
     def tracker(self) -> Tracker:
-        """Where machines are."""
+        """What follows where machines are; the default reads places on tracks."""
         return TrackTracker(self.site)
 
     def place(self, number: int) -> str | None:

@@ -108,7 +108,7 @@ class Gateway:
     # --- the task ------------------------------------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Publish until ``stop``."""
+        """Open all sessions and publish what is due, until ``stop`` is called."""
         links = [asyncio.ensure_future(link.run()) for link in self.links.values()]
         try:
             while not self._stopping:

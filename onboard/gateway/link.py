@@ -60,7 +60,7 @@ class Link:
 
     @property
     def waiting(self) -> int:
-        """Telemetry that waits."""
+        """How many publications wait for the broker."""
         return len(self._queue)
 
     def post(self, publication: Publication) -> None:
@@ -81,7 +81,7 @@ class Link:
         self._news.set()
 
     async def run(self) -> None:
-        """Open sessions until ``stop``."""
+        """Open one session after another until ``stop`` is called, with growing pauses between them."""
         wait_s = FIRST_WAIT_S
         while not self._stopping.is_set():
             published = self.counts.published

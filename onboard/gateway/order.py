@@ -84,7 +84,7 @@ class Order:
 
 
 def order_of(record: WishRecord) -> Order:
-    """Inverse of ``Order.entry``."""
+    """The order that a journal record of it stands for."""
     wish = Wish(
         record.what,
         record.node,

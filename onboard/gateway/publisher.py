@@ -103,7 +103,7 @@ class Publisher:
         return list(self._feed(message, now_us))
 
     def wake(self, now_us: int) -> list[Outgoing]:
-        """Tell what is due."""
+        """All publications that are due at loop time ``now_us``."""
         return list(self._wake(now_us))
 
     def next_wake(self) -> int:
@@ -123,7 +123,7 @@ class Publisher:
         return list(self._tell_state(node, self._due[node], now_us))
 
     def tell_factsheet(self, node: int, now_us: int) -> list[Outgoing]:
-        """The factsheet again."""
+        """Publish one machine's factsheet again; nothing for a machine that does not travel."""
         if node not in self._due:
             return []
         return [Outgoing(self._serial(node), self._factsheet(node, now_us))]

@@ -19,7 +19,7 @@ class Life(StrEnum):
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing follows."""
+        """Whether the order is done or refused, and nothing follows."""
         return self in (Life.DONE, Life.REFUSED)
 
 

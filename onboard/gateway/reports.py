@@ -74,7 +74,7 @@ class Reports:
             self._records = self._kept = len(kept)
 
     def entries(self) -> Iterator[Entry]:
-        """What counts, oldest first."""
+        """What a journal that is written anew has to keep, oldest first."""
         yield from self.keep()
         for name in self._known:
             yield DeliveredRecord(name).entry

@@ -48,7 +48,7 @@ class GatewaySettings:
 
     @property
     def dialect(self) -> Dialect:
-        """The version's words."""
+        """The words of the VDA 5050 version that was chosen."""
         return DIALECTS[self.version]
 
     def tells_of(self, serial: str) -> bool:

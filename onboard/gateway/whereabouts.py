@@ -55,7 +55,7 @@ class TrackTracker:
             self._at[machine.node_id] = self._place(machine.home, 0, 0, 0)
 
     def feed(self, message: Message) -> bool:
-        """Progress and firm plans."""
+        """Follow progress and firm plans; True where a machine's place or way has changed."""
         match message:
             case Progress():
                 old = self._at.get(message.sender)
@@ -75,7 +75,7 @@ class TrackTracker:
         return False
 
     def where(self, node_id: int) -> Whereabouts:
-        """As in the port."""
+        """The segment where the machine is, and those of its plan that lie ahead."""
         at, plan = self._at[node_id], self._plans.get(node_id)
         if plan is None:
             return at

@@ -64,23 +64,23 @@ class NoWishes:
         return (SyncRequest(sender, 0),)
 
     def transport(self, told: dict[str, Any]) -> Wish:
-        """None is taken."""
+        """Raises ``RefusedError``: this system takes no transports from outside."""
         raise RefusedError("UNSUPPORTED", f"a {self._site.system} takes no transports from outside its desks")
 
     def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
-        """None is taken."""
+        """Raises ``RefusedError``: machines of this system take no orders by name."""
         raise RefusedError("UNSUPPORTED", f"machines of a {self._site.system} take no orders by name")
 
     def say(self, order: Order, sender: int, wall_us: int) -> Said:
-        """Nothing was taken."""
+        """Raises ``RefusedError``: no order can have been taken before."""
         raise RefusedError("UNSUPPORTED", "not of this site")
 
     def task_of(self, order: Order, message: Message) -> Reference | None:
-        """None."""
+        """None: no message is about an order from outside."""
         return None
 
     def is_done(self, order: Order, message: Message) -> bool:
-        """Only a report tells."""
+        """False: only a report of the task can say so."""
         return False
 
 

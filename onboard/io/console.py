@@ -23,6 +23,6 @@ class ManyTelemetry:
         self._sinks = sinks
 
     def event(self, time_us: int, source: str, text: str) -> None:
-        """As in the port."""
+        """Hand one event to each sink; what one of them raises keeps it from those behind."""
         for sink in self._sinks:
             sink.event(time_us, source, text)

@@ -67,7 +67,7 @@ class FileJournal:
 
     @property
     def has_grown(self) -> bool:
-        """As in the port."""
+        """Whether the file is beyond ``LEAST_BYTES``, and ``GROWTH`` times what it was when last written anew."""
         return self.size_bytes > self._least
 
     def replay(self) -> list[Entry]:
@@ -91,11 +91,11 @@ class FileJournal:
         return reading.entries
 
     async def append(self, entry: Entry) -> None:
-        """As in the port. ``replay`` must have been called once."""
+        """Write in the journal's own thread. ``replay`` must have been called once. Raises ``OSError``."""
         await self._in_writer(lambda: self._append(entry))
 
     async def compact(self, fewer: Compaction) -> None:
-        """As in the port."""
+        """Write another file, rename it over this one. Raises ``OSError``, ``JournalDamagedError`` for a bad one."""
         await self._in_writer(lambda: self._compact(fewer))
 
     async def renew(self, entries: Iterable[Entry]) -> None:

@@ -62,14 +62,14 @@ class LastingBus:
             self._bus.subscribe(on_frame, on_sent)
 
     def send(self, frame: Frame) -> bool:
-        """As in the port."""
+        """Queue; False, and counted, while the interface or the bus that this one needs is away."""
         if self._bus is None or (self._needs is not None and self._needs.is_away):
             self._refused += 1
             return False
         return self._bus.send(frame)
 
     def health(self) -> BusHealth:
-        """As in the port, since it was opened last."""
+        """Counters since the interface was opened last; bus-off while it is away."""
         return BusHealth(ErrorState.BUS_OFF, send_refused=self._refused) if self._bus is None else self._bus.health()
 
     async def wait_lost(self) -> str:
@@ -77,7 +77,7 @@ class LastingBus:
         return await asyncio.shield(self._lost)
 
     async def close(self) -> None:
-        """As in the port."""
+        """Stop looking for the interface, and close it where it is open."""
         if self._keeping is not None:
             self._keeping.cancel()
             await asyncio.wait([self._keeping])
@@ -104,14 +104,14 @@ class LastingBus:
             self._tell(f"the bus {self.name} is back")
 
     async def _come(self) -> OpenBus:
-        told = ""
+        reason = ""
         while True:
             try:
                 return await self._opener(self._settings)
             except BusOpenError as error:
                 if not error.may_come:
                     raise
-                if str(error) != told:
-                    told = str(error)
-                    self._tell(f"waits for its bus: {told}")
+                if str(error) != reason:
+                    reason = str(error)
+                    self._tell(f"waits for its bus: {reason}")
             await asyncio.sleep(RETRY_S)

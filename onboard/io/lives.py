@@ -31,9 +31,9 @@ _RESULTS = {
 
 @dataclass(frozen=True, slots=True)
 class LastLife:
-    """``told`` is one line for a person, empty where there is nothing to tell; ``reason`` is for the bus."""
+    """``line`` is for a person, empty where there is nothing to tell; ``reason`` is for the bus."""
 
-    told: str = ""
+    line: str = ""
     reason: Reason = Reason.NONE
 
 

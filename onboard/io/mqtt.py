@@ -105,7 +105,7 @@ class MqttSession:
         self.client = client
 
     async def publish(self, publication: Publication) -> None:
-        """As in the port."""
+        """Hand one publication to paho and wait as QoS says; more than ``TIMEOUT_S`` raises ``BrokerError``."""
         try:
             await self.client.publish(
                 publication.topic, publication.payload, qos=publication.qos, retain=publication.retain
@@ -114,7 +114,7 @@ class MqttSession:
             raise BrokerError(str(error)) from error
 
     async def incoming(self) -> AsyncIterator[Delivery]:
-        """As in the port."""
+        """Deliveries in the order of aiomqtt's queue. Raises ``BrokerError`` when the connection ends."""
         try:
             async for message in self.client.messages:
                 yield Delivery(str(message.topic), message.payload, message.qos, bool(message.retain), message.mid)
@@ -122,7 +122,7 @@ class MqttSession:
             raise BrokerError(str(error)) from error
 
     def taken(self, delivery: Delivery) -> None:
-        """As in the port."""
+        """Acknowledge a delivery, so that the broker does not bring it again."""
         self.client._client.ack(delivery.number, delivery.qos)  # noqa: SLF001  # aiomqtt 2.5 hands no such thing on
 
 

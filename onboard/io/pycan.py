@@ -81,7 +81,7 @@ class PythonCanBus:
         return True
 
     def health(self) -> BusHealth:
-        """As in the port."""
+        """Error counters as the driver told them last in an error frame, all others as counted here."""
         tec, rec = self._error_counters
         return BusHealth(
             self.state,

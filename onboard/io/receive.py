@@ -27,7 +27,7 @@ class BusLostError(Exception):
 
 
 class Reader(Protocol):
-    """Reads until stopped."""
+    """Hands items of a driver to the loop until it is stopped; ``overflows`` counts those it had to drop."""
 
     overflows: int
 
@@ -56,7 +56,7 @@ class LoopReader(Generic[Item]):
         loop.add_reader(descriptor, self._readable)
 
     async def stop(self) -> None:
-        """Stop."""
+        """Take the descriptor off the loop; items that the driver still holds are not read."""
         self._remove()
 
     def _remove(self) -> None:

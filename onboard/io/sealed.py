@@ -106,7 +106,7 @@ class Tail:
         return Appending(Write(self.end, line), Write(place, slot), not copies)
 
     def take(self, appending: Appending) -> None:
-        """It is durable."""
+        """The record that ``appending`` made is on the medium: the next one is chained to it."""
         line = appending.line.data
         self.records, self.end, self.link = self.records + 1, self.end + len(line), line[:_LINK_CHARS]
         self.copies = deque(_as_fit([*self.copies, line], _room(self.owner)))
@@ -275,8 +275,8 @@ def _as_fit(lines: list[bytes], room: int) -> list[bytes]:
 
 
 def _slot(seal: Seal) -> bytes:
-    told: Entry = {"owner": seal.owner, "identity": seal.identity, "records": seal.records, "link": seal.link}
-    head = _json({**told, "format": FORMAT, "copies": len(seal.copies)})
+    fields: Entry = {"owner": seal.owner, "identity": seal.identity, "records": seal.records, "link": seal.link}
+    head = _json({**fields, "format": FORMAT, "copies": len(seal.copies)})
     body = (head + b"\n" + b"".join(seal.copies)).ljust(SLOT_BYTES - _LINK_CHARS - 2) + b"\n"
     slot = b"%s %s" % (_link(b"slot", body), body)
     assert len(slot) == SLOT_BYTES, "an owner's name that leaves no room: see _room"
@@ -289,9 +289,9 @@ def _seal(slot: bytes) -> Seal | None:
     if len(slot) != SLOT_BYTES or link != _link(b"slot", body):
         return None
     head, *lines = body.split(b"\n")
-    told = json.loads(head)
-    copies = tuple(line + b"\n" for line in lines[: told["copies"]])
-    return Seal(told["owner"], told["identity"], told["records"], told["link"], copies)
+    fields = json.loads(head)
+    copies = tuple(line + b"\n" for line in lines[: fields["copies"]])
+    return Seal(fields["owner"], fields["identity"], fields["records"], fields["link"], copies)
 
 
 # --- the form before this one ----------------------------------------------------------------------------------

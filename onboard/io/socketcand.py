@@ -54,11 +54,11 @@ class SocketcandBus:
             ) from error
 
     def subscribe(self, on_frame: FrameHandler, on_sent: FrameHandler | None = None) -> None:
-        """As in the port."""
+        """Handlers outlast a connection: they hear again once the server is back."""
         self._subscribers.add(on_frame, on_sent)
 
     def send(self, frame: Frame) -> bool:
-        """As in the port."""
+        """Hand to TCP; False, and counted, while the server is away or ``WRITE_LIMIT`` bytes wait for it."""
         possible = is_sendable(frame) and not frame.is_remote
         if self._closed or not possible or self._connection is None or not self._connection.write(format_send(frame)):
             self.counts["send_refused"] += 1
@@ -67,7 +67,7 @@ class SocketcandBus:
         return True
 
     def health(self) -> BusHealth:
-        """As in the port; the protocol tells no error counters."""
+        """Bus-off while the server is away; error counters are 0, as the protocol does not carry them."""
         return BusHealth(
             ErrorState.BUS_OFF if self._connection is None else ErrorState.ERROR_ACTIVE,
             sent=self.counts["sent"],
@@ -80,7 +80,7 @@ class SocketcandBus:
         return await asyncio.shield(self._lost)
 
     async def close(self) -> None:
-        """As in the port."""
+        """End the connection and give up coming back."""
         self._closed = True
         if self._returning is not None:
             self._returning.cancel()

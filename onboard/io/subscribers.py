@@ -23,7 +23,7 @@ class Subscribers:
         self._on_sent: list[FrameHandler] = []
 
     def add(self, on_frame: FrameHandler, on_sent: FrameHandler | None) -> None:
-        """Add one subscriber."""
+        """Serve one more subscriber, behind those there are; None where it does not want its own frames back."""
         self._on_frame.append(on_frame)
         if on_sent is not None:
             self._on_sent.append(on_sent)

@@ -34,7 +34,7 @@ class Submitted(Enum):
 
 
 class Transmitter(Protocol):
-    """Takes frames in order."""
+    """Hands frames to a driver in the order in which they came, without blocking the loop."""
 
     def send(self, frame: Frame) -> bool:
         """Take a frame; False where it will not be sent. Never blocks."""
@@ -78,7 +78,7 @@ class DirectTransmitter:
         return True
 
     def stop(self) -> None:
-        """Forget what waits."""
+        """Drop the frames that wait, and set no timer again."""
         self._stopped = True
         self._waiting.clear()
         if self._timer is not None:
@@ -123,7 +123,7 @@ class ThreadTransmitter:
         threading.Thread(target=self._run, name=f"send {name}", daemon=True).start()
 
     def send(self, frame: Frame) -> bool:
-        """Queue for the thread."""
+        """Queue for the thread; False beyond ``QUEUE_LIMIT`` frames."""
         with self._changed:
             if self._stopped or len(self._waiting) >= QUEUE_LIMIT:
                 return False

@@ -26,11 +26,11 @@ class SystemdWatchdog:
             self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_CLOEXEC | socket.SOCK_NONBLOCK)
 
     def ready(self) -> None:
-        """``READY=1``."""
+        """Say ``READY=1``: units ordered after this one may start."""
         self._tell("READY=1")
 
     def alive(self) -> None:
-        """``WATCHDOG=1``."""
+        """Say ``WATCHDOG=1``; wanted at least once in ``period_us``."""
         self._tell("WATCHDOG=1")
 
     def status(self, text: str) -> None:

@@ -60,7 +60,7 @@ class Statements:
                 del self.held[key]
 
     def car_at(self, word: CarAt) -> None:
-        """Where a car stands."""
+        """Take up where a car stands, unless a newer word of that car is known."""
         key = TokenKey(TokenKind.CAR, word.car.origin << 16 | word.car.number)
         known = self.cars.get(key)
         if may_exist(self.site, key) and (known is None or word.version >= known.version):

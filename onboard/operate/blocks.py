@@ -34,17 +34,17 @@ class Mark(Order):
 
     @property
     def question(self) -> str:
-        """See ``Order``."""
+        """Asked before a segment is cleared only: to block one takes motion away."""
         return "" if self._blocks else f"Is {self._segment} free of persons and things, and shall it be passed again?"
 
     def begin(self, now_us: int) -> None:
-        """See ``Order``."""
+        """Say it to all at once, and tell the person under which node-ID."""
         super().begin(now_us)
         what = f"blocked: {reason_words(self._reason)}" if self._blocks else "clear"
         self.tell(f"{self._segment} is {what}; said to all under node-ID {self.node}")
 
     def feed(self, message: Message, now_us: int) -> None:
-        """What the steward keeps."""
+        """The track's steward repeats what it keeps; that it keeps this word ends the order."""
         if message.sender != self._steward or self._asked_us is None or self.status is not None:
             return
         match message:
@@ -55,7 +55,7 @@ class Mark(Order):
                 self._kept()
 
     def wake(self, now_us: int) -> list[Message]:
-        """See ``Order``."""
+        """Ask the steward for its word where it has not come; give up when the time to confirm is over."""
         if self.status is not None:
             return []
         if self._is_gone(now_us):

@@ -22,22 +22,22 @@ class Hold(Order):
         self.is_urgent = holds
 
     def preview(self, now_us: int) -> list[str]:
-        """How it stands."""
+        """One line: how the machine stands now."""
         return [f"{self._machine.name} {state_words(self.park, self._machine.node_id, now_us)}"]
 
     @property
     def question(self) -> str:
-        """See ``Order``."""
+        """Asked before a machine is let go only: to hold one takes motion away."""
         return "" if self._holds else f"Is nobody in the way of {self._machine.name}, and shall it go on by itself?"
 
     def begin(self, now_us: int) -> None:
-        """See ``Order``."""
+        """Ask the machine to stand, or to go on by itself."""
         super().begin(now_us)
         self._pauses.ask(self._machine.node_id, {"actionType": "startPause" if self._holds else "stopPause"}, now_us)
         self.tell(f"{self._machine.name} is asked to {'stand' if self._holds else 'go on'} under node-ID {self.node}")
 
     def feed(self, message: Message, now_us: int) -> None:
-        """The machine's word."""
+        """The machine's own word that it is held and stands, or goes on, ends the order."""
         if self.status is not None:
             return
         if self._pauses.feed(message, now_us):
@@ -53,7 +53,7 @@ class Hold(Order):
         return is_own and self._holds and not self._is_told and self.park.machines[message.sender].is_held
 
     def wake(self, now_us: int) -> list[Message]:
-        """See ``Order``."""
+        """Repeat the request as ``Pauses`` says; give up after ``REST_US``."""
         if self.status is not None:
             return []
         said, closed = self._pauses.wake(now_us)

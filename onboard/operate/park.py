@@ -52,7 +52,7 @@ class Park:
         self._tracker = edge_of(self.site).tracker()
 
     def feed(self, message: Message, now_us: int) -> None:
-        """Take up one message."""
+        """Take up one message of the fleet bus, heard at loop time ``now_us``."""
         known = self.machines.get(message.sender)
         if known is None:
             self.others[message.sender] = type(message).__name__

@@ -40,7 +40,7 @@ _SLOT = TokenKind.SEGMENT
 
 
 class Step(Enum):
-    """How far it is."""
+    """How far a regeneration is, in the words that the person reads."""
 
     FREEZE = "all are asked to stand and to say what they hold"
     ASK = "the person decides"
@@ -110,7 +110,7 @@ class Regenerate(Order):
 
     @property
     def question(self) -> str:
-        """See ``Order``."""
+        """First whether the absent machine is locked off; then whether the rights listed shall be made anew."""
         if self._step is Step.ASK:
             return f"Shall {len(self._assignment.given)} rights be made anew under epoch {self._epoch}?"
         if self._who.absent:
@@ -125,11 +125,11 @@ class Regenerate(Order):
 
     @property
     def has_question(self) -> bool:
-        """See ``Order``."""
+        """Whether all have said what they hold, so that the person has to decide now."""
         return self._step is Step.ASK and self.status is None
 
     def answered(self, now_us: int, *, agrees: bool) -> None:
-        """See ``Order``."""
+        """The person's yes has the list read back by all; a no breaks it off with nothing changed."""
         if self._step is not Step.ASK:
             return
         if agrees:
@@ -138,7 +138,7 @@ class Regenerate(Order):
             self._abort("the person does not want it", now_us)
 
     def interrupt(self, now_us: int) -> list[Message]:
-        """See ``Order``. What was committed stays so."""
+        """Break it off with nothing changed; what was committed stays so."""
         if self._step is Step.COMMIT:
             self.tell("COMMIT was said: those who have not heard it stand until it is said again")
             return super().interrupt(now_us)
@@ -192,7 +192,7 @@ class Regenerate(Order):
         self._wake_us = now_us
 
     def wake(self, now_us: int) -> list[Message]:
-        """See ``Order``."""
+        """Say what the present step needs again, or go to the next; a step that takes too long breaks it off."""
         if self.status is not None:
             return []
         match self._step:

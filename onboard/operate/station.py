@@ -37,7 +37,7 @@ class Station:
         bus.subscribe(self._on_frame)
 
     def now_us(self) -> int:
-        """Loop time."""
+        """Time of the asyncio loop in whole us."""
         return round(self._loop.time() * 1_000_000)
 
     async def listen(self, for_us: int) -> bool:
@@ -101,7 +101,7 @@ class Station:
         return order.status
 
     def interrupt(self) -> None:
-        """A person ends it."""
+        """A person has pressed Ctrl-C: the order ends as its ``interrupt`` says."""
         self._is_interrupted = True
         self._news.set()
 
@@ -111,7 +111,7 @@ class Station:
             await self._wait(None)
 
     def lose(self, why: str) -> None:
-        """The bus is gone."""
+        """The bus is gone for good; ``why`` is told to the person."""
         self._is_lost = why
         self._news.set()
 

@@ -18,11 +18,11 @@ class Status(Order):
         self._listen_us = listen_us
 
     def begin(self, now_us: int) -> None:
-        """See ``Order``."""
+        """Listen for the time asked for; nothing is said on the bus."""
         self.began_us, self._wake_us = now_us, now_us + self._listen_us
 
     def wake(self, now_us: int) -> list[Message]:
-        """See ``Order``."""
+        """Print the lines once the time to listen is over."""
         if self.status is None and self._wake_us is not None and now_us >= self._wake_us:
             for line in status_lines(self.park, now_us):
                 self.tell(line)

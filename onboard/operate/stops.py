@@ -27,7 +27,7 @@ class Stop(Order):
         self._is_told = False
 
     def begin(self, now_us: int) -> None:
-        """See ``Order``."""
+        """Say the stop to all at once, and tell the person under which node-ID."""
         super().begin(now_us)
         self.tell(f"stop: said to all under node-ID {self.node}")
 
@@ -43,7 +43,7 @@ class Stop(Order):
                 self._finish()
 
     def wake(self, now_us: int) -> list[Message]:
-        """See ``Order``."""
+        """Say the stop again for as long as it shall hold, and tell once who has confirmed it."""
         if self.status is not None:
             return []
         if not self._is_told and (not self._waited or now_us >= self.began_us + self.confirm_us()):
@@ -56,7 +56,7 @@ class Stop(Order):
         return [EmergencyStop(self.node, Reason.OPERATOR)]
 
     def interrupt(self, now_us: int) -> list[Message]:
-        """See ``Order``."""
+        """Say it no longer: it then holds for ``LASTS_US`` more."""
         self._finish()
         self.tell(f"no longer said: the stop holds for {LASTS_US // 1_000_000} s more; onboard operate go lifts it")
         return []
@@ -102,11 +102,11 @@ class GoAgain(Order):
 
     @property
     def question(self) -> str:
-        """See ``Order``."""
+        """Asked always: machines begin to move afterwards."""
         return f"Is nobody in the machines' way, and shall the emergency stop{self._of()} be lifted?"
 
     def begin(self, now_us: int) -> None:
-        """See ``Order``."""
+        """Say ``Go`` to all, and wait for those that stand now."""
         super().begin(now_us)
         self._waited = self._standing(now_us)
         self.tell(f"go{self._of()}: said under node-ID {self.node}")
@@ -119,7 +119,7 @@ class GoAgain(Order):
             self.status = NOT_CONFIRMED
 
     def wake(self, now_us: int) -> list[Message]:
-        """See ``Order``."""
+        """Tell of each machine that goes on; give up on the others when the time to confirm is over."""
         if self.status is not None:
             return []
         for node in sorted(self._waited):
@@ -164,12 +164,12 @@ class LetGo(GoAgain):
         super().__init__(park, node, machine.node_id)
 
     def preview(self, now_us: int) -> list[str]:
-        """Why it holds."""
+        """One line: how the machine stands now, and why."""
         return [f"{self.park.name(self._stopper)} {state_words(self.park, self._stopper, now_us)}"]
 
     @property
     def question(self) -> str:
-        """See ``Order``."""
+        """Asked always: the machine begins to move afterwards."""
         name = self.park.name(self._stopper)
         return f"Is what made {name} hold put right, is nobody in its way, and shall it go on?"
 

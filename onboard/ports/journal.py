@@ -42,4 +42,4 @@ class Journal(Protocol):
         """Begin anew with ``entries``, in whatever condition it is; what was there is kept aside for a person."""
 
     async def close(self) -> None:
-        """Give the medium back."""
+        """Finish writes under way and give the medium back; nothing may be appended afterwards."""

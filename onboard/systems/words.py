@@ -55,7 +55,7 @@ class SiteWords:
         return f"{self.noun} {self.load(value)}"
 
     def place(self, number: int) -> str:
-        """A station's number."""
+        """A station by its number: track, index and side, or anywhere, or outside."""
         if number == ANY_STATION:
             return "anywhere"
         return "outside" if number == OUTSIDE else str(Station.from_number(number))
@@ -82,7 +82,7 @@ class SiteWords:
         return plain(operation.name)
 
     def reason(self, reason: Reason) -> str:
-        """Why, in words."""
+        """A reason code in lower case with spaces, as people read it."""
         return plain(reason.name)
 
     def way(self, call: CallForProposals) -> str:

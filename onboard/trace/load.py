@@ -65,7 +65,7 @@ class ChannelLoad:
         self.longest_us[name] = max(self.longest_us.get(name, 0), response_us)
 
     def finish(self) -> None:
-        """The log is over."""
+        """The log has ended: count its last second too."""
         self._end_second()
 
     def _count(self, time_us: int, bits: int) -> None:

@@ -47,7 +47,7 @@ class LiveSource:
             self.picture.feed_device(message.sender, message, time_us)
 
     def layout(self) -> dict[str, Any]:
-        """As in the port."""
+        """The drawing, without commands: a page may not move a live site."""
         return {**self.picture.layout(), "commands": []}
 
     def snapshot(self) -> dict[str, Any]:
@@ -56,7 +56,7 @@ class LiveSource:
         return {**self.picture.snapshot(), "pace": 1, "zero_s": self._zero_s}
 
     def figures(self) -> dict[str, Any]:
-        """As in the port."""
+        """The indicators of what was heard so far."""
         return self.picture.figures()
 
     async def command(self, name: str, arguments: Mapping[str, Any]) -> str:
@@ -64,7 +64,7 @@ class LiveSource:
         raise CommandError(f"{name}: this bus is not simulated; the page only listens")
 
     async def sleep(self, seconds: float) -> None:
-        """As in the port."""
+        """Wait in real time, in s: the bus does not wait either."""
         await asyncio.sleep(seconds)
 
 
@@ -96,7 +96,7 @@ class LogSource:
         self.picture = self._film.show(time_us)
 
     def layout(self) -> dict[str, Any]:
-        """As in the port."""
+        """The drawing, with the commands of a player: pause and speed."""
         return {**self.picture.layout(), "commands": ["pause", "speed"]}
 
     def snapshot(self) -> dict[str, Any]:
@@ -106,7 +106,7 @@ class LogSource:
         return {**self.picture.snapshot(), "pace": pace, "zero_s": zero_s, "span_us": [self._first_us, self._last_us]}
 
     def figures(self) -> dict[str, Any]:
-        """As in the port."""
+        """The indicators of the log up to the moment shown."""
         return self.picture.figures()
 
     async def command(self, name: str, arguments: Mapping[str, Any]) -> str:
@@ -124,5 +124,5 @@ class LogSource:
         raise CommandError(f"{name}: a recorded log cannot be changed")
 
     async def sleep(self, seconds: float) -> None:
-        """As in the port."""
+        """Wait in real time, in s, whatever speed the log is played at."""
         await asyncio.sleep(seconds)

@@ -45,7 +45,7 @@ class WebServer:
         self._server = _Server(config)
 
     async def run(self) -> None:
-        """Serve until ``stop``."""
+        """Serve the page on the socket that was opened, until ``stop`` is called."""
         await self._server.serve([self._socket])
 
     def stop(self) -> None:

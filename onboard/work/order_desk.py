@@ -57,15 +57,15 @@ class OrderDesk(ABC, Generic[AnOrder]):
 
     @abstractmethod
     def order_record(self, order: AnOrder) -> JournalRecord:
-        """What came in."""
+        """The order as it came in, for the journal; written before anybody is told that it is in hand."""
 
     @abstractmethod
     def state_record(self, order: AnOrder) -> JournalRecord:
-        """How it stands."""
+        """How the order stands, for the journal; written whenever that changes."""
 
     @abstractmethod
     def terms(self, order: AnOrder) -> CallTerms:
-        """What is called for."""
+        """The call by which this order finds its machine."""
 
     @abstractmethod
     def answer(self, order: AnOrder) -> Message | None:
@@ -94,12 +94,12 @@ class OrderDesk(ABC, Generic[AnOrder]):
 
     @property
     def state(self) -> MachineState:
-        """Heartbeat state."""
+        """What the heartbeat says: IDLE once every order is over, else WORKING."""
         return MachineState.IDLE if all(one.is_over for one in self.orders.values()) else MachineState.WORKING
 
     @property
     def itinerary_version(self) -> int:
-        """A desk goes nowhere."""
+        """0: a desk has no plan of where to go."""
         return 0
 
     def start(self, now_us: int) -> list[Effect]:
@@ -169,7 +169,7 @@ class OrderDesk(ABC, Generic[AnOrder]):
         return min((time for time in times if time is not None), default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
-        """No rights, no itinerary."""
+        """Nothing: a desk of this kind has neither an itinerary nor cars in its custody."""
         return []
 
     # --- orders ------------------------------------------------------------------------------------------------

@@ -83,7 +83,7 @@ class WorkOrder:
 
     @property
     def is_over(self) -> bool:
-        """Whether nothing follows."""
+        """Whether the order is done or refused, and nothing follows."""
         return self.state in OVER
 
     @property

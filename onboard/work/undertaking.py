@@ -101,7 +101,7 @@ class Undertakings(Generic[AWork]):
     cancelled: set[Reference] = field(default_factory=set)
 
     def standing(self, task: Reference) -> TaskStanding:
-        """How a task stands."""
+        """How a task stands here: unknown, won, begun or over."""
         if task in self.in_hand:
             return _BEGUN if self.is_begun(self.in_hand[task]) else _WON
         return _OVER if task in self.over else _UNKNOWN

@@ -90,4 +90,4 @@ def test_a_mistake_is_told_in_one_line(options: list[str], told: str, capsys: py
 
 
 def test_every_attack_says_what_it_does() -> None:
-    assert all(entry.told.endswith(".") and entry.for_s > 0 for entry in ATTACKS.values())
+    assert all(entry.summary.endswith(".") and entry.for_s > 0 for entry in ATTACKS.values())

@@ -9,8 +9,8 @@ from bus_sim.can.node import SimulatedBus
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
-from hil.commission.ears import Ears
-from hil.commission.person import PersonGoneError
+from hil.commission.listener import BusListener
+from hil.commission.person import NoAnswerError
 from hil.commission.protocol import Protocol, Verdict
 from hil.commission.setting import Setting
 from hil.commission.walk import walk
@@ -51,7 +51,7 @@ class Scene:
         for key, answer in self.answers.items():
             if key in question:
                 if answer == "GONE":
-                    raise PersonGoneError
+                    raise NoAnswerError
                 return answer
         return "60" if "ohms" in question else "y"
 
@@ -68,7 +68,16 @@ class Scene:
         devices = self.simulation.devices[machine.node_id].attach("walk")
         self.spoke = [fleet, devices]
         protocol = Protocol(self.name, self.site.name, "2026-01-01 12:00:00+00:00")
-        await walk(Setting(self.site, machine, Ears(fleet, codecs.fleet), Ears(devices, codecs.device), self, protocol))
+        await walk(
+            Setting(
+                self.site,
+                machine,
+                BusListener(fleet, codecs.fleet),
+                BusListener(devices, codecs.device),
+                self,
+                protocol,
+            )
+        )
         await stop_fleet(self.simulation)
         return protocol
 

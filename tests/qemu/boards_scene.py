@@ -3,7 +3,7 @@
 import json
 import sys
 
-from hil.guest.ears import Ears
+from hil.guest.listener import BusListener
 from hil.guest.mesh import run
 from hil.guest.site_run import TOOLS, SiteRun, play
 
@@ -13,10 +13,12 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.prepare()
     site.connect_boards(bitrate)
     site.record()
-    ears = Ears(TOOLS)
+    listener = BusListener(TOOLS)
     site.start_machines()
     site.start_plant()
-    site.wait(ears, "frames of both machines", lambda: {frame[6:8] for frame in ears.frames} >= {"01", "0B"}, 60)
+    site.wait(
+        listener, "frames of both machines", lambda: {frame[6:8] for frame in listener.frames} >= {"01", "0B"}, 60
+    )
     status = site.statuses(["plant"], 200)
     site.tell("the plant's run is over")
     links = {name: json.loads(run("ip", "-n", name, "-j", "-d", "-s", "link", "show", "can0"))[0] for name in (

@@ -4,7 +4,7 @@ import json
 import sys
 import time
 
-from hil.guest.ears import Ears
+from hil.guest.listener import BusListener
 from hil.guest.mesh import inside
 from hil.guest.site_run import TOOLS, SiteRun, play
 
@@ -22,42 +22,44 @@ def scene(site: SiteRun) -> dict[str, object]:
     site.tell("the bus is there")
     site.record()
     site.record_outside()
-    ears = Ears(TOOLS)
+    listener = BusListener(TOOLS)
     site.start_machines()
     site.start_plant()
 
     def count(name: str) -> int:
-        return sum(frame.startswith(beats[name]) for frame in ears.frames)
+        return sum(frame.startswith(beats[name]) for frame in listener.frames)
 
-    site.wait(ears, "all machines' heartbeats", lambda: all(count(name) for name in beats), 60)
+    site.wait(listener, "all machines' heartbeats", lambda: all(count(name) for name in beats), 60)
     site.start("monitor", [*inside(TOOLS), *plan["monitor"]], "monitor.txt")
-    site.wait(ears, f"{UNPLUGGED} is steady", lambda: count(UNPLUGGED) >= 3, 30)
+    site.wait(listener, f"{UNPLUGGED} is steady", lambda: count(UNPLUGGED) >= 3, 30)
     mesh.unplug(UNPLUGGED)
     out, heard = [time.time()], count(WITNESS)
-    site.wait(ears, f"{UNPLUGGED} is away", lambda: count(WITNESS) >= heard + AWAY_BEATS, 30)
+    site.wait(listener, f"{UNPLUGGED} is away", lambda: count(WITNESS) >= heard + AWAY_BEATS, 30)
     before = count(UNPLUGGED)
     out.append(time.time())
     mesh.plug(UNPLUGGED)
-    site.wait(ears, f"{UNPLUGGED} is heard again", lambda: count(UNPLUGGED) > before, 30)
+    site.wait(listener, f"{UNPLUGGED} is heard again", lambda: count(UNPLUGGED) > before, 30)
 
-    asked_at = len(ears.read())
+    asked_at = len(listener.read())
     site.tool("cansend", "can0", plan["ask"])
     answer = plan["answer"]
-    site.wait(ears, "an answer to cansend", lambda: any(f.startswith(answer) for f in ears.frames[asked_at:]), 20)
+    site.wait(
+        listener, "an answer to cansend", lambda: any(f.startswith(answer) for f in listener.frames[asked_at:]), 20
+    )
 
     status = site.statuses(["plant"], 150)
     site.tell("the plant's run is over")
-    stopped_at = len(ears.read())
+    stopped_at = len(listener.read())
     site.tool("cansend", "can0", plan["stop"])
     held: dict[str, str] = plan["held"]
     everybody = "everybody holds, and says so"
-    site.wait(ears, everybody, lambda: set(held.values()) <= set(ears.frames[stopped_at:]), 20)
+    site.wait(listener, everybody, lambda: set(held.values()) <= set(listener.frames[stopped_at:]), 20)
     status |= site.end(site.order.machines)
     site.end(["candump", "candump-outside", "monitor"])
 
     part = site.share / "part.log"
     part.write_text("".join((site.share / "fleet.log").read_text().splitlines(keepends=True)[:REPLAYED]))
-    other = Ears(UNPLUGGED)
+    other = BusListener(UNPLUGGED)
     site.tool("canplayer", "-I", str(part), "-g", "5", "-t", "can0=can0")
     site.wait(other, "canplayer's frames", lambda: len(other.frames) >= REPLAYED, 20)
     return {"status": status, "unplugged": out, "replayed": other.frames}

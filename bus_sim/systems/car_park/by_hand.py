@@ -46,7 +46,7 @@ class Hand:
 
 
 class ByHand:
-    """Turns keys into customers."""
+    """Turns keys at the terminal into customers who come and go."""
 
     def __init__(self, street: Street, seed: int, console: Console, *, ends_with_pipe: bool = True) -> None:
         """Without ``ends_with_pipe`` only q ends the run: cars may come by other ways than by keys."""

@@ -37,7 +37,7 @@ class CarParkSource(RunSource):
         self._station: Bus | None = None
 
     def snapshot(self) -> dict[str, Any]:
-        """As in the port; waiting is what the street measures."""
+        """The picture, with mean waiting times in s as the street measures them."""
         summary = self._simulation.plant.street.summary()
         waits = (summary.in_wait_us, summary.out_wait_us)
         means = [sum(times) / len(times) / 1e6 if times else None for times in waits]

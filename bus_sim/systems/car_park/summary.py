@@ -56,7 +56,7 @@ class RunSummary:
     trace: str | None
 
     def to_json(self) -> dict[str, object]:
-        """Plain values for ``json.dump``."""
+        """The fields as ``json.dump`` takes them; units stand in the keys."""
         return asdict(self)
 
     @property

@@ -80,7 +80,7 @@ class ArmDevice:
         self._say_grip()
 
     def at(self, now_us: int) -> tuple[float, float]:
-        """Where it is, mm."""
+        """Where the arm's tool is at ``now_us``, x and y in mm: on the straight line of its last order."""
         if now_us >= self._end_us:
             return self._to
         share = (now_us - self._begin_us) / (self._end_us - self._begin_us)
@@ -275,7 +275,7 @@ class CellPlant:
 
     @property
     def entries(self) -> list[Entry]:
-        """All orders so far."""
+        """All orders that came so far, counter by counter."""
         return [entry for counter in self.counters.values() for entry in counter.entries]
 
     @property

@@ -42,7 +42,7 @@ class Counter:
         link.subscribe(self._on_message)
 
     def add(self, order: Order) -> None:
-        """Somebody orders visits, now."""
+        """Somebody orders visits at this moment; said to the desk, and again until it answers."""
         entry = Entry(len(self.entries) + 1, order, self._plant.timers.now_us())
         self.entries.append(entry)
         self._say(entry)
@@ -92,7 +92,7 @@ class GraphPlant:
 
     @property
     def entries(self) -> list[Entry]:
-        """All orders so far."""
+        """All orders that came so far, counter by counter."""
         return [entry for counter in self.counters.values() for entry in counter.entries]
 
     @property

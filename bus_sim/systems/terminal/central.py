@@ -76,10 +76,10 @@ class CentralDesk(Desk):
 
 
 class CentralDeskFactory(DeskFactory):
-    """Makes central desks."""
+    """Makes desks that plan for all vehicles, for comparison."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> CentralDesk:
-        """The desk's steps."""
+        """A desk that plans centrally. Raises ``TypeError`` for an estimator without the desk's picture."""
         if not isinstance(estimator, DeskGeneration):
             raise TypeError("a desk needs its own picture")
         return CentralDesk(fleet, estimator)
@@ -105,5 +105,5 @@ def play_central(site: Terminal, options: RunOptions, *, limit_us: int) -> Outco
 
 
 def play_auction(site: Terminal, options: RunOptions, *, limit_us: int) -> Outcome:
-    """The same with calls."""
+    """Play the same missions at one desk by calls and bids; ``limit_us`` of virtual time at most."""
     return play(at_one_desk(site), options, limit_us=limit_us)

@@ -219,11 +219,11 @@ class TerminalPlant:
         return len(deliveries(self.site, self.world.handled)) >= ordered(self.site, self.refused)
 
     def now_us(self) -> int:
-        """Loop time."""
+        """Virtual time in us, as of the plant's timers."""
         return self.timers.now_us()
 
     def after(self, duration_us: int, callback: Callable[[], None]) -> None:
-        """Call later."""
+        """Call once ``duration_us`` of virtual time have passed."""
         self.timers.call_at(self.now_us() + duration_us, callback)
 
     def block(self, blockage: Blockage) -> None:
@@ -232,7 +232,7 @@ class TerminalPlant:
         self._camera(blockage.lane)
 
     def free(self, lane: int) -> None:
-        """It is taken away."""
+        """Take away what blocks a lane: cameras see it, and vehicles that stand before it go on."""
         self.world.blocked.discard(lane)
         self._camera(lane)
         for devices in self.vehicles.values():

@@ -199,7 +199,7 @@ class Counter:
         link.subscribe(self._on_message)
 
     def add(self, wanted: Wanted) -> None:
-        """Somebody orders, now."""
+        """Somebody orders a batch at this moment; said to the desk, and again until it answers."""
         entry = Entry(len(self.entries) + 1, wanted, self._plant.timers.now_us())
         self.entries.append(entry)
         self._say(entry)
@@ -256,7 +256,7 @@ class TurningPlant:
 
     @property
     def entries(self) -> list[Entry]:
-        """All orders so far."""
+        """All orders that came so far, counter by counter."""
         return [entry for counter in self.counters.values() for entry in counter.entries]
 
     @property

@@ -254,7 +254,7 @@ class Initiator:
             self.awards_sent = QUICK_AWARDS + 1
             self.due_us = min(self.due_us or now_us, now_us + self.timing.award_repeat_us)
 
-    def unheard(self, now_us: int) -> int:
+    def silent_winner(self, now_us: int) -> int:
         """The winner that was awarded the task long ago and has said nothing of it since; 0 for nobody."""
         is_late = self.state is State.AWARDING and now_us - self.awarded_us >= ACCEPT_WITHIN_US
         return self.best[1] if is_late and self.best is not None else NOBODY
@@ -333,7 +333,7 @@ class Initiator:
         return [Send(closing), *self._closed(NOBODY, CallResult.REFUSED, Reason.NO_BID)]
 
     def cancel(self, now_us: int) -> Outcome:
-        """The task is gone."""
+        """The task is no longer wanted: say WITHDRAWN, so that bidders give up what they keep for it."""
         closing = self._closing(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)
         return [Send(closing), *self._closed(NOBODY, CallResult.WITHDRAWN, Reason.CANCELLED)]
 

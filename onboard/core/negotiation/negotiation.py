@@ -117,9 +117,9 @@ class Negotiation:
         for initiator in self.initiators:
             initiator.awarded_us = now_us
 
-    def unheard(self, task: Reference, now_us: int) -> int:
+    def silent_winner(self, task: Reference, now_us: int) -> int:
         """Who was awarded a ``task`` of mine long ago and is not heard acting on it; 0 for nobody."""
-        found = [one.unheard(now_us) for one in self.initiators if one.terms.task == task]
+        found = [one.silent_winner(now_us) for one in self.initiators if one.terms.task == task]
         return max(found, default=NOBODY)
 
     def standing_bid(self, key: CallKey) -> tuple[int, int] | None:

@@ -125,7 +125,7 @@ class Participant:
 
     @property
     def key(self) -> CallKey:
-        """Which call."""
+        """The initiator's node-ID and its number of the call: what all frames of one call share."""
         return CallKey(self.call.sender, self.call.call)
 
     @property
@@ -357,7 +357,7 @@ class Participant:
         return []
 
     def rest(self, now_us: int) -> Outcome:
-        """Nothing to do."""
+        """What the table names where an event changes the state and needs no action."""
         return []
 
     # --- judgement ---------------------------------------------------------------------------------------------

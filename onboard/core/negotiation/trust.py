@@ -49,7 +49,7 @@ class Trust:
     _out_of_task: dict[tuple[Reference, int], tuple[int, int]] = field(default_factory=dict)
 
     def given(self, task: Reference, winner: int, cost: int, criterion: Criterion) -> None:
-        """A task was awarded."""
+        """A task was awarded at ``cost``, in the criterion's unit; beyond ``MOST_TASKS`` the oldest is forgotten."""
         self._given.pop(task, None)
         self._given[task] = winner, cost if criterion is Criterion.FINISH_TIME else None
         while len(self._given) > MOST_TASKS:

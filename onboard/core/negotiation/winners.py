@@ -89,7 +89,7 @@ class Winners:
 
     def lost(self, task: Reference, now_us: int) -> Reason:
         """Why the winner of a task does not do it: NODE_SILENT, why it is an obstacle, FALSE_STATEMENT, or NONE."""
-        if self.negotiation.unheard(task, now_us):
+        if self.negotiation.silent_winner(task, now_us):
             return Reason.NODE_SILENT
         known = self._tasks.get(task)
         if known is None:
@@ -121,7 +121,7 @@ class Winners:
     def blame(self, task: Reference, now_us: int) -> None:
         """Whoever lost a task that others have begun for it leaves them with it: told until it shows a sign of work."""
         known = self._tasks.get(task)
-        node = known.winner if known is not None else self.negotiation.unheard(task, now_us)
+        node = known.winner if known is not None else self.negotiation.silent_winner(task, now_us)
         if node:
             self.blame_node(node, now_us)
 
@@ -132,10 +132,10 @@ class Winners:
     def take_back(self, task: Reference, reason: Reason, now_us: int) -> list[Effect]:
         """Nobody has a task any more, and who had it is left out of its next calls; it may be called for anew."""
         known = self._tasks.pop(task, None)
-        unheard = self.negotiation.unheard(task, now_us)
-        if unheard and self.negotiation.trust.winner(task) is None:
+        silent = self.negotiation.silent_winner(task, now_us)
+        if silent and self.negotiation.trust.winner(task) is None:
             # An option that was confirmed and not heard counts like any other award.
-            self.negotiation.trust.given(task, unheard, 0, Criterion.MONEY)
+            self.negotiation.trust.given(task, silent, 0, Criterion.MONEY)
         said = self.negotiation.abandon(task, reason, now_us)
         effects: list[Effect] = [item for item in said if not isinstance(item, NegotiationEvent)]
         return effects if known is None or effects else [self._rejects(task, known.call, reason)]

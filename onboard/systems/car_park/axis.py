@@ -24,7 +24,7 @@ class TrackAxis:
 
     @property
     def track(self) -> Track:
-        """The alley or spur."""
+        """The alley or spur that the axis lies along."""
         return self.site.tracks[self.number]
 
     @cached_property
@@ -55,7 +55,7 @@ class TrackAxis:
         return () if self.mouth is not None else tuple(lift for lift in ends if lift is not None)
 
     def position_mm(self, index: int) -> int:
-        """Centre of an index."""
+        """Centre of a segment, mm from that of index 1."""
         return (index - 1) * self.pitch_mm
 
     def index_at(self, position_mm: int) -> int:

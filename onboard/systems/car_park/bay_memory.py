@@ -48,7 +48,7 @@ def ticket_record(car: Reference, *, urgent: bool) -> Record:
 
 
 def job_record(task: Reference, operation: Operation, car: Reference, wheelbase_mm: int) -> Record:
-    """The bay's task begins."""
+    """The journal's word that a task of the bay begins."""
     return Record(BayJobRecord(task, operation, car, wheelbase_mm))
 
 

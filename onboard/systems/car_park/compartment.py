@@ -267,7 +267,7 @@ class Compartment:
         return effects
 
     def _is_unheard(self, job: BayTask, now_us: int) -> bool:
-        return custody.is_mine(self.fleet, job.car) and self.fleet.negotiation.unheard(job.task, now_us) != NOBODY
+        return custody.is_mine(self.fleet, job.car) and self.fleet.negotiation.silent_winner(job.task, now_us) != NOBODY
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""

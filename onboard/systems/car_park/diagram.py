@@ -284,7 +284,7 @@ class TimeSpace:
 
     @property
     def last_us(self) -> int:
-        """The last one."""
+        """When the last message was heard, time of the log in us."""
         return self._watcher.picture.last_us
 
     def feed(self, said: Said) -> None:
@@ -292,7 +292,7 @@ class TimeSpace:
         self._watcher.feed(said)
 
     def draw(self, start_us: int) -> Drawing:
-        """The log is over."""
+        """The diagram of all that was heard; its time axis begins at ``start_us``."""
         return draw(self._site, self._watcher.finish(), start_us)
 
 

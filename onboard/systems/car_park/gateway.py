@@ -101,7 +101,7 @@ class CarParkEdge(Edge):
         self._park = site
 
     def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
-        """Tickets and keys."""
+        """Orders from outside become tickets and keys at the compartments' desks."""
         return ParkWishes(self._park, view, place)
 
     def body(self) -> Body:
@@ -115,7 +115,7 @@ class CarParkEdge(Edge):
         )
 
     def loads(self) -> Json:
-        """Cars."""
+        """The factsheet's word of loads: cars, with their limits in m and kg."""
         limits = self._park.cars
         dimensions = {"length": limits.max_length_mm / 1000, "width": 0.0, "height": limits.max_height_mm / 1000}
         most_kg = float(limits.max_load_kg)

@@ -36,7 +36,7 @@ class Layout:
     known: bool = True
 
     def alleys(self) -> list[Track]:
-        """The alleys by floor."""
+        """The alleys, in the order in which the tracks were read."""
         return [track for track in self.tracks.values() if track.kind is TrackKind.ALLEY]
 
     def find(self, table: Table, name: str, *, spurs: bool = False) -> Segment | None:

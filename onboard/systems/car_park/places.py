@@ -20,7 +20,7 @@ from onboard.systems.car_park.program import Handling, Phase, Work
 
 @dataclass
 class Places:
-    """One robot's places."""
+    """Which places are one robot's to put a car into, and what it does when another has promised the same."""
 
     fleet: Fleet
     generation: CarParkGeneration

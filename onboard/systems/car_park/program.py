@@ -32,7 +32,7 @@ class Handling(StrEnum):
 
 
 class Phase(StrEnum):
-    """Where one handling stands."""
+    """How far one handling of a car is."""
 
     ACQUIRE = "acquire"
     REACH = "reach"

@@ -162,7 +162,7 @@ class TicketRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class BayJobRecord(JournalRecord):
-    """The bay's task begins."""
+    """A task of the bay begins, for this car."""
 
     NAME = "job"
     RULES = (Keep("job"), End(("ticket",), _CAR, ("operation", (Operation.RETRIEVE,))))
@@ -219,7 +219,7 @@ class RideRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class RideOverRecord(JournalRecord):
-    """It is over."""
+    """The robot's ride has ended at its floor."""
 
     NAME = "ride_over"
     RULES = (End(("ride",)),)

@@ -58,7 +58,7 @@ def award_record(call: CallForProposals, source: Station, sink: Station, version
 
 
 def handled_record(work: Work) -> Record:
-    """A handling is over."""
+    """The journal's word that one handling of a task is over."""
     return Record(HandledRecord(work.call.task, work.handling, work.station.number))
 
 

@@ -34,7 +34,7 @@ class CarParkScene:
         self._speeds: dict[int, tuple[int, int]] = {}
 
     def feed(self, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow rights, plans, cars and calls for the elevation."""
         match message:
             case BusTime():
                 self._clock.feed(message, time_us)
@@ -46,7 +46,7 @@ class CarParkScene:
                 self._speeds[message.sender] = (message.speed_mm_s, time_us)
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow doors, desks and drives, where their buses are heard."""
         match message:
             case DoorState():
                 self._doors[node] = {
@@ -96,7 +96,7 @@ class CarParkScene:
         }
 
     def machine(self, node: int, now_us: int) -> Json:
-        """As in the port."""
+        """Segment, offset in mm, speed and car of one machine at ``now_us``."""
         view = self.view
         segment, offset_mm = view.positions[node]
         speed_mm_s, since_us = self._speeds.get(node, (0, 0))

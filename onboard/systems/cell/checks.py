@@ -55,7 +55,7 @@ class PassedOn(Rule):
         self._before: dict[Reference, set[int]] = {}
 
     def handlers(self) -> Handlers:
-        """Custodians' statements."""
+        """Reads what custodians say of parts."""
         return {PartAt: self._on_part}
 
     def _on_part(self, event: Event[PartAt]) -> None:
@@ -111,7 +111,7 @@ class OffersGoDown(BidsGoDown):
         self._costs: dict[tuple[int, Reference], float] = {}
 
     def handlers(self) -> Handlers:
-        """Offers too."""
+        """Reads offers beside what bids need."""
         return {**super().handlers(), OfferHigh: self._on_high, OfferLow: self._on_low}
 
     def _on_high(self, event: Event[OfferHigh]) -> None:

@@ -29,6 +29,6 @@ def five(nodes: tuple[int, ...]) -> tuple[int, int, int, int, int]:
 
 
 def nodes_of(message: GoalPath | OfferNodes) -> tuple[int, ...]:
-    """Inverse of ``five``."""
+    """The node-IDs in five fields of a message, without the empty ones."""
     every = (message.node1, message.node2, message.node3, message.node4, message.node5)
     return tuple(node for node in every if node)

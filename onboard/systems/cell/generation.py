@@ -42,7 +42,7 @@ class ArmGeneration:
 
     @property
     def arm(self) -> Arm:
-        """This robot."""
+        """This robot as the site file describes it."""
         return self.site.arms[self.machine.node_id]
 
     # --- the Estimator -----------------------------------------------------------------------------------------

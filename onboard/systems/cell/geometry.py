@@ -37,7 +37,7 @@ class Area(NamedTuple):
         return self.x0_mm < point.x_mm < self.x1_mm and self.y0_mm < point.y_mm < self.y1_mm
 
     def corners(self) -> tuple[Point, Point, Point, Point]:
-        """The four corners."""
+        """The four corners, mm, counter-clockwise from the lowest x and y."""
         return (
             Point(self.x0_mm, self.y0_mm),
             Point(self.x1_mm, self.y0_mm),
@@ -47,7 +47,7 @@ class Area(NamedTuple):
 
 
 def distance_m(one: Point, other: Point) -> float:
-    """Straight distance, in m."""
+    """Straight distance of two points, in m, as the paper's costs have it."""
     return hypot((other.x_mm - one.x_mm) / _MM, (other.y_mm - one.y_mm) / _MM)
 
 

@@ -27,7 +27,7 @@ class Undertaking:
 
     @property
     def task(self) -> Reference:
-        """The goal's name."""
+        """Origin and number of the goal that the contract is about."""
         return self.contract.goal.task
 
 
@@ -59,7 +59,7 @@ def stage_record(one: Undertaking) -> Record:
 
 
 def lost_record(one: Undertaking) -> Record:
-    """It is another's now."""
+    """The journal's word that the contract is another's now."""
     return Record(ContractLostRecord(one.task))
 
 

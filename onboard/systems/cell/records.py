@@ -56,7 +56,7 @@ class StageRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class ContractLostRecord(JournalRecord):
-    """It is another's now."""
+    """Another has the contract now, and this robot forgets it."""
 
     NAME = "contract_lost"
     RULES = (End(("contract", "stage"), ("task",)),)

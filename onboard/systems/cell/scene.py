@@ -65,7 +65,7 @@ class CellScene:
         return {"plan": {"width": WIDTH, "height": self._height, "shapes": shapes}}
 
     def feed(self, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow arms, goals and parts for the plan."""
         match message:
             case ArmProgress() if message.sender in self._robots:
                 self._on_progress(message, time_us)
@@ -114,7 +114,7 @@ class CellScene:
         return round(x, 1), round(y, 1)
 
     def machine(self, node: int, now_us: int) -> Json:
-        """As in the port."""
+        """Where an arm's tool is and which part it carries; a desk has neither."""
         robot = self._robots.get(node)
         if robot is None:
             return {"where": "", "car": None}

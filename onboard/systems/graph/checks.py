@@ -78,7 +78,7 @@ class AgentsOfNodes(Rule):
     needs_site = True
 
     def handlers(self) -> Handlers:
-        """Answers and notices."""
+        """Reads answers and notices of node agents."""
         return {NodeAnswer: self._on_word, EdgeNotice: self._on_word}
 
     def _on_word(self, event: Event[NodeAnswer | EdgeNotice]) -> None:
@@ -105,11 +105,11 @@ class GrantsAreTold(Rule):
         self._untold: dict[tuple[int, int, int], int] = {}
 
     def handlers(self) -> Handlers:
-        """Signals, answers and notices."""
+        """Reads robots' signals, and agents' answers and notices."""
         return {TurnSignal: self._on_signal, NodeAnswer: self._on_answer, EdgeNotice: self._on_notice}
 
     def tick(self, now_us: int) -> None:
-        """A second is long."""
+        """A grant of which nobody was told within a second is reported."""
         for (node, after, robot), time_us in list(self._untold.items()):
             if now_us > time_us + 1_000_000:
                 del self._untold[node, after, robot]

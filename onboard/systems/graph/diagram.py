@@ -25,7 +25,7 @@ class GraphDiagram(Rows):
         self._loading: dict[int, tuple[int, int]] = {}
 
     def take(self, message: Message, time_us: int) -> None:
-        """Robots tell their places."""
+        """A robot's word of the node where it is becomes a point of its line."""
         if isinstance(message, RobotAt) and message.sender in self._lines and message.node in self._rows:
             self._on_robot(message, time_us)
 

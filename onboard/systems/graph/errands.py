@@ -27,7 +27,7 @@ def errand_record(errand: Errand) -> Record:
 
 
 def lost_record(task: Reference) -> Record:
-    """It is another's now."""
+    """The journal's word that the order is another's now."""
     return Record(ErrandLostRecord(task))
 
 

@@ -18,7 +18,7 @@ VISIT_AGAIN_US = 1_000_000
 
 
 class GraphWishes(NoWishes):
-    """A factory graph."""
+    """What orders from outside become on a factory graph: visits by a robot of that name, or by any."""
 
     def __init__(self, site: FactoryGraph) -> None:
         super().__init__(site)
@@ -103,7 +103,7 @@ class GraphTracker:
         return True
 
     def where(self, node_id: int) -> Whereabouts:
-        """As in the port."""
+        """The node where the robot is, or that it left last."""
         return self._at[node_id]
 
 
@@ -117,7 +117,7 @@ class GraphEdge(Edge):
         self._graph = site
 
     def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
-        """Visits and transports."""
+        """Orders from outside become lists of visits."""
         return GraphWishes(self._graph)
 
     def tracker(self) -> Tracker:

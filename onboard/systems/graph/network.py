@@ -31,7 +31,7 @@ class Graph:
 
     @cached_property
     def nodes(self) -> tuple[int, ...]:
-        """All nodes, lowest first."""
+        """All nodes that an edge ends at, lowest number first."""
         return tuple(sorted({node for ends in self.lengths_mm for node in ends}))
 
     @cached_property

@@ -38,7 +38,7 @@ class ErrandRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class ErrandLostRecord(JournalRecord):
-    """It is another's now."""
+    """Another has the order now, and this robot forgets it."""
 
     NAME = "errand_lost"
     RULES = (End(("errand",), _TASK),)

@@ -44,7 +44,7 @@ class GraphScene:
         self._edges: dict[frozenset[int], tuple[EdgeState, int]] = {}
 
     def layout(self) -> Json:
-        """Nodes and edges."""
+        """Nodes, and edges with their length in m, as a plan."""
         shapes = [
             shape(_edge_id(one, other), "edge", f"{length / 1000:g} m", [self._spots[one], self._spots[other]])
             for one, other, length in self.site.edges
@@ -55,7 +55,7 @@ class GraphScene:
         return {"plan": {"width": width, "height": height, "shapes": shapes}}
 
     def feed(self, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow robots, edges, orders and calls for the plan."""
         match message:
             case RobotAt() if message.sender in self._robots:
                 self._on_robot(message, time_us)
@@ -92,7 +92,7 @@ class GraphScene:
             robot.path = None
 
     def machine(self, node: int, now_us: int) -> Json:
-        """As in the port."""
+        """Where a robot is; of a host, which nodes' agents it runs."""
         robot = self._robots.get(node)
         if robot is None:
             hosted = [f"N{one}" for one, host in sorted(self.site.hosts.items()) if host == node]

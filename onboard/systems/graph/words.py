@@ -27,7 +27,7 @@ class GraphWords(SiteWords):
         return str(value.number) if any(value) else "none"
 
     def place(self, number: int) -> str:
-        """A node."""
+        """A node by its number, as `N7`; or any of them."""
         return "any node" if number == ANY_STATION else node_name(number)
 
     def slot(self, track: int, index: int) -> str:

@@ -25,12 +25,12 @@ class CellTracker:
         return True
 
     def where(self, node_id: int) -> Whereabouts:
-        """As in the port."""
+        """The cell where the robot said that it is."""
         return self._at[node_id]
 
 
 class MapdEdge(Edge):
-    """A floor of cells."""
+    """What the gateway tells of a floor of cells; it takes no orders."""
 
     def __init__(self, site: Mapd) -> None:
         super().__init__(site)

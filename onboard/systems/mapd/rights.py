@@ -24,10 +24,10 @@ def cell_token(resource: int) -> TokenKey:
 
 
 def resource_of(key: TokenKey) -> int:
-    """Inverse of ``cell_token``."""
+    """The cell or zone that a right is about."""
     return resource_number(Station.from_number(key.number))
 
 
 def resource_number(station: Station) -> int:
-    """Inverse of ``cell_station``."""
+    """The cell or zone, from 0, that a right's station number stands for."""
     return (station.track - 1) * _PER_TRACK + station.side * _PER_SIDE + station.index - 1

@@ -82,7 +82,7 @@ class MapdScene:
         return {"plan": {"width": width, "height": height, "shapes": shapes}}
 
     def feed(self, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow robots, tasks and rounds for the plan."""
         robot = self._robots.get(message.sender)
         match message:
             case CallForProposals():
@@ -148,7 +148,7 @@ class MapdScene:
         robot.bound_for = cell
 
     def machine(self, node: int, now_us: int) -> Json:
-        """As in the port."""
+        """The cell where a robot is, its task and its way; nothing of the desk."""
         robot = self._robots.get(node)
         if robot is None:
             return {"where": "", "car": None}

@@ -48,7 +48,7 @@ class MapdWords(SiteWords):
         return f"{'delivers' if message.loaded else 'goes to pick up'} task {message.task}"
 
     def done(self, load: Reference, station: int) -> str:
-        """A task is delivered."""
+        """What is said when a task was delivered."""
         return f"has delivered {self.thing(load)}"
 
 

@@ -25,7 +25,7 @@ from onboard.trace.check.tokens_seen import Token
 
 
 class Slot(NamedTuple):
-    """A body slot."""
+    """One body's room on an entity: the entity's number, and the slot in it."""
 
     entity: int
     slot: int
@@ -60,7 +60,7 @@ class OneBodyInSlot(_TerminalRule):
         self._at: dict[int, Slot] = {}
 
     def handlers(self) -> Handlers:
-        """Where drives are."""
+        """Reads where drives say that they are."""
         return {MoveState: self._on_state}
 
     def _on_state(self, event: Event[MoveState]) -> None:
@@ -87,7 +87,7 @@ class MovesByRight(_TerminalRule):
     on_devices = True
 
     def handlers(self) -> Handlers:
-        """Orders to drives."""
+        """Reads the orders that drives are given."""
         return {MoveOrder: self._on_order}
 
     def _on_order(self, event: Event[MoveOrder]) -> None:
@@ -115,7 +115,7 @@ class BoxInOnePlace(_TerminalRule):
         self._aboard: dict[int, int] = {}
 
     def handlers(self) -> Handlers:
-        """Labels read, and statements."""
+        """Reads labels that handlers see, and statements about boxes."""
         return {HandlerState: self._on_state, CarAt: self._on_statement}
 
     def _on_state(self, event: Event[HandlerState]) -> None:

@@ -101,7 +101,7 @@ class EntityTracker:
         self._at[report.sender] = Whereabouts(node, (), old.passed + (node != old.node), plan.done < plan.steps)
 
     def where(self, node_id: int) -> Whereabouts:
-        """As in the port."""
+        """The entity where the vehicle is, and those of its plan that lie ahead."""
         at, plan = self._at[node_id], self._plans.get(node_id)
         if plan is None or len(plan.entities) < plan.steps:
             return at
@@ -125,7 +125,7 @@ class TerminalEdge(Edge):
         self._terminal = site
 
     def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
-        """Missions for one box."""
+        """Orders from outside become missions for one box."""
         return TerminalWishes(self._terminal)
 
     def tracker(self) -> Tracker:
@@ -133,7 +133,7 @@ class TerminalEdge(Edge):
         return EntityTracker(self._terminal)
 
     def place(self, number: int) -> str | None:
-        """An entity."""
+        """An entity's name by its number; None where the site has none."""
         return self._terminal.entities[number].name if number in self._terminal.entities else None
 
 

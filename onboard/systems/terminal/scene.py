@@ -94,7 +94,7 @@ class TerminalScene:
     # --- in ----------------------------------------------------------------------------------------------------
 
     def feed(self, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow vehicles, lanes, boxes and missions for the plan."""
         if message.sender in self._bodies:
             self._on_vehicle(message, time_us)
         match message:
@@ -128,7 +128,7 @@ class TerminalScene:
                 self._on_report(message, time_us)
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow a drive's slot and motion, where its bus is heard."""
         body = self._bodies.get(node)
         if body is None or not isinstance(message, MoveState):
             return
@@ -196,7 +196,7 @@ class TerminalScene:
     # --- out ---------------------------------------------------------------------------------------------------
 
     def machine(self, node: int, now_us: int) -> Json:
-        """As in the port."""
+        """Where a vehicle is, what it does and which boxes it has; nothing of a desk."""
         body = self._bodies.get(node)
         if body is None:
             return {"where": "", "car": None}

@@ -137,7 +137,7 @@ class Terminal(Site):
 
     @cached_property
     def by_name(self) -> dict[str, Entity]:
-        """Entities by their names."""
+        """All entities by the names of the site file."""
         return {entity.name: entity for entity in self.entities.values()}
 
     def box(self, number: int) -> Reference:

@@ -27,7 +27,7 @@ class BillsAddUp(Rule):
         self._tasks: dict[tuple[int, int], Reference] = {}
 
     def handlers(self) -> Handlers:
-        """Bills, calls and bids."""
+        """Reads the three parts of a bill, calls and bids."""
         return {
             BillCutting: self._on_cutting,
             BillWaiting: self._on_waiting,
@@ -75,7 +75,7 @@ class BillsGoDown(BidsGoDown):
         self._totals_ct: dict[tuple[int, Reference], int] = {}
 
     def handlers(self) -> Handlers:
-        """Bills too."""
+        """Reads bills beside what the rule for bids needs."""
         return {**super().handlers(), BillBar: self._on_bar}
 
     def _on_bar(self, event: Event[BillBar]) -> None:

@@ -14,7 +14,7 @@ class Bill(NamedTuple):
 
     @property
     def total_eur(self) -> float:
-        """Their sum."""
+        """The sum of its five terms, in EUR."""
         return sum(self)
 
     @property

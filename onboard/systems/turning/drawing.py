@@ -108,7 +108,7 @@ class Drawing:
 
     @property
     def diameter_mm(self) -> float:
-        """Largest diameter."""
+        """The largest diameter of the part, mm."""
         return self.elements[-1].end.r_um / 500
 
     @property

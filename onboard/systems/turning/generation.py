@@ -43,7 +43,7 @@ class LatheGeneration:
 
     @property
     def lathe(self) -> Lathe:
-        """This lathe."""
+        """This lathe as the site file describes it."""
         return self.site.lathes[self.machine.node_id]
 
     def hear(self, message: Message) -> None:
@@ -155,12 +155,12 @@ def after(job: Job, process: Process, state: LatheState) -> LatheState:
 
 
 def job_of(message: TurningOrder) -> Job:
-    """An order's job."""
+    """The job that an order's message asks for, lengths in mm."""
     return Job(message.drawing, message.material, message.bar_mm, message.batch, message.face_um / 1000)
 
 
 def order_message(task: Reference, job: Job) -> TurningOrder:
-    """Inverse of ``job_of``."""
+    """The message that asks for a job; lengths become whole um and mm."""
     face_um, bar_mm = round(job.face_mm * 1000), round(job.bar_mm)
     return TurningOrder(task.origin, task.number, job.drawing, job.material, job.batch, bar_mm, face_um)
 

@@ -41,7 +41,7 @@ class JobRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class JobStageRecord(JournalRecord):
-    """How far it is."""
+    """How far the lathe is with a job."""
 
     NAME = "job_stage"
     RULES = (Keep("job_stage", _TASK),)
@@ -52,7 +52,7 @@ class JobStageRecord(JournalRecord):
 
 @dataclass(frozen=True, slots=True)
 class JobLostRecord(JournalRecord):
-    """It is another's now."""
+    """Another has the job now, and this lathe forgets it."""
 
     NAME = "job_lost"
     RULES = (End(("job", "job_stage"), _TASK),)

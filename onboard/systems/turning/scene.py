@@ -48,7 +48,7 @@ class TurningScene:
         return {"plan": {**size, "shapes": shapes}}
 
     def feed(self, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Follow bills, lathes, jobs and calls for the plan."""
         match message:
             case BillBar():
                 self._prices[message.sender, Reference(message.manager, message.task)] = message.total_ct

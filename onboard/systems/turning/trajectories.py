@@ -113,12 +113,12 @@ def _away(job: Job, z_mm: float) -> list[Cut]:
 
 
 def cutting_min(trajectory: Trajectory) -> float:
-    """Minutes under feed."""
+    """Minutes of the trajectory that the tool cuts, under feed."""
     return sum(minutes for minutes, rapid in _minutes(trajectory, 1.0) if not rapid)
 
 
 def rapid_min(trajectory: Trajectory, lathe: Lathe) -> float:
-    """Minutes in rapid moves."""
+    """Minutes of the trajectory in rapid moves, at the lathe's rapid speed."""
     return sum(minutes for minutes, rapid in _minutes(trajectory, lathe.rapid_mm_min) if rapid)
 
 

@@ -67,7 +67,7 @@ class TurningWords(SiteWords):
         return f"{_DEEDS[message.lathe_phase]} {super().thing(Reference(message.manager, message.task))}"
 
     def done(self, load: Reference, station: int) -> str:
-        """What was made."""
+        """What is said when a batch was made."""
         return f"has made {self.thing(load)}"
 
 

@@ -101,7 +101,7 @@ class Rows:
         self.take(said.message, said.time_us)
 
     def take(self, message: Message, time_us: int) -> None:
-        """One message."""
+        """Take up one message at ``time_us``; each system's rows say which they draw."""
         raise NotImplementedError
 
     def end(self, time_us: int) -> None:

@@ -33,7 +33,7 @@ class Drawing:
         ]
 
     def line(self, points: list[tuple[float, float]], stroke: str, *, width: float = 1, dash: str = "") -> None:
-        """A line through points."""
+        """A line through points in px, dashed where a pattern is given."""
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
         dashed = f' stroke-dasharray="{dash}"' if dash else ""
         self._parts.append(f'<polyline points="{path}" fill="none" stroke="{stroke}" stroke-width="{width}"{dashed}/>')
@@ -45,7 +45,7 @@ class Drawing:
         self._parts.append(f'<polygon points="{path}" fill="{fill}" fill-opacity="{opacity}">{title}</polygon>')
 
     def text(self, x: float, y: float, words: str, *, anchor: str = "start", fill: str = "#222222") -> None:
-        """Words at their baseline."""
+        """Words with their baseline at x and y, px; signs that SVG reserves are escaped."""
         self._parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{fill}">{escape(words)}</text>')
 
     def arrow(self, x1: float, x2: float, y: float, stroke: str) -> None:

@@ -152,7 +152,7 @@ class BidsInTime(_CallRule):
     source = "row P05; docs/decisions.md, flag 11"
 
     def judge_award(self, event: Event[Award], seen: CallSeen) -> None:
-        """The winner's bids."""
+        """The winner must have bid before the deadline less the guard."""
         award = event.message
         if award.result not in (CallResult.AWARDED, CallResult.OPTION) or award.winner == NOBODY or seen.told:
             return

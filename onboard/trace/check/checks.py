@@ -192,7 +192,7 @@ class Checks:
         self._picture.feed(event)
 
     def finish(self) -> Verdict:
-        """The log is over."""
+        """The log has ended: judge what is still open, and tell the verdict."""
         self._end()
         for decoders in self._decoders.values():
             for decoder in decoders:

@@ -32,7 +32,7 @@ class Body:
 
     @property
     def place(self) -> tuple[int, int]:
-        """Track and position."""
+        """Number of the track, and position on it in mm."""
         return self.track, self.position_mm
 
 

@@ -47,7 +47,7 @@ class OneOwner(Rule):
         self._calls: OrderedDict[tuple[int, int], bool] = OrderedDict()
 
     def handlers(self) -> Handlers:
-        """Calls, awards and reports."""
+        """Reads calls, awards and reports of tasks."""
         return {CallForProposals: self._on_call, Award: self._on_award, TaskReport: self._on_report}
 
     def _on_call(self, event: Event[CallForProposals]) -> None:

@@ -95,7 +95,7 @@ class Picture:
         return body if lift is None else replace(body, track=floor_of(self.site, lift))
 
     def feed(self, event: Event[Message]) -> None:
-        """Take up one message."""
+        """Take up one message of the fleet bus before the rules see it."""
         self.now_us = time_us = event.time_us
         match event.message:
             case BusTime(bus_time_us=bus_us):

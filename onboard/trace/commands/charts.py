@@ -48,7 +48,7 @@ _CONVERTER = "rsvg-convert"
 
 
 def register_sequence(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``sequence`` to the commands of ``onboard trace``, with its options."""
     parser = add_command(commands, "sequence", "sequence chart of a customer's task", SEQUENCE_HELP, run_sequence)
     add_log(parser)
     parser.add_argument("task", metavar="TASK", help="such as IOC1/2, as `onboard trace calls` names it")
@@ -57,7 +57,7 @@ def register_sequence(commands: Commands) -> None:
 
 
 def register_diagram(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``diagram`` to the commands of ``onboard trace``, with its options."""
     parser = add_command(commands, "diagram", "what moves or lasts over time, SVG or PNG", DIAGRAM_HELP, run_diagram)
     add_log(parser)
     add_site(parser, required=True)
@@ -106,7 +106,7 @@ def run_sequence(args: argparse.Namespace) -> int:
 
 
 def run_diagram(args: argparse.Namespace) -> int:
-    """Draw the diagram."""
+    """Draw what the site's system has rows for. Raises ``TraceError`` for a system without any."""
     site = site_of(args)
     assert site is not None, "argparse asks for it"
     module = part(site.system, "diagram")

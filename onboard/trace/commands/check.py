@@ -35,7 +35,7 @@ examples:
 
 
 def register(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``check`` to the commands of ``onboard trace``, with its options."""
     check = add_command(commands, "check", "judge a log by every rule that a fleet must keep", HELP, run)
     add_log(check)
     add_site(check)

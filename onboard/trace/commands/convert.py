@@ -16,7 +16,7 @@ examples:
 
 
 def register(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``convert`` to the commands of ``onboard trace``, with its options."""
     convert = add_command(commands, "convert", "write a log as candump -L or pcapng", HELP, run)
     add_log(convert)
     convert.add_argument("out", type=Path, metavar="OUT", help="file to write: .pcapng, else as candump -L writes it")

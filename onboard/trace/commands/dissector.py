@@ -18,13 +18,13 @@ examples:
 
 
 def register(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``dissector`` to the commands of ``onboard trace``, with its options."""
     parser = add_command(commands, "dissector", "print a Wireshark dissector (Lua) of the DBC", HELP, run)
     parser.add_argument("site", nargs="?", type=Path, metavar="SITE", help="site file: its machines' names, its system")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print it."""
+    """Print the dissector, in Lua, on standard output; exit status 0."""
     site = load_site(args.site) if args.site is not None else None
     sys.stdout.write(dissector(site, system_of(site).name if site is not None else ""))
     return 0

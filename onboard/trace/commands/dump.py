@@ -43,7 +43,7 @@ examples:
 
 
 def register(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``dump`` to the commands of ``onboard trace``, with its options."""
     dump = add_command(commands, "dump", "print a log as candump prints a bus, or in words", HELP, run)
     add_log(dump)
     dump.add_argument("filters", nargs="*", metavar="[BUS,]FILTER", help="what to show; default: all data frames")

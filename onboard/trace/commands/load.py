@@ -29,7 +29,7 @@ _BIT_RATE = 500_000
 
 
 def register(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``load`` to the commands of ``onboard trace``, with its options."""
     parser = add_command(commands, "load", "bus load and response times, beside their worst case", HELP, run)
     add_log(parser)
     add_site(parser)
@@ -37,7 +37,7 @@ def register(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Print the tables."""
+    """Print load and response times of each bus of the log. Raises ``TraceError`` for a rate below 1 bit/s."""
     site = site_of(args)
     bit_rate: int = args.bitrate or (site.bitrate if site is not None else _BIT_RATE)
     if bit_rate < 1:

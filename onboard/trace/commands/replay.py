@@ -31,7 +31,7 @@ examples:
 
 
 def register(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``replay`` to the commands of ``onboard trace``, with its options."""
     parser = add_command(commands, "replay", "run one controller against a log: the first different frame", HELP, run)
     add_log(parser)
     parser.add_argument("--site", type=Path, metavar="SITE", required=True, help="site file, or a shipped site's name")
@@ -54,7 +54,7 @@ def register(commands: Commands) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Replay and compare."""
+    """Run one controller against the log; exit status 1 at the first frame that differs."""
     site = load_site(args.site)
     machine = _machine(site, args.machine)
     codecs = codecs_for(site)

@@ -41,7 +41,7 @@ examples:
 
 
 def register_calls(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``calls`` to the commands of ``onboard trace``, with its options."""
     parser = add_command(commands, "calls", "every call: bids, winner, promise, finish", CALLS_HELP, run_calls)
     add_log(parser)
     add_site(parser)
@@ -49,7 +49,7 @@ def register_calls(commands: Commands) -> None:
 
 
 def register_why(commands: Commands) -> None:
-    """Add the command."""
+    """Add ``why`` to the commands of ``onboard trace``, with its options."""
     parser = add_command(commands, "why", "what one customer waited for, on whom, for how long", WHY_HELP, run_why)
     add_log(parser)
     parser.add_argument("task", nargs="?", metavar="TASK", help="such as IOC1/2; default: list the longest waits")
@@ -57,7 +57,7 @@ def register_why(commands: Commands) -> None:
 
 
 def run_calls(args: argparse.Namespace) -> int:
-    """Print the calls."""
+    """Print every call of the log, or those for one task. Raises ``TraceError`` for systems without calls."""
     site = site_of(args)
     task = task_of(args.task, site)
     listener, calls, words = Listener(codecs_for(site)), Calls(), Words(site)

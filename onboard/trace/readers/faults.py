@@ -26,7 +26,7 @@ class LogFaults:
         self.frames = 0
 
     def add(self, fault: LogFault, where: int) -> None:
-        """Count one."""
+        """Count one fault of the log, and keep where the first of its kind is."""
         self.counts[fault] += 1
         self.first.setdefault(fault, where)
 

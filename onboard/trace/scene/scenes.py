@@ -11,21 +11,21 @@ class PlainScene:
     """A system that nobody has drawn: its calls, bids and events are told all the same."""
 
     def layout(self) -> Json:
-        """An empty plan."""
+        """An empty plan, 1000 x 60: nobody has said how to draw this system."""
         return {"plan": {"width": 1000, "height": 60, "shapes": []}}
 
     def feed(self, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Nothing is drawn, so no message changes anything."""
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
-        """As in the port."""
+        """Nothing is drawn, so no message changes anything."""
 
     def machine(self, node: int, now_us: int) -> Json:
-        """As in the port."""
+        """No place and no load: neither can be read without the system's own messages."""
         return {"where": "", "car": None}
 
     def marks(self, now_us: int) -> Json:
-        """As in the port."""
+        """No marks and no things on an empty plan."""
         return {"marks": {}, "things": []}
 
 

@@ -52,7 +52,7 @@ class Part:
 
     @property
     def length_us(self) -> int:
-        """How long it was."""
+        """How long this part of the wait lasted, us."""
         return self.end_us - self.begin_us
 
 
@@ -139,7 +139,7 @@ class Why:
                 self._body(message.requester).refusal = (time_us, message)
 
     def finish(self) -> None:
-        """The log is over."""
+        """The log has ended: what is still waited for lasts until then."""
         if self._now_us is not None:
             self._settle(self._now_us)
 

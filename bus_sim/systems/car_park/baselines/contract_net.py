@@ -129,7 +129,7 @@ class ContractNetInitiator:
         return self._close() if self.participants <= self.bids.keys() else []
 
     def wake(self, now_us: int) -> Outcome:
-        """Let the deadline pass."""
+        """Close the call where its deadline has passed."""
         return self._close() if self.call is not None and now_us >= self.deadline_us else []
 
     def next_wake(self) -> int | None:

@@ -39,7 +39,7 @@ exit status: 0 all went well; 1 a run broke an invariant or left somebody waitin
 
 
 def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The subcommand's options."""
+    """Add ``compare`` to the commands of ``bus-sim``, with its options."""
     compare = commands.add_parser(
         "compare",
         help="our protocol beside central dispatchers, a bound and an optimum",
@@ -91,8 +91,8 @@ def run_compare(args: argparse.Namespace) -> int:
             found[part] = _compare_small(small, seeds[:MOST_CASES])
         print("\n".join([*found[part].lines(), ""]), flush=True)
     if args.json is not None:
-        told = {part: table.to_json() for part, table in found.items()}
-        args.json.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+        values = {part: table.to_json() for part, table in found.items()}
+        args.json.write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
     tables = [table for table in found.values() if isinstance(table, Table)]
     return 1 if any(table.faults or table.left_out for table in tables) else 0
 

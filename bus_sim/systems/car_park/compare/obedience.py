@@ -60,7 +60,7 @@ class WaitingInitiator(Initiator):
 
 
 class CallingNegotiation(Negotiation):
-    """A compartment's side."""
+    """A compartment that tells its tasks to a dispatcher and waits for the robot that it names."""
 
     def open(self, terms: CallTerms, now_us: int) -> list[Effect]:
         """Tell a task; the answer comes as a ``Closed`` event once the dispatcher has decided."""
@@ -115,7 +115,7 @@ class DispatchedRobotFactory(RobotFactory):
     """Makes robots for a dispatcher."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
-        """The robot's task-generation function."""
+        """The planner of the product, started from the moment of the award instead of the call's deadline."""
         usual = super().estimator(site, machine, mirror)
         return DispatchedGeneration(usual.site, usual.machine, usual.mirror, usual.program)
 

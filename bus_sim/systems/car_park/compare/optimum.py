@@ -18,7 +18,7 @@ class OptimumError(RuntimeError):
 
 
 def is_available() -> bool:
-    """Whether OR-Tools is installed."""
+    """Whether OR-Tools, which proves the optimum, is installed."""
     return find_spec("ortools") is not None
 
 

@@ -92,10 +92,10 @@ class _Run:
             await self._until(begin_us)
             self._indicators.begin(self._loop.now_us())
         await self._to_the_end()
-        told = self._told(begin_us)
+        visits = self._told(begin_us)
         for controller in simulation.controllers.values():
             await controller.stop()
-        return told
+        return visits
 
     async def _until(self, limit_us: int, done: Callable[[], bool] = lambda: False) -> None:
         await run_until(self._simulation, done, limit_us, STEP_US)

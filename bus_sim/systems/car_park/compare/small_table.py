@@ -58,13 +58,13 @@ def solve_case(site: Site, seed: int) -> SmallCase:
 
 @dataclass(frozen=True)
 class SmallTable:
-    """All small cases."""
+    """All cases of one site that are small enough for the exact optimum."""
 
     site: str
     cases: tuple[SmallCase, ...]
 
     def to_json(self) -> dict[str, object]:
-        """Plain values for ``json.dump``."""
+        """The fields as ``json.dump`` takes them; units stand in the keys."""
         return asdict(self)
 
     def lines(self) -> list[str]:

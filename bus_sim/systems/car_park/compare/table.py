@@ -41,7 +41,7 @@ class Table:
         return {"title": self.title, "rows": rows, "left_out": self.left_out, "faults": self.faults}
 
     def lines(self) -> list[str]:
-        """The table in Markdown."""
+        """The table in Markdown, waiting times in s; below it what was left out, and faults of the runs."""
         text = [
             f"{self.title}",
             "",

@@ -73,7 +73,7 @@ class Carrier:
 
     @property
     def mode(self) -> DriveMode:
-        """As told in DriveState."""
+        """What ``DriveState`` says of the drive at this moment."""
         if self.fault:
             return DriveMode.FAULT
         if self._turn_timer is not None:

@@ -111,7 +111,7 @@ class Motion:
 
 
 def standing(position_mm: float, now_us: int) -> Motion:
-    """An axis at rest."""
+    """The motion of an axis that stands at ``position_mm`` from ``now_us`` on."""
     return Motion(now_us, (), position_mm)
 
 

@@ -10,7 +10,7 @@ OVERLAP_TOLERANCE_MM = 1e-3
 
 
 class Rule(Enum):
-    """The invariants."""
+    """What must never happen in the plant, as the oracle reports it."""
 
     BODIES_APART = "two bodies overlap on a track"
     ON_TRACK = "a carrier leaves its track"

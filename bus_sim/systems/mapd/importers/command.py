@@ -15,7 +15,7 @@ _KINDS = "a map (.map, with a .task file or without), an openTCS model (.xml) or
 
 
 def add_import(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """The command's options."""
+    """Add ``import`` to the commands of ``bus-sim``, with its options."""
     one = commands.add_parser("import", help="make a site file of a MAPF map, an openTCS model or an Open-RMF building")
     one.add_argument("files", nargs="+", type=Path, metavar="FILE", help=_KINDS)
     one.add_argument("-o", "--output", type=Path, required=True, metavar="SITE", help="the site file to write")

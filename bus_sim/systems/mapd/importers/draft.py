@@ -79,7 +79,7 @@ def draw_tasks(endpoints: Sequence[str], count: int, every: int, seed: int) -> l
 
 
 def site_text(draft: Draft) -> str:
-    """The site file."""
+    """The draft as a site file of the system ``mapd``; what was not carried over stands in comments on top."""
     lines = [f"# Imported from {', '.join(draft.sources)}.", *(f"# {one}" for one in draft.meanings)]
     lines += [f"# Not carried over: {element}: {why}" for element, why in draft.losses]
     lines += ["", "[site]", f"name = {quoted(site_name(draft.name))}", 'system = "mapd"', ""]

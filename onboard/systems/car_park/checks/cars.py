@@ -47,7 +47,7 @@ class CarsConserved(Rule):
         self._aboard: dict[int, Reference] = {}
 
     def handlers(self) -> Handlers:
-        """Statements about cars."""
+        """Reads where cars are said to stand."""
         return {CarAt: self._on_car}
 
     def _on_car(self, event: Event[CarAt]) -> None:

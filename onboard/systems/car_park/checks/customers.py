@@ -40,7 +40,7 @@ class TasksServed(Rule):
         self._told: set[Reference] = set()
 
     def handlers(self) -> Handlers:
-        """Calls and reports."""
+        """Reads calls, awards and reports of tasks."""
         return {CallForProposals: self._on_call, TaskReport: self._on_report, Award: self._on_award}
 
     def _on_call(self, event: Event[CallForProposals]) -> None:
@@ -94,7 +94,7 @@ class CustomersServed(Rule):
         self._told: set[tuple[int, Reference]] = set()
 
     def handlers(self) -> Handlers:
-        """Desks and bays."""
+        """Reads what desks are asked and show, and what bays sense."""
         return {DeskEvent: self._on_event, DeskOrder: self._on_word, BayState: self._on_bay}
 
     def _on_bay(self, event: Event[BayState]) -> None:

@@ -30,7 +30,7 @@ class Doors(Rule):
         self._told: set[tuple[int, str]] = set()
 
     def handlers(self) -> Handlers:
-        """Doors, bays and shuttles."""
+        """Reads doors, orders to them, bays and shuttles."""
         return {
             DoorState: self._on_doors,
             DoorOrder: self._on_order,

@@ -116,7 +116,7 @@ class SomethingHappens(_OpenTasks):
         self._happened(event)
 
     def on_report(self, event: Event[TaskReport]) -> None:
-        """A task goes on."""
+        """A report of a task counts as something that happens."""
         super().on_report(event)
         self._happened(event)
 

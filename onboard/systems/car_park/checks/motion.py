@@ -126,7 +126,7 @@ class OneBody(Rule):
     needs_site = True
 
     def handlers(self) -> Handlers:
-        """Where bodies are."""
+        """Reads where bodies say that they are."""
         return {Progress: self._on_progress}
 
     def _on_progress(self, event: Event[Progress]) -> None:

@@ -15,7 +15,7 @@ from onboard.wire.decoder import Decoder
 M = TypeVar("M", bound=Message)
 
 
-class Ears:
+class BusListener:
     """One bus. ``heard`` keeps every message with its loop time, us; ``senders`` counts frames by node-ID."""
 
     def __init__(self, bus: Bus, codec: Codec) -> None:
@@ -39,7 +39,7 @@ class Ears:
         return len(self.heard)
 
     def say(self, message: Message) -> None:
-        """Say a message."""
+        """Send a message as its controller would, in as many frames as it needs."""
         for frame in self._codec.encode(message):
             self.bus.send(frame)
 
