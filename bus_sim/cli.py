@@ -12,6 +12,8 @@ from bus_sim.campaign.command import add_campaign, run_campaign_command, run_sce
 from bus_sim.demand import DemandError
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.options import RunOptions
+from bus_sim.outputs import OutputError, check_outputs
+from bus_sim.outside import is_address
 from bus_sim.processes.fleet import ProcessesError
 from bus_sim.processes.options import ANY_PORT, add_processes, process_plan
 from bus_sim.publish import PublishError, check_mqtt
@@ -23,6 +25,7 @@ from bus_sim.systems.registry import UnknownSystemError, own_commands, simulated
 from bus_sim.systems.system import SimulatedSystem
 from bus_sim.virtual_time import DeadlockError, StandstillError
 from onboard import __version__
+from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.config.site_report import site_report
 from onboard.core.site import Site
@@ -61,7 +64,7 @@ DEFAULT_SITE = "standard"
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``bus-sim``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="bus-sim",
         description="Run a site on a simulated CAN bus: all controllers, the plant and its customers in one process.",
         epilog=HELP,
@@ -209,6 +212,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit status."""
     args = build_parser().parse_args(argv)
     try:
+        check_outputs(args)
         with terminated_as_interrupted():
             return _command(args.command)(args)
     except (
@@ -222,6 +226,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         UnknownSystemError,
         PublishError,
         OptionError,
+        OutputError,
     ) as error:
         for line in str(error).splitlines():
             print(line if isinstance(error, ConfigError) else f"bus-sim: {line}", file=sys.stderr)
@@ -246,6 +251,8 @@ def _dbc(args: argparse.Namespace) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    if args.limit_s is not None and not 0 < args.limit_s < float("inf"):
+        raise OptionError(f"--for {args.limit_s:g}: must be seconds above 0")
     if args.scenario is not None:
         return _run_scenario(args)
     site = find_site(args.site or DEFAULT_SITE)
@@ -332,7 +339,7 @@ def _options(args: argparse.Namespace, site: Site) -> RunOptions:
     except ValueError as error:
         raise OptionError(str(error)) from error
     live = args.serve is not None or bool(args.bus) or processes is not None or mqtt is not None
-    if args.serve is not None and not args.serve.rpartition(":")[2].isdigit():
+    if args.serve is not None and not is_address(args.serve):
         raise OptionError(f"--serve {args.serve}: must be HOST:PORT, such as 127.0.0.1:29536")
     if live and args.without and args.speed is not None and speed != 1.0:
         raise OptionError(

@@ -8,6 +8,15 @@ from bus_sim.run import FLEET, BusRun
 from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
 from bus_sim.serve.socketcand import ServeError, SocketcandServer
 
+#: Of TCP.
+MOST_PORT = 65_535
+
+
+def is_address(text: str) -> bool:
+    """Whether a text is HOST:PORT; port 0 is any."""
+    host, _, port = text.rpartition(":")
+    return bool(host) and port.isascii() and port.isdecimal() and int(port) <= MOST_PORT
+
 
 class Outside:
     """Everything that joins the buses from outside, for the time of a run.

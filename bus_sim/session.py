@@ -93,8 +93,6 @@ class _Session:
         self._options = options
         self._loop = loop
         self._console = Console(quiet=options.quiet)
-        if options.trace is not None:
-            options.trace.parent.mkdir(parents=True, exist_ok=True)
         plan = options.processes
         # Whoever has a process of its own has no controller here.
         all_names = frozenset(machine.name for machine in site.machines.values())

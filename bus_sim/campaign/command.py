@@ -294,6 +294,8 @@ def _check(args: argparse.Namespace) -> None:
     _check_seconds("limit", args.limit)
     if args.faults_an_hour is not None and not 0 < args.faults_an_hour <= MOST_AN_HOUR:
         raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
+    if args.scene != str(Scene.ALONE) and args.exhaustive is None:
+        raise DemandError(f"--scene {args.scene}: goes with --exhaustive; add it, or leave this out")
     if args.sample is not None and (args.sample < 1 or (args.exhaustive is None and not args.cold_start)):
         raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive or --cold-start")
 

@@ -38,6 +38,11 @@ def remove_system(name: str) -> None:
     del _ADDED[name]
 
 
+def own_names() -> tuple[str, ...]:
+    """The names of the systems that are folders beside this file, in the order of the alphabet."""
+    return _FOLDERS.own_names()
+
+
 def system_names() -> tuple[str, ...]:
     """The names of all systems as site files say them, in the order of the alphabet."""
     return _FOLDERS.names()

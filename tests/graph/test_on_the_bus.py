@@ -22,11 +22,11 @@ from onboard.systems.graph.messages import (
     EdgeState,
     NodeAnswer,
     NodeVerdict,
+    OrderResult,
     RobotAt,
     RobotMode,
     TurnSignal,
     VisitList,
-    VisitResult,
 )
 from onboard.systems.graph.network import Graph, complete, ring
 from onboard.systems.graph.robot import GraphRobot
@@ -56,7 +56,7 @@ class Scene:
         assert self.plant.violations == []
         assert self.played.halted == []
         assert self.played.is_over
-        assert all(entry.result is VisitResult.DONE for entry in self.plant.entries)
+        assert all(entry.result is OrderResult.DONE for entry in self.plant.entries)
         checks = Checks(self.site, rules=RULES)
         for time_us, message in self.played.messages:
             checks.feed_message(time_us, message)
@@ -277,7 +277,7 @@ def test_g27_a_robot_with_another_map_does_not_drive() -> None:
     assert isinstance(played.plant, GraphPlant)
     assert [entry.robot for entry in played.plant.entries[:2]] == [22, 22]
     # Among strangers it does not even answer: the order is with the desk for a person to see.
-    assert played.plant.entries[2].result is VisitResult.RECEIVED
+    assert played.plant.entries[2].result is OrderResult.RECEIVED
     assert played.plant.bodies[21].stays == []
 
 

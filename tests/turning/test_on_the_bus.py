@@ -21,7 +21,7 @@ from onboard.systems.turning.checks import RULES
 from onboard.systems.turning.generation import LatheGeneration
 from onboard.systems.turning.lathe import Job, LatheState
 from onboard.systems.turning.machine import LatheMachine
-from onboard.systems.turning.messages import BillBar, BillCutting, JobResult, LathePhase, LatheProgress, TurningOrder
+from onboard.systems.turning.messages import BillBar, BillCutting, LathePhase, LatheProgress, OrderResult, TurningOrder
 from onboard.systems.turning.process import generate
 from onboard.systems.turning.site import Turning, Wanted
 from tests.faults.systems import judged, withstands
@@ -57,7 +57,7 @@ def test_p27_three_lathes_and_the_winner_that_is_known(shipped: Stage[Any]) -> N
     _sound(shipped)
     site = _site()
     entries = _plant(shipped).entries
-    assert [(entry.winner, entry.result) for entry in entries] == [(node, JobResult.DONE) for node in (3, 2, 1, 3)]
+    assert [(entry.winner, entry.result) for entry in entries] == [(node, OrderResult.DONE) for node in (3, 2, 1, 3)]
     calls = {one.task.number: one for _, one in shipped.messages if isinstance(one, CallForProposals)}
     assert {(one.operation, one.kind, one.criterion) for one in calls.values()} == {
         (Operation.MACHINE, KindCode.LATHE, Criterion.MONEY)
@@ -115,7 +115,7 @@ def test_p24_edges_are_changed_before_they_are_worn_out() -> None:
     played = _play(_site(Wanted(0, Job(2, 1, 45, 60))))
     _sound(played)
     plant = _plant(played)
-    assert plant.entries[0].result is JobResult.DONE and sum(one.edges_changed for one in plant.devices.values()) >= 1
+    assert plant.entries[0].result is OrderResult.DONE and sum(one.edges_changed for one in plant.devices.values()) >= 1
 
 
 def test_p21_a_lathe_looks_at_no_other_machine(shipped: Stage[Any]) -> None:
@@ -142,7 +142,7 @@ def test_what_no_lathe_can_make_is_refused() -> None:
     # A bar of 300 mm is in nobody's jaws.
     played = _play(_site(Wanted(0, Job(3, 1, 300, 1))))
     _sound(played)
-    assert [one.result for one in _plant(played).entries] == [JobResult.REFUSED]
+    assert [one.result for one in _plant(played).entries] == [OrderResult.REFUSED]
     assert not any(isinstance(one, Bid) for _, one in played.messages)
 
 

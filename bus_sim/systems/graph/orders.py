@@ -5,7 +5,7 @@ from dataclasses import replace
 from bus_sim.systems.graph.plant import ORIGIN_US, GraphPlant
 from bus_sim.systems.orders import Orders, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.stage import Tally
-from onboard.systems.graph.messages import VisitResult
+from onboard.systems.graph.messages import OrderResult
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph, Order
 
 #: So many orders name their robot. Ours.
@@ -34,7 +34,7 @@ def last_s(site: FactoryGraph) -> float:
 
 def count(plant: GraphPlant) -> Tally:
     """What became of the orders."""
-    done, refused, expected = VisitResult.DONE, VisitResult.REFUSED, len(plant.site.orders)
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.orders)
     return tally_of(plant.entries, done, refused, expected, plant.timers.now_us())
 
 

@@ -9,7 +9,7 @@ from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.graph.show import picture
 from bus_sim.systems.stage import Stage, Tally
 from onboard.core.messages import Bid, CallForProposals
-from onboard.systems.graph.messages import EdgeNotice, NodeAnswer, NodeVerdict, TurnSignal, VisitResult
+from onboard.systems.graph.messages import EdgeNotice, NodeAnswer, NodeVerdict, OrderResult, TurnSignal
 from onboard.systems.graph.site import FactoryGraph
 
 if TYPE_CHECKING:  # the page's libraries are an extra
@@ -61,7 +61,7 @@ class GraphStage(Stage[GraphPlant]):
     def figures(self) -> dict[str, object]:
         """What a graph is judged by: orders and their times, and how often robots had to wait or were sent away."""
         plant = self.plant
-        done = [entry for entry in plant.entries if entry.result is VisitResult.DONE and entry.ended_us is not None]
+        done = [entry for entry in plant.entries if entry.result is OrderResult.DONE and entry.ended_us is not None]
         seconds = [(entry.ended_us - entry.begun_us) / 1e6 for entry in done if entry.ended_us is not None]
         ends = [entry.ended_us for entry in done if entry.ended_us is not None]
         begins = [entry.begun_us for entry in plant.entries]
@@ -70,7 +70,7 @@ class GraphStage(Stage[GraphPlant]):
         return {
             "orders": len(plant.entries),
             "done": len(done),
-            "refused": sum(entry.result is VisitResult.REFUSED for entry in plant.entries),
+            "refused": sum(entry.result is OrderResult.REFUSED for entry in plant.entries),
             "mean_time_s": fmean(seconds) if seconds else 0.0,
             "total_time_s": (max(ends) - min(begins)) / 1e6 if ends else 0.0,
             "signals": sum(isinstance(one, TurnSignal) for one in said),

@@ -6,7 +6,7 @@ from statistics import fmean
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.orders import Ended, Orders, nothing_to_draw, tally
 from bus_sim.systems.stage import Tally
-from onboard.systems.mapd.messages import TransportResult
+from onboard.systems.mapd.messages import OrderResult
 from onboard.systems.mapd.site import FAR, Mapd, Task
 
 #: So many endpoints are looked at to see how long ways are. Ours.
@@ -34,7 +34,7 @@ def count(plant: UnitPlant) -> Tally:
     """What became of the tasks."""
     ended = []
     for one in plant.goods.values():
-        refused = one.answer is TransportResult.REFUSED and one.served_step is None
+        refused = one.answer is OrderResult.REFUSED and one.served_step is None
         ended.append(Ended(one.served_step is not None, refused, one.ordered_us, one.served_us))
     return tally(ended, len(plant.site.tasks), plant.timers.now_us())
 

@@ -7,7 +7,8 @@ from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.show import picture
 from bus_sim.systems.stage import Stage, Tally
-from onboard.systems.mapd.messages import PathHead, StepAward, StepRound, TransportBid, TransportCall
+from onboard.core.messages import Award, Bid, CallForProposals
+from onboard.systems.mapd.messages import PathHead, StepRound
 
 
 class MapdStage(Stage[UnitPlant]):
@@ -38,7 +39,7 @@ class MapdStage(Stage[UnitPlant]):
         served = [one for one in plant.goods.values() if one.served_step is not None and one.served_us is not None]
         steps = [one.served_step - one.task.release for one in served if one.served_step is not None]
         seconds = [(one.served_us - one.ordered_us) / 1e6 for one in served if one.served_us is not None]
-        kinds = (TransportCall, TransportBid, StepAward, PathHead)
+        kinds = (Bid, Award, PathHead)
         counts = {kind: sum(isinstance(one, kind) for one in said) for kind in kinds}
         published = token_passing(site.name, len(site.tasks))
         return {
@@ -51,8 +52,8 @@ class MapdStage(Stage[UnitPlant]):
             **({} if published is None else {"token_passing_published": published}),
             "makespan_steps": max((one.served_step or 0 for one in served), default=0),
             "mean_service_s": fmean(seconds) if seconds else 0.0,
-            "calls": counts[TransportCall],
-            "bids": counts[TransportBid],
-            "awards": counts[StepAward],
+            "calls": len({one.call for one in said if isinstance(one, CallForProposals)}),
+            "bids": counts[Bid],
+            "awards": counts[Award],
             "paths": counts[PathHead],
         }

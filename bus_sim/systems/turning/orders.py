@@ -5,7 +5,7 @@ from dataclasses import replace
 from bus_sim.systems.orders import Orders, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.stage import Tally
 from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant
-from onboard.systems.turning.messages import JobResult
+from onboard.systems.turning.messages import OrderResult
 from onboard.systems.turning.site import Turning, Wanted
 
 #: Parts of an order, at least and at most. Ours.
@@ -33,5 +33,5 @@ def last_s(site: Turning) -> float:
 
 def count(plant: TurningPlant) -> Tally:
     """What became of the orders."""
-    done, refused, expected = JobResult.DONE, JobResult.REFUSED, len(plant.site.orders)
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.orders)
     return tally_of(plant.entries, done, refused, expected, plant.timers.now_us())

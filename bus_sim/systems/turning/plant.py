@@ -13,11 +13,11 @@ from onboard.systems.turning.messages import (
     CHUNK,
     JobAnswer,
     JobEntry,
-    JobResult,
     LatheAction,
     LatheOrder,
     NcMode,
     NcState,
+    OrderResult,
     ProgramEnd,
     ProgramText,
     ToolState,
@@ -183,7 +183,7 @@ class Entry:
     number: int
     wanted: Wanted
     begun_us: int
-    result: JobResult | None = None
+    result: OrderResult | None = None
     winner: int = 0
     total_ct: int = 0
     ended_us: int | None = None
@@ -220,7 +220,7 @@ class Counter:
             return
         entry.result, entry.winner = message.job_result, message.winner
         entry.total_ct = message.total_ct or entry.total_ct
-        if message.job_result in (JobResult.DONE, JobResult.REFUSED):
+        if message.job_result in (OrderResult.DONE, OrderResult.REFUSED):
             entry.ended_us = self._plant.timers.now_us()
             self._plant.check_end()
 
@@ -290,7 +290,7 @@ class TurningPlant:
             return
         wanted: dict[int, int] = {}
         for entry in self.entries:
-            if entry.result is JobResult.DONE:
+            if entry.result is OrderResult.DONE:
                 job = entry.wanted.job
                 wanted[job.drawing] = wanted.get(job.drawing, 0) + job.batch
         for drawing in self.site.drawings:

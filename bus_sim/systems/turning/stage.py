@@ -8,7 +8,7 @@ from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
 from onboard.core.messages import Bid
 from onboard.systems.turning.clamping import choose_clamping
-from onboard.systems.turning.messages import JobResult
+from onboard.systems.turning.messages import OrderResult
 from onboard.systems.turning.site import Turning
 
 if TYPE_CHECKING:  # the page's libraries are an extra
@@ -51,11 +51,11 @@ class TurningStage(Stage[TurningPlant]):
     def figures(self) -> dict[str, object]:
         """What a turning cell is judged by: orders, money, use of the lathes, edges, bids, how true the parts are."""
         plant, elapsed_us = self.plant, max(1, self.run.loop.now_us())
-        done = [entry for entry in plant.entries if entry.result is JobResult.DONE]
+        done = [entry for entry in plant.entries if entry.result is OrderResult.DONE]
         return {
             "orders": len(plant.entries),
             "made": len(done),
-            "refused": sum(entry.result is JobResult.REFUSED for entry in plant.entries),
+            "refused": sum(entry.result is OrderResult.REFUSED for entry in plant.entries),
             "parts": sum(sum(device.made.values()) for device in plant.devices.values()),
             "price_eur": sum(entry.total_ct * entry.wanted.job.batch for entry in done) / 100,
             "bids": sum(isinstance(message, Bid) for _, message in self.messages),

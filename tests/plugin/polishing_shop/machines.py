@@ -4,9 +4,10 @@ from dataclasses import dataclass, field
 
 from onboard.core.behaviour import Fleet, NoEstimator, Plain
 from onboard.core.codes import Criterion, KindCode, MachineState, Operation, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.effects import Effect, Send, Tell
 from onboard.core.messages import NO_REFERENCE, CallForProposals, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import ALONE, authorised
 from onboard.core.negotiation import Awarded, CallTerms, Closed, Estimator, NegotiationEvent, Proposal
 from onboard.core.site import Machine, Site
 from polishing_shop.frames import PartIn, PartOut, Polish, Polished
@@ -47,6 +48,7 @@ class Polisher(Plain):
 
     bench: Bench = field(default_factory=lambda: Bench(0, 0))
     parts: list[CallForProposals] = field(default_factory=list)
+    ordered: CallForProposals | None = None
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """A part is won: it stands in line."""
@@ -54,17 +56,22 @@ class Polisher(Plain):
             return []
         self.parts.append(event.call)
         self.bench.free_at_us = max(now_us, self.bench.free_at_us) + self.bench.takes_us
-        return [self._report(event.call, TaskPhase.AWARDED), *self._begin()]
+        return [self._report(event.call, TaskPhase.AWARDED)]
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """The motor is done with a part."""
         if not isinstance(message, Polished) or not self.parts or message.number != self.parts[0].task.number:
             return []
-        return [self._report(self.parts.pop(0), TaskPhase.DONE), *self._begin()]
+        return [self._report(self.parts.pop(0), TaskPhase.DONE)]
 
-    def _begin(self) -> list[Effect]:
+    def advance(self, now_us: int) -> list[Effect]:
+        """The motor hears of the first part once, as soon as this machine may move anything."""
         self.state = MachineState.WORKING if self.parts else MachineState.IDLE
-        return [Actuate(Polish(self.fleet.node_id, self.parts[0].task.number))] if self.parts else []
+        if not self.parts or self.ordered == self.parts[0]:
+            return []
+        order = authorised(self.fleet.motion, ALONE).order(Polish(self.fleet.node_id, self.parts[0].task.number))
+        self.ordered = self.parts[0] if order else None
+        return order
 
     def _report(self, call: CallForProposals, phase: TaskPhase) -> Effect:
         return Send(TaskReport(self.fleet.node_id, call.task, phase, call.from_station, Reason.NONE))
@@ -110,7 +117,7 @@ class Desk(Plain):
         is_own = isinstance(message, TaskReport) and message.task.origin == self.fleet.node_id
         if not is_own or message.phase is not TaskPhase.DONE:
             return []
-        return [Actuate(PartOut(self.fleet.node_id, message.task.number))]
+        return [Tell(PartOut(self.fleet.node_id, message.task.number))]
 
 
 class DeskFactory:

@@ -83,6 +83,8 @@ def run_certify(args: argparse.Namespace) -> int:
     if not 1 <= robots <= len(graph.nodes):
         raise SiteNotFoundError(f"--robots {robots}: must be 1 to {len(graph.nodes)}, a node for each to start from")
     rules = Rules(args.rules) if args.rules is not None else (site.rules if site is not None else Rules.PAPER)
+    if args.capacity is not None and args.capacity < 1:
+        raise SiteNotFoundError(f"--capacity {args.capacity}: must be 1 or more")
     capacity = args.capacity or (site.capacity if site is not None else robots)
     found = certify(graph, robots, rules, capacity)
     _say(found, f"{args.site}, {robots} robots, rules {rules.value}", args.counterexample, graph, rules, capacity)
