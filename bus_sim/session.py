@@ -60,10 +60,20 @@ def _on_loop(site: Site, options: RunOptions, system: SimulatedSystem[Any, Any])
     try:
         asyncio.set_event_loop(loop)
         session = _Session(site, options, system, loop)
-        return session.stage, loop.run_until_complete(session.play())
+        return session.stage, loop.run_until_complete(_to_its_end(session))
     finally:
         asyncio.set_event_loop(None)
         loop.close()
+
+
+async def _to_its_end(session: "_Session") -> Summary:
+    """The run, and nothing of it left behind: what machines have begun by then is not waited for."""
+    summary = await session.play()
+    begun = asyncio.all_tasks() - {asyncio.current_task()}
+    for task in begun:
+        task.cancel()
+    await asyncio.gather(*begun, return_exceptions=True)
+    return summary
 
 
 def _check(site: Site, options: RunOptions) -> None:
@@ -158,11 +168,6 @@ class _Session:
         page = Page(self.stage.source(), where, self._console)
         async with page:
             yield page.address
-        # While the server came to its end, the machines went on: what they began is not waited for.
-        begun = asyncio.all_tasks() - {asyncio.current_task()}
-        for task in begun:
-            task.cancel()
-        await asyncio.gather(*begun, return_exceptions=True)
 
     # --- the end -----------------------------------------------------------------------------------------------
 

@@ -231,7 +231,10 @@ def test_a_mistake_in_a_site_file_gets_a_line(
 @pytest.mark.parametrize(
     ("arguments", "wanted"),
     [
-        (["run", "SITE", "--fault", "linger:car=1,for_s=3"], "only a car park has it, and s is a mapd"),
+        (
+            ["run", "SITE", "--fault", "linger:car=1,for_s=3"],
+            "s: a mapd has nothing that this strikes (a car does not leave for long)",
+        ),
         (["compare", "SITE"], "a mapd, and only car parks are compared; name a car park"),
     ],
 )
