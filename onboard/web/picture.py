@@ -1,4 +1,4 @@
-"""What the page shows, from decoded messages alone: a fold like the terminal's, as plain values for JSON.
+"""What the page shows, from decoded messages alone: a view like the terminal's, as plain values for JSON.
 
 Times are microseconds of the log or loop; a client draws with them and never asks for more than is in a snapshot.
 What is drawn of a system, and its words, are its scene's (``onboard.trace.scene``).
@@ -11,11 +11,13 @@ from onboard.core.codes import CallResult, Criterion, Reason, TaskPhase
 from onboard.core.frame import Frame
 from onboard.core.messages import BusTime, Heartbeat, Message, Progress, Waiting
 from onboard.core.site import Site
+from onboard.history.calls import Call
+from onboard.history.history import Fact
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
 from onboard.trace.scene.scene import BusClock
 from onboard.trace.scene.scenes import scene_of
-from onboard.trace.view import CallRecord, SiteView
+from onboard.trace.view import SiteView
 
 #: Calls, and lines of events, that a snapshot tells.
 CALLS_SHOWN = 12
@@ -35,10 +37,11 @@ class LivePicture:
     def __init__(self, site: Site) -> None:
         self.site = site
         self.view = SiteView(site)
+        self.history = self.view.history
         self.scene = scene_of(site, self.view)
         #: Whether machines move along tracks here: the indicators of robots and lifts are of such a site.
         self.has_tracks = bool(site.tracks)
-        self.indicators = Indicators(site)
+        self.indicators = Indicators(site, history=self.history)
         self._heard: dict[int, int] = {}
         self._waits: dict[int, tuple[int, Waiting]] = {}
         self._clock = BusClock()
@@ -61,9 +64,13 @@ class LivePicture:
 
     def feed(self, message: Message, time_us: int) -> None:
         """One message of the fleet bus."""
-        self.view.feed(message, time_us)
+        self.take(message, self.history.feed(message, time_us), time_us)
+
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
+        """One message of the fleet bus that the history was fed with, and what it made of it."""
+        self.view.take(message, fact, time_us)
         self.scene.feed(message, time_us)
-        self.indicators.feed(message, time_us)
+        self.indicators.take(message, fact, time_us)
         match message:
             case Heartbeat():
                 self._heard[message.sender] = time_us
@@ -158,9 +165,9 @@ class LivePicture:
             return "silent"
         return self.view.states[node].name.lower()
 
-    def call(self, record: CallRecord) -> dict[str, Any]:
+    def call(self, record: Call) -> dict[str, Any]:
         """One call with its bids; times in us of the log."""
-        call, view = record.call, self.view
+        call, view, end = record.terms, self.view, record.end
         return {
             "id": f"{call.sender}.{call.call}",
             "by": view.name(call.sender),
@@ -177,10 +184,10 @@ class LivePicture:
                 {"by": view.name(node), "at_us": at_us, "cost": self._cost(call.criterion, cost)}
                 for at_us, node, cost in record.bids
             ],
-            "winner": view.name(record.winner) if record.winner else None,
-            "result": record.result.name.lower() if record.result is not None else None,
-            "won": record.result is CallResult.AWARDED,
-            **({"reason": view.words.reason(record.reason)} if record.reason is not Reason.NONE else {}),
+            "winner": view.name(end.winner) if end is not None and end.winner else None,
+            "result": end.result.name.lower() if end is not None else None,
+            "won": end is not None and end.result is CallResult.AWARDED,
+            **({"reason": view.words.reason(end.reason)} if end is not None and end.reason is not Reason.NONE else {}),
         }
 
     def _cost(self, criterion: Criterion, cost: int) -> dict[str, Any]:

@@ -108,7 +108,7 @@ class MapdScene:
         if len(self._tasks) > MOST_TASKS:
             del self._tasks[next(iter(self._tasks))]
         self.view.calls_opened += 1
-        if self.view.open_task(self._reference(call.task), Operation.TRANSPORT, time_us):
+        if self.view.history.tasks.open(self._reference(call.task), Operation.TRANSPORT, time_us):
             ways = f"from {self.words.place(call.pickup)} to {self.words.place(call.delivery)}"
             self.view.say(time_us, f"{self.view.name(call.sender)} calls: {self._thing(call.task)}, {ways}")
 
@@ -118,10 +118,10 @@ class MapdScene:
         if robot.won not in (NO_TASK, award.task) and not (robot.loaded and robot.task == robot.won):
             before = self.view.tasks.get(self._reference(robot.won))
             if before is not None and before.is_waiting and before.owner == award.robot:
-                self.view.own(self._reference(robot.won), 0)
+                self.view.history.tasks.own(self._reference(robot.won), 0)
         robot.won = award.task
         if award.task != NO_TASK:
-            self.view.own(self._reference(award.task), award.robot)
+            self.view.history.tasks.own(self._reference(award.task), award.robot)
             self.view.say(time_us, f"{name} wins {self._thing(award.task)}")
 
     def _on_state(self, robot: _Robot, state: StepState, time_us: int) -> None:
