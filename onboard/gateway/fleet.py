@@ -155,7 +155,7 @@ class FleetTopics:
     def _fixed(self, node: int, now_us: int) -> Iterator[Told]:
         """Elevators, compartments and all others that do not travel: state, and the floor of an elevator."""
         machine, view = self.site.machines[node], self.picture.view
-        state = view.states.get(node)
+        state = view.history.lives.states.get(node)
         told: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
         if machine.kind is KindCode.LIFT:
             segment, _ = view.positions[node]

@@ -17,6 +17,7 @@ from onboard.core.messages import (
 from onboard.core.serial import ms_after
 from onboard.core.site import Station
 from onboard.history.bounds import drop_oldest
+from onboard.history.clock import BusClock
 
 #: Calls of the first depth that are no customer's: for a part of a task, and for room.
 _NO_TASKS = (Operation.RIDE, Operation.GIVE_WAY)
@@ -94,9 +95,12 @@ CallFact = CallOpened | BidMade | CallAnswered
 
 
 class Calls:
-    """A fold over the fleet bus: feed every message in the order of the log. ``most`` calls are kept, None for all."""
+    """A fold over the fleet bus: feed every message in the order of the log. ``most`` calls are kept, None for all.
 
-    def __init__(self, most: int | None = None) -> None:
+    ``clock`` is fed here.
+    """
+
+    def __init__(self, most: int | None = None, clock: BusClock | None = None) -> None:
         #: The newest of each number of each caller.
         self.by_key: dict[tuple[int, int], Call] = {}
         #: All of them where ``most`` is None.
@@ -104,7 +108,7 @@ class Calls:
         self._most = most
         self._going: list[Call] = []
         self._boots: dict[int, int] = {}
-        self._offset_us: int | None = None
+        self._clock = clock if clock is not None else BusClock()
         #: Whose tentative itinerary of which version goes with which call's bid.
         self._offers: dict[tuple[int, int], Call] = {}
 
@@ -118,7 +122,7 @@ class Calls:
             case Award():
                 return self._on_award(message, time_us)
             case BusTime():
-                self._offset_us = time_us - message.bus_time_us
+                self._clock.feed(message, time_us)
             case Itinerary():
                 self._on_itinerary(message)
             case TaskReport():
@@ -131,9 +135,10 @@ class Calls:
 
     def moment_us(self, bus_ms: int, near_us: int) -> int | None:
         """Time of the log of a bus time in ms, which wraps; None before bus time was heard."""
-        if self._offset_us is None:
+        offset_us = self._clock.offset_us
+        if offset_us is None:
             return None
-        return near_us + 1000 * ms_after(bus_ms, (near_us - self._offset_us) // 1000)
+        return near_us + 1000 * ms_after(bus_ms, (near_us - offset_us) // 1000)
 
     def _on_call(self, terms: CallForProposals, time_us: int) -> CallFact | None:
         key = (terms.sender, terms.call)

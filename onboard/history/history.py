@@ -1,7 +1,10 @@
-"""Calls and tasks of a bus in one fold: feed it every message of the fleet bus, and let views take what it tells."""
+"""A bus in one fold: feed it every message of the fleet bus, and let views take what it tells."""
 
-from onboard.core.messages import Message, TaskReport
+from onboard.core.messages import Message, TaskReport, TokenGrant, TokenHeld
 from onboard.history.calls import BidMade, CallAnswered, CallOpened, Calls
+from onboard.history.clock import BusClock
+from onboard.history.lives import Lives
+from onboard.history.rights import Rights
 from onboard.history.tasks import Tasks, TaskTold
 
 #: Calls and tasks that are kept, so that a picture may stay open for ever: those that are over go first, the oldest of
@@ -15,11 +18,17 @@ class History:
     """The fold."""
 
     def __init__(self) -> None:
-        self.calls = Calls(CALL_LIMIT)
+        self.clock = BusClock()
+        self.lives = Lives()
+        self.rights = Rights()
+        self.calls = Calls(CALL_LIMIT, self.clock)
         self.tasks = Tasks(TASK_LIMIT)
 
     def feed(self, message: Message, time_us: int) -> Fact | None:
         """Take up one message, at a time of the log in us."""
+        self.lives.feed(message, time_us)
+        if isinstance(message, TokenGrant | TokenHeld):
+            self.rights.feed(message)
         if isinstance(message, TaskReport):
             self.calls.feed(message, time_us)
             return self.tasks.on_report(message, time_us)

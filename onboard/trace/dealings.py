@@ -8,7 +8,7 @@ from collections import Counter
 from dataclasses import dataclass, field
 
 from onboard.core.codes import CallResult, Grade, LegAction, Operation, TaskPhase
-from onboard.core.messages import BusTime, CallForProposals, Itinerary, Leg, Message, Stamp, Waiting
+from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Stamp, Waiting
 from onboard.core.serial import ms_after
 from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
 from onboard.history.history import Fact, History
@@ -63,7 +63,7 @@ class Dealings:
         #: Stamps of awards whose winner has not told its plan yet.
         self._fresh: set[tuple[int, int, int]] = set()
         self._told_us: tuple[int, int] = (0, -ANSWER_US)
-        self._offset_us = 0
+        self._clock = history.clock
 
     def begin(self) -> None:
         """Count from now on; open calls and tasks are kept."""
@@ -73,8 +73,6 @@ class Dealings:
         """Take up one message."""
         self.counts.messages[type(message).__name__] += 1
         match message:
-            case BusTime():
-                self._offset_us = time_us - message.bus_time_us
             case Waiting():
                 plan = self._plans.get(message.sender)
                 if plan is not None:
@@ -113,7 +111,7 @@ class Dealings:
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)
         if task.promised_ms is not None and task.owner == told.report.sender:
-            self.counts.slack_ms.append(-ms_after((time_us - self._offset_us) // 1000, task.promised_ms))
+            self.counts.slack_ms.append(-ms_after((time_us - (self._clock.offset_us or 0)) // 1000, task.promised_ms))
 
     # --- plans -------------------------------------------------------------------------------------------------
 

@@ -12,7 +12,6 @@ from onboard.core.codes import (
     STILL,
     CallResult,
     Grade,
-    MachineState,
     ManualMode,
     Operation,
     Reason,
@@ -59,7 +58,6 @@ class SiteView:
         self.history = history if history is not None else History()
         self.now_us = 0
         self.positions: dict[int, tuple[Segment, int]] = {}
-        self.states: dict[int, MachineState] = {}
         self.cars: dict[Reference, int] = {}
         self.aboard: dict[int, Reference | None] = {}
         self.itineraries: dict[int, Itinerary] = {}
@@ -150,7 +148,6 @@ class SiteView:
         self.positions[told.sender] = here
 
     def _on_heartbeat(self, beat: Heartbeat) -> None:
-        self.states[beat.sender] = beat.state
         word = self.halts.get(beat.sender)
         if word is not None and beat.state not in STILL and word.reason is not Reason.FALSE_STATEMENT:
             del self.halts[beat.sender]

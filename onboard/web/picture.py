@@ -9,13 +9,12 @@ from typing import Any
 
 from onboard.core.codes import CallResult, Criterion, Reason, TaskPhase
 from onboard.core.frame import Frame
-from onboard.core.messages import BusTime, Heartbeat, Message, Progress, Waiting
+from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.history.calls import Call
 from onboard.history.history import Fact
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
-from onboard.trace.scene.scene import BusClock
 from onboard.trace.scene.scenes import scene_of
 from onboard.trace.view import SiteView
 
@@ -42,9 +41,8 @@ class LivePicture:
         #: Whether machines move along tracks here: the indicators of robots and lifts are of such a site.
         self.has_tracks = bool(site.tracks)
         self.indicators = Indicators(site, history=self.history)
-        self._heard: dict[int, int] = {}
-        self._waits: dict[int, tuple[int, Waiting]] = {}
-        self._clock = BusClock()
+        self._clock = self.history.clock
+        self._lives = self.history.lives
         self._bits = 0
         self._frames = 0
         self._samples: deque[list[float]] = deque(maxlen=SAMPLES)
@@ -71,15 +69,6 @@ class LivePicture:
         self.view.take(message, fact, time_us)
         self.scene.feed(message, time_us)
         self.indicators.take(message, fact, time_us)
-        match message:
-            case Heartbeat():
-                self._heard[message.sender] = time_us
-            case BusTime():
-                self._clock.feed(message, time_us)
-            case Progress() if message.speed_mm_s:
-                self._waits.pop(message.sender, None)
-            case Waiting():
-                self._waits[message.sender] = (time_us, message)
         self._sample(time_us)
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
@@ -148,7 +137,7 @@ class LivePicture:
     def _machine(self, node: int) -> dict[str, Any]:
         view = self.view
         told = {"state": self._state(node), **self.scene.machine(node, view.now_us)}
-        wait = self._waits.get(node)
+        wait = self._lives.waits.get(node)
         if wait is not None and view.now_us - wait[0] <= WAIT_SHOWN_US:
             told["wait"] = {
                 "at": [wait[1].track, wait[1].index],
@@ -160,10 +149,10 @@ class LivePicture:
 
     def _state(self, node: int) -> str:
         """What its last heartbeat said, unless that is too long ago."""
-        heard_us = self._heard.get(node)
+        heard_us = self._lives.heard_us.get(node)
         if heard_us is None or self.view.now_us - heard_us > SILENT_BEATS * self.site.timing.heartbeat_us:
             return "silent"
-        return self.view.states[node].name.lower()
+        return self._lives.states[node].name.lower()
 
     def call(self, record: Call) -> dict[str, Any]:
         """One call with its bids; times in us of the log."""
