@@ -49,7 +49,8 @@ bench: $(VENV)/.test ## all figures of bench/, one table each
 		echo "== $$script"; $(BIN)/python "$$script"; \
 	done
 
-docs: $(VENV)/.test ## write docs/network.md anew from the DBC files, docs/systems.md from docs/systems/
+docs: $(VENV)/.test ## write onboard/contract and docs/network.md anew from the DBC files, docs/systems.md from docs/systems/
+	$(BIN)/python -m onboard.contract.generate
 	$(BIN)/python -m onboard.wire.network_doc
 	$(BIN)/python -m tests.systems_page
 

@@ -5,18 +5,19 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 """
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol, runtime_checkable
 
 from onboard.core.authority import TokenBook, TokenKey, car_token
 from onboard.core.codes import KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Record
+from onboard.core.journal_records import Entry
 from onboard.core.messages import CallForProposals, CarAt, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.negotiation.winners import Winners
 from onboard.core.petitions import Petitions
+from onboard.core.records import CarLeftRecord
 from onboard.core.site import Machine, Segment, Site
 
 
@@ -29,7 +30,7 @@ class Fleet:
     tokens: TokenBook
     mirror: Mirror
     negotiation: Negotiation
-    entries: tuple[Mapping[str, str | int], ...] = ()
+    entries: tuple[Entry, ...] = ()
     #: Input that came to nothing, by reason: the holon's own count.
     drops: Counter[Reason] = field(default_factory=Counter)
     petitions: Petitions = field(init=False)
@@ -59,18 +60,7 @@ class Fleet:
     def forgotten(self) -> list[Effect]:
         """Cars that left long ago, for the journal: what it has of them may go."""
         left, self._left = self._left, []
-        return [
-            Record(
-                {
-                    "record": "car_left",
-                    "kind": int(TokenKind.CAR),
-                    "number": car_token(*car).number,
-                    "car_origin": car.origin,
-                    "car": car.number,
-                }
-            )
-            for car in left
-        ]
+        return [Record(CarLeftRecord(TokenKind.CAR, car_token(*car).number, car)) for car in left]
 
     @property
     def node_id(self) -> int:

@@ -10,10 +10,11 @@ from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.edge import edge_of
 from onboard.gateway.factsheet import MOST_ID
 from onboard.gateway.inbox import Inbox, Incoming
-from onboard.gateway.order import Life, Order
+from onboard.gateway.order import Order
 from onboard.gateway.orders import Orders, Outcome, name_of
 from onboard.gateway.pauses import MODES, Closed, Pauses
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
+from onboard.gateway.records import Life
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import level
 from onboard.gateway.state import Subject

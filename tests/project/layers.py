@@ -12,10 +12,13 @@ from pathlib import Path
 
 #: What holds no decision: values and names that every layer may share.
 CORE_TYPES = (
+    "onboard.contract",
     "onboard.core.codes",
     "onboard.core.frame",
+    "onboard.core.journal_records",
     "onboard.core.journal_state",
     "onboard.core.messages",
+    "onboard.core.records",
     "onboard.core.recovery_messages",
     "onboard.core.remedies",
     "onboard.core.serial",
@@ -51,6 +54,7 @@ ORDERING = frozenset({"heappush", "heapify", "insort", "max", "min", "nlargest",
 
 ALL_OF_ONBOARD = (
     "onboard.config",
+    "onboard.contract",
     "onboard.controller",
     "onboard.core",
     "onboard.history",
@@ -80,7 +84,7 @@ class Layer:
 def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
     """The layers of one system's folder: its machines decide and nothing else; reader, judges and drawing do not."""
     own = f"onboard.systems.{system}"
-    machines = ("onboard.core", "onboard.ways", "onboard.work", "onboard.systems.system")
+    machines = ("onboard.contract", "onboard.core", "onboard.ways", "onboard.work", "onboard.systems.system")
     yield own, Layer(machines, only_stdlib=PURE_STDLIB, pure=True)
     config = Layer(
         ("onboard.config", "onboard.core", "onboard.ways", own), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
@@ -114,9 +118,12 @@ FINDER = "onboard/systems/registry.py"
 #: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
     # Until the mirror knows no way, it and what reads it lean on them.
-    "onboard.core": Layer(("onboard.ways",), only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.ways": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.work": Layer(("onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.contract": Layer(only_stdlib=PURE_STDLIB),
+    # Writes the rest of it; runs where somebody changes a DBC, never on a board.
+    "onboard.contract.generate": Layer(("onboard.contract", "onboard.wire.dbc_file", "dbc")),
+    "onboard.core": Layer(("onboard.contract", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.ways": Layer(("onboard.contract", "onboard.core"), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.work": Layer(("onboard.contract", "onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
     # It knows no system by name; a system's parts are found by the name of their folder.
     "onboard.systems": Layer(("onboard.core",)),
     "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),

@@ -19,6 +19,7 @@ from onboard.systems.terminal.search import Job, Search
 from onboard.systems.terminal.site import StationKind
 from onboard.systems.terminal.traffic import Traffic
 from onboard.systems.terminal.vehicle import terminal
+from onboard.work.order_life import OrderEvent
 from tests.terminal.fig3 import A1, PRINTED, S1, S2, fig3, plan_of
 
 SITE = terminal(find_site("terminal"))
@@ -168,10 +169,10 @@ def test_a_box_that_was_wanted_by_its_type_is_so_again_when_it_is_given_back() -
     first = orders.next(picture, taken)
     assert first is not None and first.box == box("B7")
     restarted = Orders(SITE, 1)
-    restarted.replay([orders.record()])
+    restarted.replay([orders.record().entry])
     plan(picture, 14, "B7", "S1")
     for one in (orders, restarted):
-        one.give_back(first.task)
+        one.give_back(first.task, OrderEvent.NOT_WON)
         again = one.next(picture, taken)
         assert again is not None and again.box == box("B6")
 
@@ -188,7 +189,7 @@ def test_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -
     assert [orders.key(key) is None for key in (one, other, end)] == [True, True, False]
     assert orders.answer(end) is True
     again = Orders(SITE, 1)
-    again.replay([orders.record()])
+    again.replay([orders.record().entry])
     for known in (orders, again):
         assert [known.key(key) for key in (one, other, end)] == [None] * 3
         assert known.answer(end) is True

@@ -21,7 +21,7 @@ _SVG = "{http://www.w3.org/2000/svg}"
 
 def _chart(number: int = 1) -> Chart:
     with Log(str(run_log())) as log:
-        found = chart(SITE, Listener(codecs("", ())).messages(log), Reference(1, number))
+        found = chart(SITE, Listener(codecs()).messages(log), Reference(1, number))
     assert found is not None
     return found
 

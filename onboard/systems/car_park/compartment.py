@@ -30,7 +30,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import (
     BayState,
     CarAt,
@@ -48,7 +48,12 @@ from onboard.core.serial import successor
 from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_generation import BayGeneration
-from onboard.systems.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
+from onboard.systems.car_park.bay_memory import (
+    BayMemory,
+    job_over_record,
+    job_record,
+    ticket_record,
+)
 from onboard.systems.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
@@ -72,7 +77,6 @@ class Compartment:
     stewardship: Stewardship = field(init=False)
     memory: BayMemory = field(init=False)
     outputs: BayOutputs = field(init=False)
-    _number: int = 0
     _desk_sequence: int | None = None
     _key_pressed: bool = False
     _robot_waits: bool = False
@@ -85,9 +89,6 @@ class Compartment:
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
-        for entry in self.fleet.entries:
-            if entry.get("record") == "number":
-                self._number = int(entry["number"])
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,
@@ -371,11 +372,10 @@ class Compartment:
         turned_away = bay_task.turned_away(bay, limits, self.fleet.mirror)
         if turned_away is not None:
             return [self.outputs.show(turned_away, Reference(0, 0))]
-        car = next_reference(self._number, self.fleet)
-        self._number = car.number
+        car, number = self.memory.next_reference(self.fleet)
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
         # The number first: one that is not used is no harm, one used twice would be.
-        effects: list[Effect] = [Record({"record": "number", "number": self._number})]
+        effects: list[Effect] = [number]
         effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
         effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
@@ -405,12 +405,11 @@ class Compartment:
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         car = self.tickets.popleft()
-        task = next_reference(self._number, self.fleet)
-        self._number = task.number
+        task, number = self.memory.next_reference(self.fleet)
         self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
         job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
-        return [Record({"record": "number", "number": self._number}), job, *self._call_for(self.job, now_us)]
+        return [number, job, *self._call_for(self.job, now_us)]
 
     def _when_awaiting(self, now_us: int) -> list[Effect]:
         assert self.bay is not None and self.job is not None

@@ -15,6 +15,7 @@ from enum import Enum
 from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import LegAction
+from onboard.core.serial import ranks_before
 from onboard.core.site import Site
 from onboard.systems.car_park.program import Program, Step
 from onboard.ways.kinematics import run_duration_us
@@ -64,7 +65,7 @@ class GivingWay:
             # A right in hand outranks stamps: whoever has it is about to be there.
             return holder == sender
         plans = self.fleet.mirror.itineraries
-        return plans[sender].stamp.ranks_before(plans[self.fleet.node_id].stamp)
+        return ranks_before(plans[sender].stamp, plans[self.fleet.node_id].stamp)
 
     def _come_behind(self, meetings: list[Meeting]) -> Answer:
         """Move each of my steps so far that it begins when the others' turns are over; work in hand stays as it is."""

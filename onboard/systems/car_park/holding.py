@@ -13,7 +13,8 @@ from onboard.core.effects import Effect
 from onboard.core.messages import ManualOrder, Message, Reference, TaskReport
 from onboard.core.site import TrackKind
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.handling import Phase, ShuttleWork
+from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.program import Phase
 from onboard.systems.car_park.travel import Carriage
 from onboard.work.manual import Manual
 

@@ -38,9 +38,9 @@ from onboard.systems.car_park.asking import AskingGeneration
 from onboard.systems.car_park.generation import CarParkGeneration, Solution, weighed
 from onboard.systems.car_park.giving_way import Answer, GivingWay
 from onboard.systems.car_park.going_around import GoingAround
-from onboard.systems.car_park.handling import Phase, ShuttleWork, handle
+from onboard.systems.car_park.handling import ShuttleWork, handle
 from onboard.systems.car_park.holding import Holding
-from onboard.systems.car_park.program import MAX_STEPS, Handling, Program, Step, Work
+from onboard.systems.car_park.program import MAX_STEPS, Handling, Phase, Program, Step, Work
 from onboard.systems.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
 from onboard.systems.car_park.ride_calls import call_lifts
 from onboard.systems.car_park.riding import Riding

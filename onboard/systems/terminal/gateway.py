@@ -6,7 +6,8 @@ from typing import Any
 
 from onboard.core.messages import CarAt, Message
 from onboard.gateway.edge import Edge
-from onboard.gateway.order import Life, Order, Wish
+from onboard.gateway.order import Order, Wish
+from onboard.gateway.records import Life
 from onboard.gateway.whereabouts import Tracker, Whereabouts
 from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes
 from onboard.systems.terminal.messages import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
