@@ -8,15 +8,17 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any
 
-from onboard.core.codes import CallResult, KindCode, Operation, Reason, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Heartbeat, Message, Progress, Reference, TaskReport
+from onboard.core.codes import KindCode, Operation, Reason, TaskPhase
+from onboard.core.messages import Heartbeat, Message, Progress, Reference, TaskReport
 from onboard.core.site import Segment, Site
 from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.edge import edge_of
 from onboard.gateway.machines import TRAVELLERS
 from onboard.gateway.settings import GatewaySettings
 from onboard.gateway.state import reference_text
-from onboard.trace.view import CallRecord
+from onboard.history.calls import Call, CallAnswered, CallOpened
+from onboard.history.history import Fact
+from onboard.history.tasks import TaskTold
 from onboard.trace.words import Words
 from onboard.web.picture import LivePicture
 
@@ -53,20 +55,24 @@ class FleetTopics:
 
     def feed(self, message: Message, now_us: int) -> Iterator[Told]:
         """Take up one message."""
-        before = self._phase(message)
+        yield from self.take(message, self.picture.history.feed(message, now_us), now_us)
+
+    def take(self, message: Message, fact: Fact | None, now_us: int) -> Iterator[Told]:
+        """Take up one message that the picture's history was fed with, and what it made of it."""
         self.picture.count_frame()
-        self.picture.feed(message, now_us)
+        self.picture.take(message, fact, now_us)
+        match fact:
+            case CallOpened():
+                yield from self._on_call(fact.call, now_us)
+            case CallAnswered() if fact.call is not None and fact.is_end:
+                yield from self._on_end(fact.call, fact, now_us)
         match message:
-            case CallForProposals():
-                yield from self._on_call(message, now_us)
-            case Award() if message.result is not CallResult.OPTION:
-                yield from self._on_award(message, now_us)
-            case TaskReport() if before is not message.phase:
+            case TaskReport() if not isinstance(fact, TaskTold) or fact.before is not message.phase:
                 yield from self._on_report(message, now_us)
             case Heartbeat() | Progress() if not self._is_mobile(message.sender):
                 yield from self._fixed(message.sender, now_us)
         reason = _reason(message)
-        if reason is not None and not isinstance(message, Award | TaskReport):
+        if reason is not None and not isinstance(fact, CallAnswered) and not isinstance(message, TaskReport):
             yield "event", self._event(message, reason, now_us)
 
     def indicators(self, now_us: int) -> Json:
@@ -92,7 +98,7 @@ class FleetTopics:
             (
                 one
                 for one in reversed(view.calls.values())
-                if one.call.task == reference and one.call.operation in WHOLE
+                if one.terms.task == reference and one.terms.operation in WHOLE
             ),
             None,
         )
@@ -115,22 +121,17 @@ class FleetTopics:
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _on_call(self, call: CallForProposals, now_us: int) -> Iterator[Told]:
-        record = self.picture.view.calls[call.sender, call.call]
-        if record.opened_us != now_us:
-            return
-        yield "call", self._stamped({"at_us": now_us, **self._call(record)})
-        if call.operation in WHOLE:
-            yield "task", self.task(call.task, now_us)
+    def _on_call(self, call: Call, now_us: int) -> Iterator[Told]:
+        yield "call", self._stamped({"at_us": now_us, **self._call(call)})
+        if call.terms.operation in WHOLE:
+            yield "task", self.task(call.terms.task, now_us)
 
-    def _on_award(self, award: Award, now_us: int) -> Iterator[Told]:
-        record = self.picture.view.calls.get((award.sender, award.call))
-        if record is None or record.awards > 1:
-            return
-        told = self._call(record) | {"reason": award.reason.name, "code": int(award.reason)}
+    def _on_end(self, call: Call, end: CallAnswered, now_us: int) -> Iterator[Told]:
+        reason = end.award.reason
+        told = self._call(call) | {"reason": reason.name, "code": int(reason)}
         yield "call", self._stamped({"at_us": now_us, **told})
-        if record.call.operation in WHOLE:
-            yield "task", self.task(record.call.task, now_us)
+        if call.terms.operation in WHOLE:
+            yield "task", self.task(call.terms.task, now_us)
 
     def _on_report(self, report: TaskReport, now_us: int) -> Iterator[Told]:
         operation = self.operation_of(report.task)
@@ -138,18 +139,14 @@ class FleetTopics:
             extra = {"phase": LIFE[report.phase], "by": self.picture.view.name(report.sender)}
             yield "task", self.task(report.task, now_us) | extra | _coded(report.reason)
 
-    def _call(self, record: CallRecord) -> Json:
-        call = record.call
+    def _call(self, record: Call) -> Json:
+        call = record.terms
         return self.picture.call(record) | {
             "task": reference_text(call.task),
             "car": reference_text(call.car) if call.car.number else None,
             "from": self.place(call.from_station),
             "to": self.place(call.to_station),
         }
-
-    def _phase(self, message: Message) -> TaskPhase | None:
-        record = self.picture.view.tasks.get(message.task) if isinstance(message, TaskReport) else None
-        return record.phase if record is not None else None
 
     def _is_mobile(self, node: int) -> bool:
         machine = self.site.machines.get(node)
@@ -158,7 +155,7 @@ class FleetTopics:
     def _fixed(self, node: int, now_us: int) -> Iterator[Told]:
         """Elevators, compartments and all others that do not travel: state, and the floor of an elevator."""
         machine, view = self.site.machines[node], self.picture.view
-        state = view.states.get(node)
+        state = view.history.lives.states.get(node)
         told: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
         if machine.kind is KindCode.LIFT:
             segment, _ = view.positions[node]

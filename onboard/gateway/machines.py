@@ -13,7 +13,6 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.messages import (
-    Award,
     Blocked,
     CarAt,
     Clear,
@@ -30,6 +29,8 @@ from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
 from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.history.calls import CallAnswered
+from onboard.history.history import Fact
 
 #: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/core/presence.py).
 SILENT_BEATS = 3
@@ -97,8 +98,8 @@ class Machines:
         """Where a mobile machine is."""
         return self._tracker.where(node_id)
 
-    def feed(self, message: Message, now_us: int) -> None:
-        """Take up one message."""
+    def feed(self, message: Message, now_us: int, fact: Fact | None = None) -> None:
+        """Take up one message, and what the history made of it."""
         self._on_site(message)
         body = self.bodies.get(message.sender)
         if body is not None:
@@ -110,13 +111,13 @@ class Machines:
                 body.wait = None
         if body is not None:
             self._on_word(body, message, now_us)
+        if isinstance(fact, CallAnswered) and fact.award.result is CallResult.WITHDRAWN:
+            self._on_withdrawal(fact)
         match message:
             case CarAt():
                 self._on_car(message)
             case Halted():
                 self._on_halted(message, now_us)
-            case Award() if message.result is CallResult.WITHDRAWN:
-                self._on_withdrawal(message)
 
     def halted(self, node_id: int, now_us: int) -> Halted | None:
         """Why a machine does not act, as long as that is said, in each heartbeat period."""
@@ -200,7 +201,8 @@ class Machines:
             task.phase, task.reason = report.phase, report.reason
         self.changed.add(report.sender)
 
-    def _on_withdrawal(self, award: Award) -> None:
+    def _on_withdrawal(self, fact: CallAnswered) -> None:
+        award = fact.award
         for node, body in self.bodies.items():
             if body.task is not None and body.task.task == award.task and not body.task.is_over:
                 body.task.phase, body.task.reason = TaskPhase.FORFEITED, award.reason

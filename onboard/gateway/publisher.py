@@ -18,6 +18,7 @@ from onboard.gateway.factsheet import factsheet
 from onboard.gateway.fleet import WHOLE, FleetTopics
 from onboard.gateway.machines import Machines
 from onboard.gateway.settings import GatewaySettings, level
+from onboard.history.history import Fact
 from onboard.ports.broker import Publication
 
 #: The link of the fleet's own topics.
@@ -136,8 +137,9 @@ class Publisher:
     # --- inner works -------------------------------------------------------------------------------------------
 
     def _feed(self, message: Message, now_us: int) -> Iterator[Outgoing]:
-        self.machines.feed(message, now_us)
-        told = self._of_fleet(message, now_us)
+        fact = self.fleet.picture.history.feed(message, now_us)
+        self.machines.feed(message, now_us, fact)
+        told = self._of_fleet(message, fact, now_us)
         if not self.settings.serials:
             yield from told
         else:
@@ -165,8 +167,8 @@ class Publisher:
                 told = self.fleet.indicators(now_us)
                 yield Outgoing(FLEET, self.publication("indicators", told, retain=True))
 
-    def _of_fleet(self, message: Message, now_us: int) -> Iterator[Outgoing]:
-        for topic, told in self.fleet.feed(message, now_us):
+    def _of_fleet(self, message: Message, fact: Fact | None, now_us: int) -> Iterator[Outgoing]:
+        for topic, told in self.fleet.take(message, fact, now_us):
             retain = topic.startswith("machine/")
             if retain and self._fixed.get(topic) == told:
                 continue

@@ -10,8 +10,6 @@ from enum import StrEnum
 
 from onboard.core.codes import ANY_STATION, CallResult, Grade, KindCode, LegAction, Operation, TaskPhase
 from onboard.core.messages import (
-    Award,
-    CallForProposals,
     CarAt,
     Itinerary,
     Message,
@@ -21,6 +19,8 @@ from onboard.core.messages import (
     Waiting,
 )
 from onboard.core.site import Segment, Site
+from onboard.history.calls import Call, CallAnswered
+from onboard.history.history import Fact
 
 #: Operations whose winner has a task until it reports the end.
 TASKS = (Operation.PARK, Operation.RETRIEVE)
@@ -68,13 +68,12 @@ class Body:
 
 
 class Activities:
-    """A fold over the fleet bus: feed every message in the order of the log."""
+    """Give it every message of the fleet bus in the order of the log, and what a history was told by it."""
 
     def __init__(self, site: Site, begin_us: int = 0) -> None:
         self.bodies: dict[int, Body] = {}
         self._site = site
         self._begin_us = begin_us
-        self._calls: dict[tuple[int, int], CallForProposals] = {}
         for machine in site.machines.values():
             if machine.kind in (KindCode.ROBOT, KindCode.LIFT):
                 track = next((t for t in site.lifts if site.stewards[t] == machine.node_id), machine.home.track)
@@ -91,18 +90,15 @@ class Activities:
             body.spent_us = Counter()
             body.busy_us = body.travel_mm = body.empty_mm = body.longest_wait_us = 0
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message."""
+        if isinstance(fact, CallAnswered) and fact.call is not None and fact.is_end:
+            self._on_end(fact.call, fact, time_us)
         match message:
             case Progress():
                 self._on_progress(message, time_us)
             case Waiting():
                 self._on_waiting(message, time_us)
-            case CallForProposals():
-                if message.operation in TASKS:
-                    self._calls[message.sender, message.call] = message
-            case Award():
-                self._on_award(message, time_us)
             case TaskReport():
                 self._on_report(message, time_us)
             case CarAt() if (body := self.bodies.get(message.sender)) and message.station == ANY_STATION:
@@ -162,11 +158,10 @@ class Activities:
                 lift.rides[robot.node] = rides[lift.node]
                 self._settle(lift, time_us)
 
-    def _on_award(self, award: Award, time_us: int) -> None:
-        call = self._calls.pop((award.sender, award.call), None)
-        body = self.bodies.get(award.winner)
-        if call is not None and body is not None and award.result is CallResult.AWARDED:
-            body.tasks.add(call.task)
+    def _on_end(self, call: Call, end: CallAnswered, time_us: int) -> None:
+        body = self.bodies.get(end.award.winner)
+        if call.terms.operation in TASKS and body is not None and end.award.result is CallResult.AWARDED:
+            body.tasks.add(call.terms.task)
             self._settle(body, time_us)
 
     def _on_report(self, report: TaskReport, time_us: int) -> None:

@@ -7,21 +7,12 @@ for a part of it (a ride) are sub-calls.
 from collections import Counter
 from dataclasses import dataclass, field
 
-from onboard.core.codes import CallResult, Criterion, Grade, LegAction, Operation, TaskPhase
-from onboard.core.messages import (
-    Award,
-    Bid,
-    BusTime,
-    CallForProposals,
-    Itinerary,
-    Leg,
-    Message,
-    Reference,
-    Stamp,
-    TaskReport,
-    Waiting,
-)
+from onboard.core.codes import CallResult, Grade, LegAction, Operation, TaskPhase
+from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Stamp, Waiting
 from onboard.core.serial import ms_after
+from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
+from onboard.history.history import Fact, History
+from onboard.history.tasks import TaskTold
 
 TASKS = (Operation.PARK, Operation.RETRIEVE)
 #: A plan told anew so soon after another machine's plan is the answer to it, us. Machines answer within one turn, and a
@@ -39,15 +30,6 @@ class Plan:
     stamp: Stamp
     legs: tuple[Leg, ...]
     waited: str | None = None
-
-
-@dataclass
-class Task:
-    """A task from its first call to its end."""
-
-    operation: Operation
-    owner: int = 0
-    promised_ms: int | None = None
 
 
 @dataclass
@@ -72,86 +54,64 @@ class Counts:
 
 
 class Dealings:
-    """A fold over the fleet bus: feed every message in the order of the log."""
+    """A view of a history: give it every message of the fleet bus in the order of the log, and what was told by it."""
 
-    def __init__(self) -> None:
+    def __init__(self, history: History) -> None:
         self.counts = Counts()
-        self._calls: dict[tuple[int, int], CallForProposals] = {}
-        self._bids: dict[tuple[int, int], dict[int, int]] = {}
-        self._tasks: dict[Reference, Task] = {}
+        self._tasks = history.tasks
         self._plans: dict[int, Plan] = {}
         #: Stamps of awards whose winner has not told its plan yet.
         self._fresh: set[tuple[int, int, int]] = set()
         self._told_us: tuple[int, int] = (0, -ANSWER_US)
-        self._offset_us = 0
+        self._clock = history.clock
 
     def begin(self) -> None:
         """Count from now on; open calls and tasks are kept."""
         self.counts = Counts()
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message."""
         self.counts.messages[type(message).__name__] += 1
         match message:
-            case BusTime():
-                self._offset_us = time_us - message.bus_time_us
-            case CallForProposals():
-                self._on_call(message)
-            case Bid():
-                self.counts.bids += 1
-                if (message.initiator, message.call) in self._calls:
-                    self._bids.setdefault((message.initiator, message.call), {})[message.sender] = message.cost
-            case Award():
-                self._on_award(message)
-            case TaskReport():
-                self._on_report(message, time_us)
             case Waiting():
                 plan = self._plans.get(message.sender)
                 if plan is not None:
                     plan.waited = message.reason.name
             case Itinerary() if message.grade is Grade.FIRM:
                 self._on_plan(message, time_us)
+        match fact:
+            case CallOpened():
+                self._on_call(fact.call.terms)
+            case BidMade():
+                self.counts.bids += 1
+            case CallAnswered() if fact.call is not None and fact.is_end:
+                self._on_end(fact.call, fact)
+            case TaskTold() if fact.is_first and fact.report.phase is TaskPhase.DONE:
+                self._on_done(fact, time_us)
 
     # --- calls and tasks ---------------------------------------------------------------------------------------
 
     def _on_call(self, call: CallForProposals) -> None:
-        key = (call.sender, call.call)
-        if key in self._calls:
-            return
-        self._calls[key] = call
         counts = self.counts
         counts.calls += 1
         counts.sub_calls += call.depth > 0
         counts.opened_again += call.attempt > 1
         counts.give_way_calls += call.operation is Operation.GIVE_WAY
-        if call.depth == 0 and call.operation in TASKS:
-            self._tasks.setdefault(call.task, Task(call.operation))
 
-    def _on_award(self, award: Award) -> None:
-        if award.result is CallResult.OPTION:
-            return
-        key = (award.sender, award.call)
-        call, bids = self._calls.pop(key, None), self._bids.pop(key, {})
-        if call is None:
-            return
+    def _on_end(self, call: Call, end: CallAnswered) -> None:
+        award = end.award
         self.counts.refused += award.result is CallResult.REFUSED
-        task = self._tasks.get(call.task)
-        if award.result is not CallResult.AWARDED or call.depth or task is None:
-            return
-        task.owner = award.winner
-        task.promised_ms = bids.get(award.winner) if call.criterion is Criterion.FINISH_TIME else None
-        self._fresh.add((award.winner, award.sender, award.call & 0xFF))
+        if award.result is CallResult.AWARDED and not call.terms.depth and call.terms.operation in TASKS:
+            self._fresh.add((award.winner, award.sender, award.call & 0xFF))
 
-    def _on_report(self, report: TaskReport, time_us: int) -> None:
-        if report.phase is TaskPhase.REFUSED:
-            self._tasks.pop(report.task, None)
-        if report.phase is not TaskPhase.DONE or report.task not in self._tasks:
+    def _on_done(self, told: TaskTold, time_us: int) -> None:
+        task = told.task
+        if task.operation not in TASKS:
             return
-        task = self._tasks.pop(report.task)
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)
-        if task.promised_ms is not None and task.owner == report.sender:
-            self.counts.slack_ms.append(-ms_after((time_us - self._offset_us) // 1000, task.promised_ms))
+        if task.promised_ms is not None and task.owner == told.report.sender:
+            self.counts.slack_ms.append(-ms_after((time_us - (self._clock.offset_us or 0)) // 1000, task.promised_ms))
 
     # --- plans -------------------------------------------------------------------------------------------------
 
@@ -177,7 +137,9 @@ class Dealings:
             self.counts.unasked_moves += 1
 
     def _has_task(self, node: int) -> bool:
-        return any(task.owner == node for task in self._tasks.values())
+        return any(
+            task.owner == node and not task.is_over and task.operation in TASKS for task in self._tasks.by_name.values()
+        )
 
 
 def _is_rest_of(new: tuple[Leg, ...], old: tuple[Leg, ...]) -> bool:

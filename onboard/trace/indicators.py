@@ -1,4 +1,4 @@
-"""Performance indicators (row P55) from the fleet bus alone: a fold over decoded messages, live or from a log."""
+"""Performance indicators (row P55) from the fleet bus alone: a view of its history, live or from a log."""
 
 from bisect import bisect_left
 from collections.abc import Sequence
@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from onboard.core.codes import KindCode
 from onboard.core.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
+from onboard.history.history import Fact, History
 from onboard.trace.activity import Activities, Activity, Body
 from onboard.trace.dealings import ANSWER, Counts, Dealings
 from onboard.trace.durations import percentile
@@ -119,16 +120,21 @@ def _line(machine: Utilisation) -> str:
 class Indicators:
     """Feed every message of the fleet bus in the order of the log; ask for the figures at any time."""
 
-    def __init__(self, site: Site, begin_us: int = 0) -> None:
+    def __init__(self, site: Site, begin_us: int = 0, history: History | None = None) -> None:
         self._site = site
+        self._history = history if history is not None else History()
         self._begin_us = begin_us
         self._activities = Activities(site, begin_us)
-        self._dealings = Dealings()
+        self._dealings = Dealings(self._history)
 
     def feed(self, message: Message, time_us: int) -> None:
-        """Take up one message."""
-        self._dealings.feed(message, time_us)
-        self._activities.feed(message, time_us)
+        """Take up one message, where the history is these indicators' own."""
+        self.take(message, self._history.feed(message, time_us), time_us)
+
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
+        """Take up one message, and what the history made of it."""
+        self._dealings.take(message, fact, time_us)
+        self._activities.take(message, fact, time_us)
 
     def begin(self, time_us: int) -> None:
         """Measure from now on: open tasks, plans and places are kept, sums begin anew."""

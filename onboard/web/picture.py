@@ -1,4 +1,4 @@
-"""What the page shows, from decoded messages alone: a fold like the terminal's, as plain values for JSON.
+"""What the page shows, from decoded messages alone: a view like the terminal's, as plain values for JSON.
 
 Times are microseconds of the log or loop; a client draws with them and never asks for more than is in a snapshot.
 What is drawn of a system, and its words, are its scene's (``onboard.trace.scene``).
@@ -9,13 +9,14 @@ from typing import Any
 
 from onboard.core.codes import CallResult, Criterion, Reason, TaskPhase
 from onboard.core.frame import Frame
-from onboard.core.messages import BusTime, Heartbeat, Message, Progress, Waiting
+from onboard.core.messages import Message
 from onboard.core.site import Site
+from onboard.history.calls import Call
+from onboard.history.history import Fact
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
-from onboard.trace.scene.scene import BusClock
 from onboard.trace.scene.scenes import scene_of
-from onboard.trace.view import CallRecord, SiteView
+from onboard.trace.view import SiteView
 
 #: Calls, and lines of events, that a snapshot tells.
 CALLS_SHOWN = 12
@@ -35,13 +36,13 @@ class LivePicture:
     def __init__(self, site: Site) -> None:
         self.site = site
         self.view = SiteView(site)
+        self.history = self.view.history
         self.scene = scene_of(site, self.view)
         #: Whether machines move along tracks here: the indicators of robots and lifts are of such a site.
         self.has_tracks = bool(site.tracks)
-        self.indicators = Indicators(site)
-        self._heard: dict[int, int] = {}
-        self._waits: dict[int, tuple[int, Waiting]] = {}
-        self._clock = BusClock()
+        self.indicators = Indicators(site, history=self.history)
+        self._clock = self.history.clock
+        self._lives = self.history.lives
         self._bits = 0
         self._frames = 0
         self._samples: deque[list[float]] = deque(maxlen=SAMPLES)
@@ -61,18 +62,13 @@ class LivePicture:
 
     def feed(self, message: Message, time_us: int) -> None:
         """One message of the fleet bus."""
-        self.view.feed(message, time_us)
+        self.take(message, self.history.feed(message, time_us), time_us)
+
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
+        """One message of the fleet bus that the history was fed with, and what it made of it."""
+        self.view.take(message, fact, time_us)
         self.scene.feed(message, time_us)
-        self.indicators.feed(message, time_us)
-        match message:
-            case Heartbeat():
-                self._heard[message.sender] = time_us
-            case BusTime():
-                self._clock.feed(message, time_us)
-            case Progress() if message.speed_mm_s:
-                self._waits.pop(message.sender, None)
-            case Waiting():
-                self._waits[message.sender] = (time_us, message)
+        self.indicators.take(message, fact, time_us)
         self._sample(time_us)
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
@@ -141,7 +137,7 @@ class LivePicture:
     def _machine(self, node: int) -> dict[str, Any]:
         view = self.view
         told = {"state": self._state(node), **self.scene.machine(node, view.now_us)}
-        wait = self._waits.get(node)
+        wait = self._lives.waits.get(node)
         if wait is not None and view.now_us - wait[0] <= WAIT_SHOWN_US:
             told["wait"] = {
                 "at": [wait[1].track, wait[1].index],
@@ -153,14 +149,14 @@ class LivePicture:
 
     def _state(self, node: int) -> str:
         """What its last heartbeat said, unless that is too long ago."""
-        heard_us = self._heard.get(node)
+        heard_us = self._lives.heard_us.get(node)
         if heard_us is None or self.view.now_us - heard_us > SILENT_BEATS * self.site.timing.heartbeat_us:
             return "silent"
-        return self.view.states[node].name.lower()
+        return self._lives.states[node].name.lower()
 
-    def call(self, record: CallRecord) -> dict[str, Any]:
+    def call(self, record: Call) -> dict[str, Any]:
         """One call with its bids; times in us of the log."""
-        call, view = record.call, self.view
+        call, view, end = record.terms, self.view, record.end
         return {
             "id": f"{call.sender}.{call.call}",
             "by": view.name(call.sender),
@@ -177,10 +173,10 @@ class LivePicture:
                 {"by": view.name(node), "at_us": at_us, "cost": self._cost(call.criterion, cost)}
                 for at_us, node, cost in record.bids
             ],
-            "winner": view.name(record.winner) if record.winner else None,
-            "result": record.result.name.lower() if record.result is not None else None,
-            "won": record.result is CallResult.AWARDED,
-            **({"reason": view.words.reason(record.reason)} if record.reason is not Reason.NONE else {}),
+            "winner": view.name(end.winner) if end is not None and end.winner else None,
+            "result": end.result.name.lower() if end is not None else None,
+            "won": end is not None and end.result is CallResult.AWARDED,
+            **({"reason": view.words.reason(end.reason)} if end is not None and end.reason is not Reason.NONE else {}),
         }
 
     def _cost(self, criterion: Criterion, cost: int) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reaso
 from onboard.core.messages import Award, Bid, CallForProposals, Reference
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.settings import GatewaySettings
-from onboard.trace.view import CALL_LIMIT, TASK_LIMIT
+from onboard.history.history import CALL_LIMIT, TASK_LIMIT
 from tests.mqtt.logs import EPOCH_US, content, published
 
 

@@ -57,6 +57,7 @@ ALL_OF_ONBOARD = (
     "onboard.contract",
     "onboard.controller",
     "onboard.core",
+    "onboard.history",
     "onboard.io",
     "onboard.ports",
     "onboard.systems",
@@ -89,7 +90,7 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
         ("onboard.config", "onboard.core", "onboard.ways", own), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
     )
     history = Layer(
-        (*CORE_TYPES, own, "onboard.trace", "onboard.ways", "onboard.wire"),
+        (*CORE_TYPES, own, "onboard.history", "onboard.trace", "onboard.ways", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
     )
     words = Layer((*CORE_TYPES, own, "onboard.systems.words"), only_stdlib=PURE_STDLIB, pure=True)
@@ -127,6 +128,8 @@ LAYERS: dict[str, Layer] = {
     "onboard.systems": Layer(("onboard.core",)),
     "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),
     **{layer: rule for system in SYSTEMS for layer, rule in _parts_of(system)},
+    # The one fold of the bus: whoever shows, counts or publishes it is a view of this.
+    "onboard.history": Layer(CORE_TYPES, only_stdlib=PURE_STDLIB, pure=True),
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(
@@ -137,7 +140,8 @@ LAYERS: dict[str, Layer] = {
     ),
     "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
     "onboard.trace": Layer(
-        (*CORE_TYPES, *REGISTRY, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})
+        (*CORE_TYPES, *REGISTRY, "onboard.history", "onboard.wire"),
+        not_stdlib=frozenset({"asyncio", "random", "threading"}),
     ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
     "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
@@ -146,13 +150,21 @@ LAYERS: dict[str, Layer] = {
     # Judges nothing: it runs the very code of a controller, and only compares what comes out.
     "onboard.trace.replay": Layer((*ALL_OF_ONBOARD, "onboard.trace")),
     # The page shows what the trace knows; only its own command line opens files and buses.
-    "onboard.web": Layer((*CORE_TYPES, "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
+    "onboard.web": Layer((*CORE_TYPES, "onboard.history", "onboard.trace", "onboard.wire"), ("starlette", "uvicorn")),
     "onboard.web.cli": Layer(
         (*CORE_TYPES, "onboard.config", "onboard.io", "onboard.systems", "onboard.trace", "onboard.web", "onboard.wire")
     ),
     # What is published is decided from the decoded bus alone; sessions, files and buses come in through ports.
     "onboard.gateway": Layer(
-        (*CORE_TYPES, *REGISTRY, "onboard.ports", "onboard.trace", "onboard.web.picture", "onboard.wire"),
+        (
+            *CORE_TYPES,
+            *REGISTRY,
+            "onboard.history",
+            "onboard.ports",
+            "onboard.trace",
+            "onboard.web.picture",
+            "onboard.wire",
+        ),
         not_stdlib=frozenset({"random", "socket", "threading", "time"}),
     ),
     # Its command line is a composition root: it opens the bus, the journal and the broker.

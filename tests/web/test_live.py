@@ -16,7 +16,8 @@ from bus_sim.cli import main as bus_sim
 from bus_sim.sites import find_site
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
 from onboard.core.messages import Award, CallForProposals, Message, Reference
-from onboard.trace.view import CALL_LIMIT, TASK_LIMIT, SiteView
+from onboard.history.history import CALL_LIMIT, TASK_LIMIT
+from onboard.trace.view import SiteView
 from onboard.web.app import CommandError
 from onboard.web.live import LiveSource
 from onboard.web.serve import WebServer

@@ -189,7 +189,7 @@ _MARKS = {(False, False): ".", (True, False): "'", (False, True): ",", (True, Tr
 
 def _states(view: SiteView, width: int) -> list[Text]:
     """What each machine does, in columns."""
-    words = [f"{view.name(node)} {_STATE_WORDS[state]}" for node, state in sorted(view.states.items())]
+    words = [f"{view.name(node)} {_STATE_WORDS[state]}" for node, state in sorted(view.history.lives.states.items())]
     column = max((len(word) for word in words), default=0) + 2
     a_line = max(1, width // column)
     return [

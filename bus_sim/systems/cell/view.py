@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 from bus_sim.systems.cell.text import printed
 from onboard.core.codes import CallResult, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
+from onboard.core.messages import Message, Reference, TaskReport
+from onboard.history.calls import CallAnswered, CallOpened, Calls
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.messages import (
     ArmProgress,
@@ -47,28 +48,30 @@ class CellView:
     positions: dict[int, ArmProgress] = field(default_factory=dict)
     goal_messages: int = 0
     deepest: int = 0
+    _calls: Calls = field(default_factory=Calls)
     _highs: dict[tuple[int, Reference], int] = field(default_factory=dict)
     _offers: dict[tuple[int, Reference], float] = field(default_factory=dict)
 
-    def feed(self, message: Message) -> None:
+    def feed(self, message: Message, time_us: int = 0) -> None:
         """Take up one message."""
+        match self._calls.feed(message, time_us):
+            case CallOpened(call):
+                self.goal_messages += 1
+                self.deepest = max(self.deepest, call.terms.depth)
+            case CallAnswered(award=award) if award.result is CallResult.AWARDED:
+                told = self.goals.setdefault(award.task, Told())
+                told.contractor = award.winner
+                told.cost = self._offers.get((award.winner, award.task), 0.0)
         match message:
             case GoalStart():
                 self._goal(message.sender, message.goal).start = Point(message.x_mm, message.y_mm)
             case GoalEnd():
                 self._goal(message.sender, message.goal).end = Point(message.x_mm, message.y_mm)
-            case CallForProposals():
-                self.goal_messages += 1
-                self.deepest = max(self.deepest, message.depth)
             case OfferHigh():
                 self._highs[message.sender, Reference(message.manager, message.goal)] = message.bits
             case OfferLow():
                 key = (message.sender, Reference(message.manager, message.goal))
                 self._offers[key] = from_halves(self._highs.get(key, 0), message.bits)
-            case Award() if message.result is CallResult.AWARDED:
-                told = self.goals.setdefault(message.task, Told())
-                told.contractor = message.winner
-                told.cost = self._offers.get((message.winner, message.task), 0.0)
             case TaskReport():
                 self.goals.setdefault(message.task, Told()).phase = message.phase
             case ArmProgress():

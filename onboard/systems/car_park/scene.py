@@ -5,17 +5,13 @@ from typing import Any
 from onboard.core.codes import KindCode, LegAction, TokenKind
 from onboard.core.messages import (
     BayState,
-    BusTime,
     DoorState,
     Message,
     Progress,
     ShuttleState,
-    TokenGrant,
-    TokenHeld,
 )
-from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, TrackKind
-from onboard.trace.scene.scene import BusClock, Json
+from onboard.trace.scene.scene import Json
 from onboard.trace.view import SiteView
 
 
@@ -26,22 +22,16 @@ class CarParkScene:
         self.site = site
         self.view = view
         self.words = view.words
-        self._clock = BusClock()
+        self._clock = view.history.clock
+        self._rights = view.history.rights
         self._doors: dict[int, dict[str, str]] = {}
         self._bays: dict[int, dict[str, Any]] = {}
         self._shuttles: dict[int, dict[str, Any]] = {}
-        self._tokens: dict[int, tuple[int, int]] = {}
         self._speeds: dict[int, tuple[int, int]] = {}
 
     def feed(self, message: Message, time_us: int) -> None:
         """Follow rights, plans, cars and calls for the elevation."""
         match message:
-            case BusTime():
-                self._clock.feed(message, time_us)
-            case TokenGrant() if message.token_kind is TokenKind.SEGMENT:
-                self._on_token(message.token, message.version, message.holder)
-            case TokenHeld() if message.token_kind is TokenKind.SEGMENT:
-                self._on_token(message.token, message.version, message.sender)
             case Progress():
                 self._speeds[message.sender] = (message.speed_mm_s, time_us)
 
@@ -58,11 +48,6 @@ class CarParkScene:
                 self._bays[node] = {"car": message.load_kg > 0, "person": message.person_inside}
             case ShuttleState():
                 self._shuttles[node] = {"mm": message.extension_mm, "side": int(message.side)}
-
-    def _on_token(self, number: int, version: int, holder: int) -> None:
-        known = self._tokens.get(number)
-        if known is None or not is_newer(known[0], version, 16):
-            self._tokens[number] = (version, holder)
 
     def layout(self) -> Json:
         """Tracks and places; ``blockable`` are the segments that a person may name."""
@@ -142,7 +127,7 @@ class CarParkScene:
     def _held(self, node: int) -> list[list[int]]:
         if self.site.machines[node].kind is not KindCode.ROBOT:
             return []
-        return sorted([number >> 8, number & 0xFF] for number, (_, holder) in self._tokens.items() if holder == node)
+        return [[number >> 8, number & 0xFF] for number in self._rights.held_by(node, TokenKind.SEGMENT)]
 
 
 SCENE = CarParkScene

@@ -64,7 +64,7 @@ class GraphScene:
             case VisitList():
                 task = Reference(message.sender, message.order)
                 ways = ", ".join(f"N{node}" for node in stops_of(message))
-                if self.view.open_task(task, Operation.TRANSPORT, time_us) and message.robot:
+                if self.view.history.tasks.open(task, Operation.TRANSPORT, time_us) and message.robot:
                     self.view.say(time_us, f"{self.view.name(message.robot)} is to visit {ways}")
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:

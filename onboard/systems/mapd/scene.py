@@ -116,10 +116,10 @@ class MapdScene:
         if robot.won != NO_TASK and not (robot.loaded and robot.task == robot.won):
             before = self.view.tasks.get(self._reference(robot.won))
             if before is not None and before.is_waiting and before.owner == node:
-                self.view.own(self._reference(robot.won), 0)
+                self.view.history.tasks.own(self._reference(robot.won), 0)
         robot.won = task
         if task != NO_TASK:
-            self.view.own(self._reference(task), node)
+            self.view.history.tasks.own(self._reference(task), node)
             self.view.say(time_us, f"{self.view.name(node)} wins {self._thing(task)}")
 
     def _on_state(self, robot: _Robot, state: StepState, time_us: int) -> None:

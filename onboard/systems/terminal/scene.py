@@ -8,8 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from onboard.core.codes import ANY_STATION, TokenKind
-from onboard.core.messages import BusTime, CarAt, Message, TokenGrant, TokenHeld
-from onboard.core.serial import is_newer
+from onboard.core.messages import CarAt, Message
 from onboard.systems.terminal.chart import BAY, MARGIN, chart_of
 from onboard.systems.terminal.messages import (
     Action,
@@ -22,7 +21,7 @@ from onboard.systems.terminal.messages import (
     StepResult,
 )
 from onboard.systems.terminal.site import EntityKind, Terminal
-from onboard.trace.scene.scene import NEARLY, BusClock, Json, Spot, along, part, shape, spot_on, still
+from onboard.trace.scene.scene import NEARLY, Json, Spot, along, part, shape, spot_on, still
 from onboard.trace.view import SiteView
 
 _DRIVING = Action.GOTO
@@ -51,9 +50,9 @@ class TerminalScene:
         self.site = site
         self.view = view
         self.words = view.words
-        self._clock = BusClock()
+        self._clock = view.history.clock
+        self._rights = view.history.rights
         self._bodies = {node: _Body(site.machines[node].home.track) for node in site.vehicles}
-        self._tokens: dict[int, tuple[int, int]] = {}
         self._blocked: dict[int, bool] = {}
         self._boxes = {number: box.station for number, box in enumerate(site.boxes, start=1)}
         chart = chart_of(site)
@@ -98,17 +97,11 @@ class TerminalScene:
         if message.sender in self._bodies:
             self._on_vehicle(message, time_us)
         match message:
-            case BusTime():
-                self._clock.feed(message, time_us)
             case LaneState():
                 if self._blocked.get(message.lane, False) is not message.blocked:
                     words = "is blocked" if message.blocked else "is free again"
                     self.view.say(time_us, f"{self.words.place(message.lane)} {words}")
                 self._blocked[message.lane] = message.blocked
-            case TokenGrant() if message.token_kind is TokenKind.SEGMENT:
-                self._on_token(message.token, message.version, message.holder)
-            case TokenHeld() if message.token_kind is TokenKind.SEGMENT:
-                self._on_token(message.token, message.version, message.sender)
             case CarAt() if message.car.number in self._boxes:
                 # The newest at a station is the last in its row.
                 del self._boxes[message.car.number]
@@ -139,11 +132,6 @@ class TerminalScene:
         if message.entity in self.site.entities and message.slot:
             body.entity, body.slot = message.entity, message.slot
             self._in_slot(node, body, time_us, at_end=message.at_end or is_still)
-
-    def _on_token(self, number: int, version: int, holder: int) -> None:
-        known = self._tokens.get(number)
-        if known is None or not is_newer(known[0], version, 16):
-            self._tokens[number] = (version, holder)
 
     def _on_head(self, head: PlanHead, time_us: int) -> None:
         body = self._bodies[head.sender]
@@ -238,9 +226,9 @@ class TerminalScene:
     def _held(self, node: int) -> list[list[object]]:
         """Lanes with the piece of them that is held, and crossings."""
         found: list[list[object]] = []
-        for number, (_, holder) in sorted(self._tokens.items()):
+        for number in self._rights.held_by(node, TokenKind.SEGMENT):
             entity = self.site.entities.get(number >> 8)
-            if holder != node or entity is None or entity.kind is EntityKind.AREA:
+            if entity is None or entity.kind is EntityKind.AREA:
                 continue
             slots, slot = max(1, entity.capacity), number & 0xFF
             line = self._lines.get(entity.number)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from onboard.core.messages import BusTime, Message
-from onboard.core.serial import ms_after
 from onboard.core.site import Site
+from onboard.history.clock import BusClock
 from onboard.systems.words import words_of
 from onboard.trace.chart.svg import Drawing, colour, dashes
 from onboard.trace.listener import Said
@@ -86,7 +86,7 @@ class Rows:
         self.first_us, self.last_us = 0 if from_us is None else from_us, 0
         self._name, self._machines = site.name, sorted(site.machines)
         self._until_us, self._is_begun = until_us, from_us is not None
-        self._offset_us = 0
+        self._clock = BusClock()
 
     def feed(self, said: Said) -> None:
         """Take up one message of the fleet bus; what came before the time that is shown is heard all the same."""
@@ -96,7 +96,7 @@ class Rows:
             self._is_begun, self.first_us = True, said.time_us
         self.last_us = max(self.last_us, said.time_us)
         if isinstance(said.message, BusTime):
-            self._offset_us = said.time_us - said.message.bus_time_us
+            self._clock.feed(said.message, said.time_us)
         self.words.hear(said.message)
         self.take(said.message, said.time_us)
 
@@ -108,8 +108,9 @@ class Rows:
         """The log is over: what goes on ends with it."""
 
     def log_us(self, bus_ms: int, near_us: int) -> int:
-        """The time of the log of a bus time in ms."""
-        return near_us + 1000 * ms_after(bus_ms, (near_us - self._offset_us) // 1000)
+        """The time of the log of a bus time in ms; ``near_us`` itself where nobody told bus time."""
+        found = self._clock.log_us(bus_ms, near_us)
+        return near_us if found is None else found
 
     def draw(self, start_us: int) -> Drawing:
         """All panels, the machines by their colours."""

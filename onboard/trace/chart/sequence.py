@@ -22,9 +22,7 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.messages import (
-    Award,
     BayState,
-    Bid,
     CallForProposals,
     CarAt,
     DeskEvent,
@@ -39,6 +37,7 @@ from onboard.core.messages import (
     TaskReport,
 )
 from onboard.core.site import Site
+from onboard.history.calls import BidMade, CallAnswered, CallFact, CallOpened, Calls
 from onboard.trace.chart.svg import Drawing
 from onboard.trace.listener import Said
 from onboard.trace.words import Words
@@ -78,7 +77,8 @@ class _Story:
         self.car: Reference | None = None
         self.owner = 0
         self.operation: Operation | None = None
-        self.calls: dict[tuple[int, int], CallForProposals] = {}
+        self.calls: set[tuple[int, int]] = set()
+        self._history = Calls()
         self.offers: set[tuple[int, int]] = set()
         self._lifts = {site.stewards[track]: track for track in site.lifts}
         self._platforms = set(site.platforms)
@@ -92,22 +92,29 @@ class _Story:
         message = said.message
         if self.over:
             return
-        for receiver, text, step in self._fleet(message) if said.is_fleet else self._device(message):
+        for receiver, text, step in self._fleet(message, said.time_us) if said.is_fleet else self._device(message):
             yield Arrow(said.time_us, message.sender, receiver, text, step)
 
-    def _fleet(self, message: Message) -> Iterator[tuple[int, str, int]]:
-        match message:
-            case CallForProposals() if message.task == self.task:
-                yield from self._call(message)
-            case Bid() if (message.initiator, message.call) in self.calls:
-                call = self.calls[message.initiator, message.call]
-                self.offers.add((message.sender, message.itinerary_version))
+    def _dealt(self, fact: CallFact | None) -> Iterator[tuple[int, str, int]]:
+        """What a message tells of the task's calls."""
+        if fact is None or fact.call is None or fact.call.terms.task != self.task:
+            return
+        call = fact.call.terms
+        match fact:
+            case CallOpened():
+                yield from self._call(call)
+            case BidMade(bid=bid):
+                self.offers.add((bid.sender, bid.itinerary_version))
                 step = self._park(0 if call.depth else 7)
-                yield message.initiator, f"bids {self._words.cost(message.cost, call.criterion)}", step
+                yield bid.initiator, f"bids {self._words.cost(bid.cost, call.criterion)}", step
+            case CallAnswered():
+                yield from self._answer(call, fact)
+
+    def _fleet(self, message: Message, time_us: int) -> Iterator[tuple[int, str, int]]:
+        yield from self._dealt(self._history.feed(message, time_us))
+        match message:
             case Itinerary() if (message.sender, message.version) in self.offers:
                 yield ALL, f"tentative itinerary, {len(message.legs)} legs", self._park(9)
-            case Award() if (message.sender, message.call) in self.calls:
-                yield from self._award(message)
             case Itinerary() if message.grade is Grade.FIRM and self._is_ours(message):
                 yield ALL, f"itinerary {message.version}, {len(message.legs)} legs", self._once("plan", self._park(11))
             case TaskReport() if message.task == self.task:
@@ -120,19 +127,17 @@ class _Story:
                 yield from self._progress(message)
 
     def _call(self, call: CallForProposals) -> Iterator[tuple[int, str, int]]:
-        if self._once((call.sender, call.call), 1) == 0:
-            return
-        self.calls[call.sender, call.call] = call
+        self.calls.add((call.sender, call.call))
         if not call.depth:
             self.operation, self.car = call.operation, call.car
         what = self._words.system.operation(call.operation)
         way = self._words.system.way(call) or self._words.system.thing(call.car)
         yield ALL, f"call {call.call}: {what}, {way}", self._park(3 if not call.depth else 15)
 
-    def _award(self, award: Award) -> Iterator[tuple[int, str, int]]:
+    def _answer(self, call: CallForProposals, fact: CallAnswered) -> Iterator[tuple[int, str, int]]:
+        award = fact.award
         if not self._changed((award.sender, award.call), (award.result, award.winner)):
             return
-        call = self.calls[award.sender, award.call]
         if award.result is CallResult.AWARDED and not call.depth:
             self.owner = award.winner
         yield award.winner or ALL, f"call {award.call} {award.result.name.lower()}", self._park(0 if call.depth else 10)

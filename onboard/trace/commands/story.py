@@ -5,6 +5,7 @@ import sys
 
 from onboard.core.messages import Reference
 from onboard.core.site import Site
+from onboard.history.calls import Calls
 from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import (
     Commands,
@@ -17,7 +18,6 @@ from onboard.trace.commands.common import (
     tell_faults,
 )
 from onboard.trace.listener import Listener
-from onboard.trace.story.calls import Calls
 from onboard.trace.story.calls import told as told_call
 from onboard.trace.story.why import TaskStory, Why
 from onboard.trace.story.why import told as told_task
@@ -69,7 +69,7 @@ def run_calls(args: argparse.Namespace) -> int:
             if said.is_fleet:
                 words.hear(said.message)
                 calls.feed(said.message, said.time_us)
-    shown = [call for call in calls.calls if task is None or call.terms.task == task]
+    shown = [call for call in calls.all if task is None or call.terms.task == task]
     for call in shown:
         print("\n".join(told_call(call, words, start_us or 0)))
     print(f"{len(shown)} calls, {sum(len(call.bids) for call in shown)} bids")

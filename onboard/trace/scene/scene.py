@@ -9,8 +9,7 @@ import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from onboard.core.messages import BusTime, Message
-from onboard.core.serial import from_bus_ms
+from onboard.core.messages import Message
 
 #: A value for JSON.
 Json = dict[str, Any]
@@ -18,23 +17,6 @@ Json = dict[str, Any]
 Spot = tuple[float, float]
 #: How far along its way a machine is shown at most before it says that it is there.
 NEARLY = 0.94
-
-
-class BusClock:
-    """Bus time against the log's: what the last BusTime said. ``offset_us`` is None before it."""
-
-    def __init__(self) -> None:
-        self.offset_us: int | None = None
-
-    def feed(self, message: BusTime, time_us: int) -> None:
-        """Take up one."""
-        self.offset_us = time_us - message.bus_time_us
-
-    def log_us(self, bus_ms: int, now_us: int) -> int | None:
-        """The time of the log nearest to now at which bus time reads ``bus_ms``; None where nobody told bus time."""
-        if self.offset_us is None:
-            return None
-        return from_bus_ms(bus_ms, now_us - self.offset_us) + self.offset_us
 
 
 class Scene(Protocol):

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from onboard.core.codes import CallResult, Grade, LegAction, ManualMode, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.messages import (
-    Award,
     CallForProposals,
     Heartbeat,
     Itinerary,
@@ -24,8 +23,8 @@ from onboard.core.messages import (
 )
 from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site, Station
+from onboard.history.calls import CallAnswered, CallOpened, Calls, is_task
 from onboard.systems.words import plain
-from onboard.trace.story.calls import is_task
 from onboard.trace.words import Words
 
 #: Heartbeats missed in a row after which a machine counts as silent.
@@ -104,6 +103,7 @@ class Why:
         self.tasks: dict[Reference, TaskStory] = {}
         self._site = site
         self._words = words or Words(site)
+        self._calls = Calls()
         self._bodies: dict[int, _Body] = {}
         self._open: list[TaskStory] = []
         self._silence_us = MISSED_BEATS * site.timing.heartbeat_us
@@ -120,11 +120,12 @@ class Why:
         body.heard_us = time_us
         self._words.hear(message)
         body.deed = self._words.system.deed(message) or body.deed
+        match self._calls.feed(message, time_us):
+            case CallOpened() as fact if is_task(fact.call.terms):
+                self._on_call(fact.call.terms, time_us)
+            case CallAnswered() as fact:
+                self._on_answer(fact)
         match message:
-            case CallForProposals() if is_task(message):
-                self._on_call(message, time_us)
-            case Award():
-                self._on_award(message)
             case TaskReport():
                 self._on_report(message, time_us)
             case Progress():
@@ -165,7 +166,8 @@ class Why:
         story = self.tasks[call.task] = TaskStory(call.task, call.operation, call.sender, time_us)
         self._open.append(story)
 
-    def _on_award(self, award: Award) -> None:
+    def _on_answer(self, fact: CallAnswered) -> None:
+        award = fact.award
         story = self.tasks.get(award.task)
         if story is None or story.end_us is not None or award.sender != story.caller:
             return

@@ -1,0 +1,21 @@
+"""Bus time against the log's."""
+
+from onboard.core.messages import BusTime
+from onboard.core.serial import from_bus_ms
+
+
+class BusClock:
+    """What the last ``BusTime`` said. ``offset_us`` is None before it."""
+
+    def __init__(self) -> None:
+        self.offset_us: int | None = None
+
+    def feed(self, message: BusTime, time_us: int) -> None:
+        """Take up one."""
+        self.offset_us = time_us - message.bus_time_us
+
+    def log_us(self, bus_ms: int, now_us: int) -> int | None:
+        """The time of the log nearest to now at which bus time reads ``bus_ms``; None where nobody told bus time."""
+        if self.offset_us is None:
+            return None
+        return from_bus_ms(bus_ms, now_us - self.offset_us) + self.offset_us
