@@ -19,7 +19,6 @@ from bus_sim.run import RunOptions, run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.authority import car_token
 from onboard.core.codes import TokenKind
 from onboard.core.holon import Holon
 from onboard.core.site import Site, journal_owner
@@ -27,6 +26,7 @@ from onboard.io.journal import GROWTH, LEAST_BYTES, FileJournal
 from onboard.io.sealed import begin
 from onboard.ports.journal import Entry
 from onboard.systems.registry import compaction_for, factory_for
+from onboard.ways.tokens import car_token
 
 #: Arrivals and stays of the run that is repeated, s.
 MEAN_S, SIGMA_S, STAY_S = 110.0, 30.0, 150.0

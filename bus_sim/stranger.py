@@ -20,6 +20,7 @@ from onboard.systems.car_park.generation import Alternative, CarParkGeneration, 
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.robot import RobotFactory
 from onboard.systems.registry import factory_for
+from onboard.ways.mirror import way_mirror
 
 #: What it says that its first run takes, ms.
 RUN_MS = 10_000
@@ -106,19 +107,22 @@ class _Standing(Plain):
 
 
 @dataclass
-class _Factory:
+class _Factory(BehaviourFactory):
     """Makes robots, one of which is the stranger."""
 
     target: int
     how: Stranger
     robots: RobotFactory = field(default_factory=RobotFactory)
 
+    def __post_init__(self) -> None:
+        self.fleet_type = self.robots.fleet_type
+
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """What it bids."""
         if machine.node_id != self.target:
             return self.robots.estimator(site, machine, mirror)
         bids = _LeastBid if self.how is Stranger.LIAR else _EmptyBid
-        return bids(site, machine, mirror, Program(site))
+        return bids(site, machine, way_mirror(mirror), Program(site))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """What it does."""

@@ -95,12 +95,15 @@ class _Standing(Plain):
 
 
 @dataclass
-class _Factory:
+class _Factory(BehaviourFactory):
     """Makes machines of one kind, one of which is the stranger."""
 
     target: int
     how: Stranger
     honest: BehaviourFactory
+
+    def __post_init__(self) -> None:
+        self.fleet_type = self.honest.fleet_type
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """What it bids."""

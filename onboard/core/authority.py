@@ -18,13 +18,12 @@ from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Site
-from onboard.core.token_keys import TokenKey, car_token, genesis_holder, may_exist, segment_token, station_token
+from onboard.core.token_keys import TokenKey, genesis_holder, may_exist, segment_token, station_token
 
 __all__ = [
     "Claim",
     "TokenBook",
     "TokenKey",
-    "car_token",
     "genesis_holder",
     "may_exist",
     "segment_token",
@@ -173,7 +172,7 @@ class TokenBook:
         self.changes += 1
 
     def create(self, key: TokenKey) -> list[Effect]:
-        """Bring a new token (of a car) into the world, held by this node. Raises ``ValueError`` where it exists."""
+        """Bring a new token into the world, held by this node. Raises ``ValueError`` where it exists."""
         if self.is_known(key):
             raise ValueError(f"token {key} exists already")
         self._hold(key, 1)

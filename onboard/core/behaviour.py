@@ -7,12 +7,12 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
-from onboard.core.authority import TokenBook, TokenKey, car_token
-from onboard.core.codes import KindCode, MachineState, Reason, TokenKind
-from onboard.core.effects import Effect, Record
-from onboard.core.messages import CallForProposals, CarAt, Message, Reference
+from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.codes import KindCode, MachineState, Reason
+from onboard.core.effects import Effect
+from onboard.core.messages import CallForProposals, Message
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.negotiation.winners import Winners
@@ -23,6 +23,9 @@ from onboard.core.site import Machine, Segment, Site
 @dataclass
 class Fleet:
     """What the core lends to a behaviour of the same node; ``entries`` are the journal's, oldest first."""
+
+    #: What this machine believes of the others: more than the core's, where a system's own fleet says so.
+    mirror_type: ClassVar[type[Mirror]] = Mirror
 
     site: Site
     machine: Machine
@@ -41,36 +44,13 @@ class Fleet:
     slots_told: tuple[Segment, ...] = ()
     #: Whether nobody knows this machine's rights, and so not where it is.
     has_no_rights: bool = False
-    #: Where cars stand whose custody came to this machine so.
-    cars_told: dict[Reference, CarAt] = field(default_factory=dict)
     #: Machines whose rights were made anew: of what was promised to them before they know nothing.
     forgetful: set[int] = field(default_factory=set)
-    _left: list[Reference] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)
-        self.winners = Winners(self.node_id, self.negotiation, self.mirror.obstacles.machines)
-        self.mirror.on_forgotten.append(self._retire)
-
-    def _retire(self, car: Reference) -> None:
-        if self.tokens.retire(car_token(*car)):
-            self._left.append(car)
-
-    def forgotten(self) -> list[Effect]:
-        """Cars that left long ago, for the journal: what it has of them may go."""
-        left, self._left = self._left, []
-        return [
-            Record(
-                {
-                    "record": "car_left",
-                    "kind": int(TokenKind.CAR),
-                    "number": car_token(*car).number,
-                    "car_origin": car.origin,
-                    "car": car.number,
-                }
-            )
-            for car in left
-        ]
+        self.winners = Winners(self.node_id, self.negotiation, self.mirror.aside)
+        self.mirror.joins(self.tokens, self.drops)
 
     @property
     def node_id(self) -> int:
@@ -113,7 +93,7 @@ class Behaviour(Protocol):
         """When ``advance`` should be called next if nothing else happens."""
 
     def statements(self, now_us: int) -> list[Effect]:
-        """Say again what this node vouches for: its itinerary and the cars in its custody."""
+        """Say again what this node vouches for: its itinerary, and what is in its custody."""
 
 
 @runtime_checkable
@@ -126,6 +106,9 @@ class Attentive(Protocol):
 
 class BehaviourFactory(Protocol):
     """Makes the behaviour of one kind; ``estimator`` is what the negotiation asks for bids."""
+
+    #: What the core lends to it: more than the core's own where its system keeps more in its mirror.
+    fleet_type: type[Fleet] = Fleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """The task-generation function of a machine of this kind."""

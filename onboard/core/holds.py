@@ -12,7 +12,6 @@ from onboard.core.messages import (
     Award,
     Bid,
     CallForProposals,
-    CarAt,
     EmergencyStop,
     Heartbeat,
     Itinerary,
@@ -27,10 +26,10 @@ from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Go, Halted, TokenDispute, TokenGiven
 
-#: Words that make a contract, claim or move a right, or vouch for a car: not those of a machine whose journal is not
-#: to be relied on. That they are missing is for all others as if they were lost on the bus, which they bear.
+#: Words that make a contract, or claim or move a right: not those of a machine whose journal is not to be relied on.
+#: That they are missing is for all others as if they were lost on the bus, which they bear.
 _OF_RIGHTS = (
-    *(CallForProposals, LeftOut, Bid, Award, Itinerary, CarAt),
+    *(CallForProposals, LeftOut, Bid, Award, Itinerary),
     *(TokenRequest, TokenGrant, TokenHeld, TokenGiven, TokenDispute),
 )
 
@@ -97,12 +96,16 @@ class Holds:
         return [*records, Report("comes back: nobody sends under its number any more"), *self.words(), *ask]
 
 
-def without_rights(effects: list[Effect]) -> list[Effect]:
-    """What is left of them where nobody knows this machine's rights: it still tells how it is, and gives tasks back."""
-    return [effect for effect in effects if not (isinstance(effect, Send) and _is_of_rights(effect.message))]
+def without_rights(effects: list[Effect], vouching: tuple[type[Message], ...]) -> list[Effect]:
+    """What is left of them where nobody knows this machine's rights: it still tells how it is, and gives tasks back.
+
+    ``vouching`` are messages that only who has its rights may say, beside those of the core.
+    """
+    of_rights = (*_OF_RIGHTS, *vouching)
+    return [one for one in effects if not (isinstance(one, Send) and _is_of_rights(one.message, of_rights))]
 
 
-def _is_of_rights(message: Message) -> bool:
+def _is_of_rights(message: Message, of_rights: tuple[type[Message], ...]) -> bool:
     if isinstance(message, TaskReport):
         return message.phase is not TaskPhase.FORFEITED
-    return isinstance(message, _OF_RIGHTS)
+    return isinstance(message, of_rights)

@@ -10,10 +10,8 @@ from typing import Any
 
 from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory, Fleet
-from onboard.core.blocked_words import BlockedWords
+from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory
 from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.core.car_words import CarWords
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
 from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
@@ -23,11 +21,8 @@ from onboard.core.journal_state import INTACT, OLD, RIGHTS_LOST, JournalConditio
 from onboard.core.messages import (
     Award,
     Bid,
-    Blocked,
     BusTime,
     CallForProposals,
-    CarAt,
-    Clear,
     EmergencyStop,
     Heartbeat,
     Itinerary,
@@ -40,7 +35,6 @@ from onboard.core.messages import (
     TokenGrant,
     TokenHeld,
 )
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_of
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
@@ -87,9 +81,8 @@ class Holon:
         entries = still_counting(journal, entries)
         self.tokens.replay(entries)
         self._has_past = any(entry.get("record") == "boot" for entry in entries)
-        self.mirror = Mirror(site, machine.node_id)
-        self.blocked_words = BlockedWords(site, machine.node_id, self.mirror)
-        self.blocked_words.replay(entries)
+        self.mirror = factory.fleet_type.mirror_type(site, machine.node_id)
+        self.mirror.replay(entries)
         self.time = Timekeeper(site, machine, self.mirror, self.drops)
         self.clock = self.time.clock
         self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
@@ -100,20 +93,18 @@ class Holon:
         own = OwnNumber(machine.node_id, self.tokens, self.mirror)
         self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
         self._factory, estimator = factory, factory.estimator(site, machine, self.mirror)
-        is_obstacle = self.mirror.obstacles.machines.__contains__
+        is_obstacle = self.mirror.aside.__contains__
         self.negotiation = negotiation_of(site, machine, estimator, boot, is_obstacle)
-        self.fleet = Fleet(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
+        self.fleet = factory.fleet_type(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
         self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
         self._attentive = self.behaviour if isinstance(self.behaviour, Attentive) else None
-        self.car_words = CarWords(machine.node_id, self.tokens, self.mirror, self.drops)
         self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
         self.rights = Rights(self.fleet, self._may_grant, self.witness)
-        self.regeneration = Regenerating(self.tokens, lambda: self.mirror.cars, self._statements, self._thaw)
-        self.regeneration.cars_told = self.fleet.cars_told
+        self.regeneration = Regenerating(self.tokens, self.mirror, self._statements, self._thaw)
         self.regeneration.replay(entries)
         self.regeneration.refuses = lambda: self.holding.why.reason if self.holding.is_apart else Reason.NONE
         self.part = TakingPart(self.presence, self.holding, self.regeneration, self.witness, self.time)
-        self.rights.is_frozen = lambda: self.regeneration.is_frozen
+        self.rights.is_frozen = self.mirror.is_frozen = lambda: self.regeneration.is_frozen
         if self.holding.why.reason in RIGHTS_LOST:
             self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
         self._heartbeat_due_us: int | None = None
@@ -129,13 +120,12 @@ class Holon:
             **dict.fromkeys((CallForProposals, Bid, Award, TaskReport, LeftOut), self._negotiate),
             Itinerary: self._on_itinerary,
             Progress: self._on_progress,
-            CarAt: self._on_car,
             Heartbeat: self._on_heartbeat,
             SyncRequest: self._on_sync_request,
             EmergencyStop: self.holds.on_stop,
             Go: self.holds.on_go,
             Halted: self.holds.on_halted,
-            **dict.fromkeys((Blocked, Clear), self.blocked_words.hear),
+            **self.mirror.handlers(),
         }
 
     # --- events in ---------------------------------------------------------------------------------------------
@@ -190,7 +180,7 @@ class Holon:
             self.drops[self.presence.foreign[message.sender][0]] += 1
             return []
         effects = self._awake(now_us)
-        self.presence.standing.hear(message, now_us)
+        self.mirror.hear(message, now_us)
         self.presence.heard(message.sender, now_us)
         handler = self._handlers.get(type(message))
         effects += handler(message, now_us) if handler is not None else []
@@ -198,7 +188,7 @@ class Holon:
             self.presence.heard(message.sender, now_us)
         effects = effects + self.behaviour.hear(message, now_us)
         if isinstance(message, (TokenGrant, TokenHeld)):
-            proven = self.car_words.settle(message.token_kind, message.token)
+            proven = self.mirror.settle(TokenKey(message.token_kind, message.token))
             effects += self.behaviour.hear(proven, now_us) if proven is not None else []
         return self._settle(effects, now_us)
 
@@ -339,11 +329,6 @@ class Holon:
         self.mirror.on_progress(progress)
         return []
 
-    def _on_car(self, statement: CarAt, now_us: int) -> list[Effect]:
-        hear = self.regeneration.on_car if self.regeneration.is_frozen else self.car_words.hear
-        hear(statement)
-        return []
-
     def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
         news = self.regeneration.on_heartbeat(beat, now_us)
         reason = self.regeneration.strange(beat)
@@ -373,7 +358,7 @@ class Holon:
         return effects
 
     def _statements(self, now_us: int) -> list[Effect]:
-        return self.behaviour.statements(now_us) + self.blocked_words.statements()
+        return self.behaviour.statements(now_us) + self.mirror.statements()
 
     # --- holds -------------------------------------------------------------------------------------------------
 
@@ -425,7 +410,7 @@ class Holon:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
         self.holds.own.note(effects)
         is_mute = self.fleet.has_no_rights and not self.regeneration.is_frozen
-        return without_rights(effects) if is_mute else effects
+        return without_rights(effects, self.mirror.vouching) if is_mute else effects
 
     def _doubts(self, now_us: int) -> list[Effect]:
         """Somebody knows that the journal is old: nothing of it is used any more, as if it were short."""
@@ -458,7 +443,7 @@ class Holon:
         if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
             self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
             self.presence.review(now_us)
-            effects += self.holds.words() + self.fleet.forgotten()
+            effects += self.holds.words() + self.mirror.forgotten()
             effects += self._told.words(self.node_id, sum(self.wire_drops, Counter(self.drops)))
             effects += [Send(word) for word in self.presence.halted_ones(now_us)]
             effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]

@@ -11,14 +11,11 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.codes import CallResult
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, CarAt, Message, TokenGrant, TokenHeld
+from onboard.core.messages import Award, Message, TokenGrant, TokenHeld
 from onboard.core.mirror import Mirror
-from onboard.core.serial import is_newer
 
 #: Own awards remembered: a fleet closes some hundreds an hour. Ours.
 MOST_AWARDS = 256
-#: Bits by which ``CarAt.version`` is compared (core/mirror.py).
-_CAR_VERSION_BITS = 16
 
 
 @dataclass
@@ -45,15 +42,9 @@ class OwnNumber:
             case TokenHeld():
                 key = TokenKey(message.token_kind, message.token)
                 return self._is_other(key, message.version, self.node_id)
-            case CarAt():
-                known = self.mirror.cars.get(message.car)
-                if known is None or is_newer(message.version, known.version, _CAR_VERSION_BITS):
-                    return True
-                said = (self.node_id, message.station)
-                return message.version == known.version and (known.custodian, known.station) != said
             case Award():
                 return message.result is CallResult.AWARDED and message not in self.awards
-        return False
+        return self.mirror.is_false(message)
 
     def _is_other(self, key: TokenKey, version: int, holder: int) -> bool:
         """Whether a token would be somewhere else than I know, under what version I know or a newer one."""

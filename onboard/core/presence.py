@@ -10,13 +10,11 @@ more machines speak another contract or know another site than speak its own, it
 from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenBook
-from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, STILL, MachineState, Reason
+from onboard.core.codes import NOBODY, STILL, MachineState, Reason
 from onboard.core.messages import Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
-from onboard.ways.obstacles import holder_in
-from onboard.ways.standing import Standing
 
 #: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word. Ours.
 SLEPT_BEATS = 2
@@ -38,12 +36,8 @@ class Presence:
     held_until_us: int | None = None
     #: Last word of machines that say themselves that they do not act.
     halts: dict[int, Halted] = field(default_factory=dict)
-    standing: Standing = field(init=False)
     _active_us: int | None = None
     _listening_since_us: int | None = None
-
-    def __post_init__(self) -> None:
-        self.standing = Standing(self.site, self.mirror)
 
     @property
     def patience_us(self) -> int:
@@ -80,7 +74,7 @@ class Presence:
             return False
         if before_us is None or now_us - before_us > SLEPT_BEATS * self.site.timing.heartbeat_us:
             return False
-        if beat.sender in self.mirror.obstacles.machines or beat.sender in self.foreign or beat.sender in self.halts:
+        if beat.sender in self.mirror.aside or beat.sender in self.foreign or beat.sender in self.halts:
             return False
         peer.heard_at_us = self._active_us = now_us
         return True
@@ -132,8 +126,8 @@ class Presence:
             del self.halts[beat.sender]
 
     def halted_ones(self, now_us: int) -> list[Halted]:
-        """What I say of machines that are silent, or stand with a car, as the lowest live one that is no obstacle."""
-        obstacles = self.mirror.obstacles.machines
+        """What I say of machines that are silent, or stand laden, as the lowest live one that is no obstacle."""
+        obstacles = self.mirror.aside
         alive = self.mirror.alive(now_us)
         if self.is_held or min([node for node in alive if node not in obstacles], default=self.node_id) < self.node_id:
             return []
@@ -142,11 +136,9 @@ class Presence:
         return [self._told_of(node) for node in silent] + [self.standing_word(node) for node in standing]
 
     def _is_stuck(self, node: int) -> bool:
-        """Whether a machine lives and stands with a car, which nobody can take from it."""
-        stands = self.mirror.obstacles.machines[node].reason is Reason.FALSE_STATEMENT
-        return stands and any(
-            record.custodian == node and record.station == ANY_STATION for record in self.mirror.cars.values()
-        )
+        """Whether a machine lives and stands with what nobody can take from it."""
+        stands = self.mirror.aside[node].reason is Reason.FALSE_STATEMENT
+        return stands and self.mirror.is_laden(node)
 
     def standing_word(self, node: int) -> Halted:
         """A machine that says that it goes does not: nobody but a person can help."""
@@ -166,7 +158,7 @@ class Presence:
         peer = self.mirror.peers.get(node)
         if peer is not None:
             peer.heard_at_us = now_us
-        if node in self.mirror.obstacles.machines:
+        if node in self.mirror.aside:
             self._judge(self.site.machines[node], now_us)
 
     def review(self, now_us: int) -> None:
@@ -188,8 +180,7 @@ class Presence:
         if reason is Reason.NONE:
             self.mirror.admit(machine.node_id, now_us)
             return
-        seen = self.mirror.progress.get(machine.node_id)
-        slots = self.mirror.obstacles.slots_of(machine, seen, holder_in(self.tokens.holder_of))
+        slots = self.mirror.slots_of(machine, self.tokens.holder_of)
         self.mirror.set_aside(machine.node_id, slots, reason, now_us)
 
     def _why(self, machine: Machine, now_us: int) -> Reason:
@@ -197,7 +188,7 @@ class Presence:
         node = machine.node_id
         if node in self.foreign:
             return self.foreign[node][0]
-        peer, known = self.mirror.peers.get(node), self.mirror.obstacles.machines.get(node)
+        peer, known = self.mirror.peers.get(node), self.mirror.aside.get(node)
         word = self.halts.get(node)
         if word is not None:
             return word.reason
@@ -206,8 +197,6 @@ class Presence:
             return Reason.NONE if heard_us is None else Reason.NODE_SILENT
         if peer is not None and peer.state in STILL:
             return Reason.ACTUATOR_FAULT if peer.state is MachineState.STOPPED else Reason.POSITION_UNKNOWN
-        if self.standing.stands(node, now_us):
+        if self.mirror.stands(node, now_us):
             return Reason.FALSE_STATEMENT
-        # Where machines do not move along tracks nobody plans around them, and they may have no plan to tell.
-        planless = bool(self.site.tracks) and machine.kind in MOBILE_KINDS and node not in self.mirror.itineraries
-        return Reason.NONE if known is None or not planless else known.reason
+        return Reason.NONE if known is None or not self.mirror.is_planless(machine) else known.reason

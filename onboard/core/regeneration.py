@@ -10,12 +10,12 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from onboard.core.authority import TokenBook, TokenKey, car_token, may_exist, segment_token, station_token
+from onboard.core.authority import TokenBook, TokenKey, may_exist
 from onboard.core.belief import Belief
-from onboard.core.codes import CONTRACT_VERSION, NOBODY, OUTSIDE, MachineState, Reason, RegenerationPhase, TokenKind
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.messages import CarAt, Heartbeat, Message, Reference, TokenHeld
-from onboard.core.mirror import CarRecord
+from onboard.core.messages import Heartbeat, Message, TokenHeld
+from onboard.core.mirror import Mirror
 from onboard.core.recovery_messages import (
     Regeneration,
     RegenerationState,
@@ -24,8 +24,7 @@ from onboard.core.recovery_messages import (
     assignment_digest,
 )
 from onboard.core.serial import is_newer
-from onboard.core.site import Segment, Site, TrackKind
-from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX
+from onboard.core.site import Segment
 
 #: A freeze that its operator does not say again for so long is over, us: it says it each second. Ours.
 FORGOTTEN_US = 10_000_000
@@ -39,11 +38,11 @@ SAY_AGAIN_US = 4_000_000
 class Regenerating:
     """All times are bus time, us. ``on_end`` is called when the machine may act again: whose rights are new, or 0.
 
-    ``extra`` says what belongs to the rights: where bodies and cars are.
+    ``extra`` says what belongs to the rights, such as where bodies are.
     """
 
     tokens: TokenBook
-    cars: Callable[[], Mapping[Reference, CarRecord]]
+    mirror: Mirror
     extra: Callable[[int], list[Effect]]
     on_end: Callable[[int, int], list[Effect]]
     #: Why this machine can take no part in it; NONE where it can.
@@ -51,9 +50,6 @@ class Regenerating:
     #: The epoch in which this machine lives, 0 for the first.
     epoch: int = 0
     phase: RegenerationPhase = RegenerationPhase.NONE
-    #: Where cars stand that were given to this machine, by who remembers it: its behaviour takes them up.
-    cars_told: dict[Reference, CarAt] = field(default_factory=dict)
-    _cars: dict[Reference, CarAt] = field(default_factory=dict)
     _next: int = 0
     _lost: int = NOBODY
     _list: dict[TokenKey, TokenAssigned] = field(default_factory=dict)
@@ -130,12 +126,6 @@ class Regenerating:
             self._list[key] = word
         return []
 
-    def on_car(self, word: CarAt) -> None:
-        """While all stand, who remembers where a car of the lost machine is says so in its place."""
-        known = self._cars.get(word.car)
-        if known is None or word.version > known.version:
-            self._cars[word.car] = word
-
     def strange(self, beat: Heartbeat) -> Reason:
         """Why a machine's words do not count: another contract, another site, or rights of another epoch; or NONE."""
         if beat.contract != CONTRACT_VERSION:
@@ -184,7 +174,7 @@ class Regenerating:
         if not self.is_frozen or (word.epoch, word.lost) != (self._next, self._lost):
             effects.append(Report(f"stands: the rights of node {word.lost} are made anew"))
             self.phase, self._next, self._lost, self._list = RegenerationPhase.FREEZE, word.epoch, word.lost, {}
-            self._cars.clear()
+            self.mirror.recalls()
             self._begin_to_say(now_us)
         elif now_us >= self._said_us + SAY_AGAIN_US:
             self._begin_to_say(now_us)
@@ -199,16 +189,13 @@ class Regenerating:
             key = TokenKey(*told)
             if one.holder not in (self.node_id, NOBODY) and (key in book.given or one.holder == self._lost):
                 known[key] = TokenSeen(self.node_id, *key, one.version, one.holder)
-        cars: list[Message] = []
-        for car, stands in self.cars().items():
-            if stands.custodian == self._lost and stands.station != OUTSIDE:
-                key = car_token(*car)
-                known.setdefault(key, TokenSeen(self.node_id, *key, stands.version, self._lost))
-                cars.append(CarAt(self.node_id, car, stands.station, stands.version, stands.wheelbase_mm))
+        vouched = self.mirror.vouched(self._lost)
+        for key, (version, _) in vouched.items():
+            known.setdefault(key, TokenSeen(self.node_id, *key, version, self._lost))
         if not is_lost:
             held = {key: TokenHeld(self.node_id, *key, version) for key, version in book.held.items()}
             known |= held
-        self._to_say = deque([*cars, *known.values()])
+        self._to_say = deque([*(word for _, word in vouched.values()), *known.values()])
         self._to_say.extend(one.message for one in self.extra(now_us) if isinstance(one, Send))
         self._count, self._say_us, self._said_us = len(known), now_us, now_us
 
@@ -223,10 +210,7 @@ class Regenerating:
 
     def _commit(self, now_us: int) -> list[Effect]:
         effects = self._take_up()
-        mine = {
-            key.number for key in self._list if key.kind is TokenKind.CAR and self._list[key].holder == self.node_id
-        }
-        self.cars_told.update({car: one for car, one in self._cars.items() if car_token(*car).number in mine})
+        self.mirror.takes_over({key for key, one in self._list.items() if one.holder == self.node_id})
         self.epoch, self.phase = self._next, RegenerationPhase.NONE
         self.tokens.changes += 1
         effects.append(Record({"record": "epoch", "epoch": self.epoch}))
@@ -253,7 +237,8 @@ class Regenerating:
     def _forget_own(self) -> list[Effect]:
         """The lost machine has what the list gives it, and nothing of what its journal or the site file says."""
         book, effects = self.tokens, list[Effect]()
-        for key in sorted({*book.held, *book.leaving, *_first_of(book)} - set(self._list)):
+        first = [key for key in self.mirror.site_tokens() if book.is_mine_by_journal(key)]
+        for key in sorted({*book.held, *book.leaving, *first} - set(self._list)):
             version = max(book.seen.get(key, 0), book.beliefs.of(key).version)
             holder = book.beliefs.latest(key).holder
             effects += self._set(key, version, holder if holder != self.node_id else NOBODY)
@@ -295,20 +280,3 @@ class Regenerating:
     ) -> Effect:
         of = epoch if epoch is not None else self._next or self.epoch
         return Send(RegenerationState(self.node_id, phase, of, tokens, digest, reason))
-
-
-def tokens_of(site: Site) -> Iterable[TokenKey]:
-    """All tokens of segments and stations that a site has."""
-    for number, track in site.tracks.items():
-        if track.kind is TrackKind.LIFT:
-            indices: Iterable[int] = (PLATFORM_INDEX, GATE_INDEX)
-        else:
-            indices = range(1, track.length + 1)
-        yield from (segment_token(Segment(number, index)) for index in indices)
-    yield from (station_token(place) for place in site.places)
-    yield from (station_token(bay) for bay in site.compartments.values())
-
-
-def _first_of(book: TokenBook) -> Iterable[TokenKey]:
-    """Tokens that the site file gives this node first and that it never moved by its journal."""
-    return [key for key in tokens_of(book.site) if book.is_mine_by_journal(key)]

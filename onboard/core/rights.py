@@ -10,7 +10,7 @@ from typing import Any
 
 from onboard.core.authority import Claim, TokenBook, TokenKey, may_exist
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import NOBODY, Reason, TokenKind
+from onboard.core.codes import NOBODY, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import (
     Message,
@@ -21,7 +21,6 @@ from onboard.core.messages import (
     TokenRequest,
 )
 from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
-from onboard.core.site import Segment
 from onboard.core.witness import Witness
 
 #: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
@@ -87,12 +86,11 @@ class Rights:
         return effects
 
     def _claim(self, key: TokenKey, node: int | None = None) -> Claim:
-        """What a node's plan says about a segment's token as I see it; by default mine."""
+        """What a node's plan says about a token as I see it; by default mine."""
         itinerary = self.mirror.itineraries.get(self.node_id if node is None else node)
-        if itinerary is None or key.kind is not TokenKind.SEGMENT:
-            return Claim(0 if itinerary is None else itinerary.version, NOBODY)
-        segment = Segment(key.number >> 8, key.number & 0xFF)
-        return Claim(itinerary.version, self.mirror.order.predecessor(itinerary.sender, segment) or NOBODY)
+        if itinerary is None:
+            return Claim(0, NOBODY)
+        return Claim(itinerary.version, self.mirror.predecessor(itinerary.sender, key))
 
     def serve_petitions(self, now_us: int) -> list[Effect]:
         """Look again at requests that were refused: what stood against them may be over."""
@@ -124,8 +122,7 @@ class Rights:
             return []
         self.witness.hear(grant)
         if self.tokens.is_news(key, grant.version) and not self.tokens.holds(key):
-            if key.kind is TokenKind.SEGMENT:
-                self.mirror.order.on_return(grant.sender, Segment(key.number >> 8, key.number & 0xFF))
+            self.mirror.on_return(grant.sender, key)
             self.petitions.close(key, grant.holder)
         return self._after(key, self.tokens.on_grant(grant, now_us), now_us)
 

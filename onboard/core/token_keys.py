@@ -21,13 +21,8 @@ def segment_token(segment: Segment) -> TokenKey:
 
 
 def station_token(station: Station) -> TokenKey:
-    """The token of one place, or of a compartment's bay: who holds it may send a shuttle in."""
+    """The token of one station: who holds it may reach into it."""
     return TokenKey(TokenKind.STATION, station.number)
-
-
-def car_token(origin: int, number: int) -> TokenKey:
-    """The token of one car: its holder is the custodian."""
-    return TokenKey(TokenKind.CAR, origin << 16 | number)
 
 
 def genesis_holder(site: Site, key: TokenKey) -> int:

@@ -13,9 +13,9 @@ from onboard.core.authority import TokenKey, genesis_holder, may_exist
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE, TokenKind
 from onboard.core.messages import CarAt
 from onboard.core.recovery_messages import TokenAssigned
-from onboard.core.regeneration import tokens_of
 from onboard.core.site import Machine, Segment, Site, Station
 from onboard.ways.lifts import gate, lift_at, platform
+from onboard.ways.tokens import tokens_of
 
 #: Highest version of a token (dbc/fleet.dbc): above it nothing can be made anew.
 LAST_VERSION = (1 << 28) - 1

@@ -2,11 +2,11 @@
 
 import pytest
 
-from onboard.core.authority import car_token
 from onboard.core.codes import ANY_STATION, Reason, TokenKind
 from onboard.core.holon import Holon
 from onboard.core.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
 from onboard.systems.registry import factory_for
+from onboard.ways.tokens import car_token
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)

@@ -23,7 +23,7 @@ def seen(place: int = 3) -> Standing:
     site = one_floor()
     mirror = Mirror(site, ME)
     mirror.on_itinerary(goes(), 0)
-    standing = Standing(site, mirror)
+    standing = Standing(site, mirror.itineraries)
     standing.hear(Progress(ROBOT, 1, 0, 1, place, 0, 0), 0)
     return standing
 
@@ -50,7 +50,7 @@ def test_a_machine_that_waits_and_says_so_is_given_longer() -> None:
 def test_a_machine_that_has_stood_idle_for_long_has_all_the_time_for_a_new_plan() -> None:
     site = one_floor()
     mirror = Mirror(site, ME)
-    standing = Standing(site, mirror)
+    standing = Standing(site, mirror.itineraries)
     now_us = 2 * WAITS_AFTER_US
     standing.hear(Progress(ROBOT, 0, 0, 1, 3, 0, 0), 0)
     assert not standing.stands(ROBOT, now_us)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.behaviour import Fleet, NoEstimator, Plain
+from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator, Plain
 from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
 from onboard.core.effects import Effect
 from onboard.core.holon import Holon
@@ -36,7 +36,7 @@ class Still(Plain):
         return self.looks
 
 
-class StillFactory:
+class StillFactory(BehaviourFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         return NoEstimator()
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from onboard.core.authority import car_token, station_token
+from onboard.core.authority import station_token
 from onboard.core.codes import (
     ANY_STATION,
     DeskInput,
@@ -38,6 +38,7 @@ from onboard.core.messages import (
 )
 from onboard.core.site import Station
 from onboard.systems.registry import factory_for
+from onboard.ways.tokens import car_token
 from tests.sites import one_floor
 
 SITE = one_floor()

@@ -6,14 +6,13 @@ from typing import NamedTuple
 import pytest
 
 from onboard.core.authority import TokenBook
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import KindCode, LegAction, TokenKind
 from onboard.core.messages import CallForProposals, Itinerary, Stamp, TokenGrant, TokenHeld
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation, Proposal
 from onboard.core.site import Axis, Machine, Segment, Site
 from onboard.systems.car_park.giving_way import Answer, GivingWay
 from onboard.systems.car_park.program import Program, Step
+from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
 from tests.core.buildings import building
@@ -41,7 +40,7 @@ class Nobody:
 class Robot(NamedTuple):
     """What giving way needs of one machine."""
 
-    fleet: Fleet
+    fleet: WayFleet
     program: Program
     giving_way: GivingWay
 
@@ -56,9 +55,9 @@ class Robot(NamedTuple):
 
 def robot(site: Site, node: int, steps: list[Step], *, award_ms: int = 0) -> Robot:
     machine = Machine(node, f"MR{node}", KindCode.ROBOT, Segment(ALLEY, 1))
-    mirror = Mirror(site, node)
+    mirror = WayMirror(site, node)
     negotiation = Negotiation(node, KindCode.ROBOT, site.timing, Nobody(), boot=1)
-    fleet = Fleet(site, machine, TokenBook(site, node), mirror, negotiation)
+    fleet = WayFleet(site, machine, TokenBook(site, node), mirror, negotiation)
     program = Program(site, standing=Segment(ALLEY, 1))
     program.replace(steps, Stamp(award_ms, node, 1))
     made = Robot(fleet, program, GivingWay(fleet, program))
@@ -182,7 +181,7 @@ def test_what_is_over_means_nothing() -> None:
 
 def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) -> list[Step] | None:
     """A route of one robot around all others': to work somewhere, and to stand on a floor of its own."""
-    mirror = Mirror(place, node)
+    mirror = WayMirror(place, node)
     for other in robots:
         mirror.on_itinerary(other.told(), 0)
     length, home = place.tracks[1].length, node - 10

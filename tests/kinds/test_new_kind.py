@@ -12,7 +12,7 @@ import pytest
 from bus_sim.run import BusRun, RunOptions, buses_of
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.behaviour import Fleet, NoEstimator, Plain
+from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator, Plain
 from onboard.core.codes import Criterion, KindCode, Operation, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import NO_REFERENCE, Award, Bid, Message, Reference, TaskReport
@@ -51,7 +51,7 @@ class Desk(Plain):
         return 10_000_000 + 2_000_000 * self.left[0] if self.left else None
 
 
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         return NoEstimator()
 

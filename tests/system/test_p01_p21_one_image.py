@@ -25,6 +25,7 @@ from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import Program, Step, to_itinerary
 from onboard.systems.registry import factory_for
+from onboard.ways.mirror import WayMirror
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
@@ -149,7 +150,7 @@ def test_p21_one_interface_two_kinds_of_cost_with_and_without_the_others_plans(
     machine = site.machines[node]
     costs = []
     for others in (False, True):
-        mirror = Mirror(site, node)
+        mirror = WayMirror(site, node)
         if others:
             foreseen(mirror)
         estimator: Estimator = factory_for(site, machine.kind).estimator(site, machine, mirror)

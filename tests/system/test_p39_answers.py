@@ -19,6 +19,7 @@ from onboard.systems.car_park.ride_calls import calls_after_winning, ride_terms,
 from onboard.systems.car_park.robot import RobotFactory
 from onboard.systems.car_park.site import RideCalls
 from onboard.ways.lift_uses import GATE_US, ride_us, run_up_us
+from onboard.ways.mirror import WayMirror
 from onboard.ways.sipp import Route, Visit, plan_route
 
 NOW_US = 100_000_000
@@ -43,7 +44,7 @@ def robot(node: int, rides: RideCalls = RideCalls.BEFORE, mirror: Mirror | None 
     """The task-generation function of a robot that stands at home."""
     site = site_with(rides)
     machine = site.machines[node]
-    generation = RobotFactory().estimator(site, machine, mirror or Mirror(site, node))
+    generation = RobotFactory().estimator(site, machine, mirror or WayMirror(site, node))
     generation.program.standing = machine.home
     return generation
 
@@ -64,7 +65,7 @@ def firm(node: int, number: int = 1) -> Itinerary:
 def lift() -> LiftGeneration:
     """The left lift of the small site, standing on the first floor, with an empty mirror."""
     site = site_with(RideCalls.BEFORE)
-    return LiftGeneration(site, site.machines[5], Mirror(site, 5))
+    return LiftGeneration(site, site.machines[5], WayMirror(site, 5))
 
 
 def ride_call(terms: CallTerms, sender: int, whole: int, call: int = 50) -> CallForProposals:
@@ -138,7 +139,7 @@ def test_p39_a_firm_ride_of_another_is_kept_free_and_one_of_the_caller_is_not() 
 def test_p49_a_lift_answers_for_its_own_shaft_only() -> None:
     terms = first_ride(11)
     site = site_with(RideCalls.BEFORE)
-    right = LiftGeneration(site, site.machines[6], Mirror(site, 6))
+    right = LiftGeneration(site, site.machines[6], WayMirror(site, 6))
     assert right.lower_bound(ride_call(terms, 11, 1), NOW_US) is None
     assert lift().lower_bound(park(), NOW_US) is None
 
@@ -241,7 +242,7 @@ def test_p39_what_was_promised_is_carried_out_while_it_holds() -> None:
 
 @pytest.mark.parametrize("locked", [False, True], ids=["planned on the mirror", "session lock"])
 def test_p39_a_session_begins_with_the_call_and_a_planned_ride_with_boarding(locked: bool) -> None:
-    mirror = Mirror(site_with(RideCalls.AFTER), 12)
+    mirror = WayMirror(site_with(RideCalls.AFTER), 12)
     if locked:
         mirror.reservations = SessionLocks(mirror)
     itinerary = firm(11)
@@ -268,7 +269,7 @@ def test_p39_nobody_rides_in_between_a_call_and_its_ride_under_a_session_lock() 
     planned = Itinerary(11, 1, Grade.FIRM, Stamp(to_bus_ms(NOW_US), 1, 1), legs)
     done_us = {}
     for locked in (False, True):
-        mirror = Mirror(site, 12)
+        mirror = WayMirror(site, 12)
         if locked:
             mirror.reservations = SessionLocks(mirror)
         mirror.on_itinerary(planned, NOW_US)

@@ -21,6 +21,7 @@ from onboard.systems.terminal.messages import Assignment, TaskTerms
 from onboard.systems.terminal.missions import Transport
 from onboard.systems.terminal.search import Job, Search, remaining
 from onboard.systems.terminal.site import Terminal
+from onboard.ways.cars import car_fleet
 
 #: An assignment that is in no plan yet is said again after this, us.
 AGAIN_US = 2_000_000
@@ -80,7 +81,7 @@ class CentralDeskFactory(DeskFactory):
         """The desk's steps."""
         if not isinstance(estimator, DeskGeneration):
             raise TypeError("a desk needs its own picture")
-        return CentralDesk(fleet, estimator)
+        return CentralDesk(car_fleet(fleet), estimator)
 
 
 def central_factory(site: Site, kind: KindCode) -> BehaviourFactory:

@@ -12,11 +12,11 @@ from bus_sim.systems.terminal.plant import NOISE, TerminalPlant
 from bus_sim.systems.watched import watched
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.messages import CarAt, Message
-from onboard.core.mirror import Mirror
 from onboard.systems.terminal.desk import Desk
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.vehicle import Vehicle
+from onboard.ways.cars import CarMirror
 
 #: Looks whether it is over, us.
 STEP_US = 1_000_000
@@ -34,7 +34,7 @@ class TerminalRun(BusRun):
     def __post_init__(self) -> None:
         super().__post_init__()
         site, listener = self.plant.site, min(self.site.machines)
-        self.spectator = TerminalMirror(site, listener, Mirror(site, listener))
+        self.spectator = TerminalMirror(site, listener, CarMirror(site, listener))
         self.observers.append(self._listen)
 
     def _listen(self, message: Message, time_us: int) -> None:

@@ -8,13 +8,14 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey
 from onboard.core.codes import Operation
 from onboard.core.effects import Record
 from onboard.core.messages import CarAt, Reference
 from onboard.core.serial import successor
 from onboard.systems.car_park.bay_task import queue_ticket
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
 
 Entry = Mapping[str, str | int]
 
@@ -55,7 +56,7 @@ def job_over_record() -> Record:
     return Record({"record": "job_over"})
 
 
-def next_reference(last: int, fleet: Fleet) -> Reference:
+def next_reference(last: int, fleet: WayFleet) -> Reference:
     """The next number of a car or task of this node; one under which a token was ever heard of is passed over.
 
     It goes to the journal before its token: whatever happens between the two writes, it is never used again.

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from onboard.core.authority import TokenKey, car_token
+from onboard.core.authority import TokenKey
 from onboard.core.codes import (
     CallResult,
     Criterion,
@@ -19,9 +19,10 @@ from onboard.core.codes import (
 )
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, BayState, CallForProposals, Reference, TaskReport, TokenRefusal
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms
 from onboard.systems.car_park.site import CarLimits
+from onboard.ways.mirror import WayMirror
+from onboard.ways.tokens import car_token
 
 #: A call that nobody could serve is made again after this, us. Ours.
 RETRY_US = 30_000_000
@@ -83,7 +84,7 @@ class BayTask:
             floor=floor,
         )
 
-    def is_unknown_to(self, refusal: TokenRefusal, mirror: Mirror) -> bool:
+    def is_unknown_to(self, refusal: TokenRefusal, mirror: WayMirror) -> bool:
         """Whether the car's custodian refuses it to the task's winner: it was off when the task was called, or won."""
         record, wanted = mirror.cars.get(self.car), TokenKey(refusal.token_kind, refusal.token)
         is_its_word = record is not None and record.custodian == refusal.sender and wanted == car_token(*self.car)
@@ -121,6 +122,6 @@ def fits(bay: BayState, limits: CarLimits) -> bool:
     return small and grips and bay.load_kg <= limits.max_load_kg
 
 
-def refusal_text(mirror: Mirror) -> DeskText:
+def refusal_text(mirror: WayMirror) -> DeskText:
     """What a customer is told whom nobody can serve; that nobody can although there is room is not called full."""
     return DeskText.OUT_OF_ORDER if mirror.free_places() else DeskText.FULL

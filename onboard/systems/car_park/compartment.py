@@ -8,8 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token, station_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey, station_token
 from onboard.core.codes import (
     ANY_STATION,
     NOBODY,
@@ -55,13 +54,15 @@ from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.site import car_park
 from onboard.systems.car_park.stewardship import Stewardship
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
 
 
 @dataclass
 class Compartment:
     """One compartment. At most one task uses its bay; tickets wait in the order in which they came."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: BayGeneration
     kind: KindCode = KindCode.COMPARTMENT
     phase: BayPhase = BayPhase.STARTING

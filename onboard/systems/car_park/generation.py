@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 from onboard.core.codes import ANY_STATION, Criterion, Grade, LegAction, Operation
 from onboard.core.messages import CallForProposals, Stamp
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Site, Station
 from onboard.systems.car_park.program import MAX_STEPS, STAMP_AHEAD_US, Handling, Program, Step, Work, to_itinerary
 from onboard.systems.car_park.site import car_park
 from onboard.ways.kinematics import run_duration_us
+from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
@@ -84,7 +84,7 @@ class CarParkGeneration:
 
     site: Site
     machine: Machine
-    mirror: Mirror
+    mirror: WayMirror
     program: Program
     tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
     #: A person has a hand in (row M38): no new tasks.

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 from onboard.core.authority import segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import LegAction
 from onboard.core.site import Site
 from onboard.systems.car_park.program import Program, Step
 from onboard.ways.kinematics import run_duration_us
+from onboard.ways.mirror import WayFleet
 from onboard.ways.passing import TOLERANCE_US
 from onboard.ways.passing_order import Meeting
 from onboard.ways.reservations import FOREVER
@@ -35,7 +35,7 @@ class Answer(Enum):
 class GivingWay:
     """Looks at each plan that is heard and changes the program's times where it has to. The way is the robot's part."""
 
-    fleet: Fleet
+    fleet: WayFleet
     program: Program
 
     def heed(self, sender: int, now_us: int) -> Answer:

@@ -8,8 +8,7 @@ to the actuator.
 from dataclasses import dataclass, field
 from enum import Enum
 
-from onboard.core.authority import TokenKey, car_token, station_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey, station_token
 from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
 from onboard.core.effects import Actuate, Effect, Record
 from onboard.core.messages import ShuttleOrder, ShuttleState
@@ -19,6 +18,8 @@ from onboard.systems.car_park.program import Handling, Work
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.travel import Carriage
 from onboard.systems.car_park.unheard import Unheard
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
 
 
 class Phase(Enum):
@@ -55,7 +56,7 @@ ENDS = {Phase.REACH: ShuttleMode.REACHED, Phase.CLAMP: ShuttleMode.REACHED, Phas
 class ShuttleWork:
     """One robot's shuttle and the handling in hand."""
 
-    fleet: Fleet
+    fleet: WayFleet
     work: Work | None = None
     phase: Phase = Phase.DONE
     sequence: int = 0

@@ -7,7 +7,6 @@ begun. Let go, it plans the same work anew from where it stands.
 
 from dataclasses import dataclass, field
 
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, LegAction, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import ManualOrder, Message, Reference, TaskReport
@@ -15,6 +14,7 @@ from onboard.core.site import TrackKind
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import Phase, ShuttleWork
 from onboard.systems.car_park.travel import Carriage
+from onboard.ways.mirror import WayFleet
 from onboard.work.manual import Manual
 
 
@@ -22,7 +22,7 @@ from onboard.work.manual import Manual
 class Holding:
     """One robot's mode. The order is kept by its journal, so a robot that was held is held after a restart."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: CarParkGeneration
     carriage: Carriage
     shuttle: ShuttleWork

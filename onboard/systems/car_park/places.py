@@ -8,7 +8,6 @@ lower stamp; the other leaves its car elsewhere. A place in which a car stands i
 from dataclasses import dataclass
 
 from onboard.core.authority import station_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, LegAction
 from onboard.core.messages import Itinerary
 from onboard.core.site import Station
@@ -16,13 +15,14 @@ from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import Phase, ShuttleWork
 from onboard.systems.car_park.program import Handling, Work
+from onboard.ways.mirror import WayFleet
 
 
 @dataclass
 class Places:
     """One robot's places."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: CarParkGeneration
     shuttle: ShuttleWork
 

@@ -8,7 +8,6 @@ say that the carrier stands (design, section 5).
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     TASK_VERSION_BITS,
     CallResult,
@@ -27,6 +26,7 @@ from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_memory import cars_at
 from onboard.systems.car_park.handling import Phase
 from onboard.systems.car_park.program import Handling, Step, Work
+from onboard.ways.mirror import WayFleet
 
 Entry = Mapping[str, str | int]
 
@@ -175,7 +175,7 @@ class Recovery:
         return [one.call.task for one in self.works if one.handling is Handling.TAKE and one.call.task != begun]
 
     def forfeit_unknown(
-        self, fleet: Fleet, award: Award, known: Iterable[Work], done: Collection[Reference]
+        self, fleet: WayFleet, award: Award, known: Iterable[Work], done: Collection[Reference]
     ) -> list[Effect]:
         """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
         mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED

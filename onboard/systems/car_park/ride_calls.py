@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import Criterion, KindCode, LegAction, Operation
 from onboard.core.effects import Effect
 from onboard.core.messages import CallForProposals, Reference
@@ -11,6 +10,7 @@ from onboard.core.negotiation import Answer, CallTerms
 from onboard.core.site import Site
 from onboard.systems.car_park.program import Step
 from onboard.ways.lifts import sill
+from onboard.ways.mirror import WayFleet
 
 
 def rides_of(steps: Iterable[Step]) -> list[Step]:
@@ -49,7 +49,7 @@ def calls_after_winning(
 
 
 def call_lifts(
-    fleet: Fleet, call: CallForProposals, steps: Iterable[Step], now_us: int, confirmed: tuple[Answer, ...] = ()
+    fleet: WayFleet, call: CallForProposals, steps: Iterable[Step], now_us: int, confirmed: tuple[Answer, ...] = ()
 ) -> list[Effect]:
     """Each ride is a call, made after winning (step 15) where no lift has promised it before (row P39)."""
     effects: list[Effect] = []

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
@@ -24,6 +23,7 @@ from onboard.systems.car_park.sill import SillProof
 from onboard.systems.car_park.stall import Stall
 from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
+from onboard.ways.mirror import WayFleet
 from onboard.ways.refuges import refuges
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
@@ -39,7 +39,7 @@ OFF_LIMIT_MM = 20_000
 class Carriage:
     """The carrier of one robot: its sensed position, its drive orders and the segments around it."""
 
-    fleet: Fleet
+    fleet: WayFleet
     track: int
     #: As last told by the drive, its position on the axis in hand.
     sensed: DriveState | None = None

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
 from onboard.core.codes import Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
@@ -17,7 +17,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
-from onboard.systems.cell.contracts import Goal
+from onboard.systems.cell.contracts import Goal, part_token
 from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import Hearsay
@@ -34,7 +34,7 @@ class Order(CounterOrder):
 
 
 @dataclass(frozen=True)
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes goal managers."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
@@ -94,7 +94,7 @@ class GoalManager(Counter[Order]):
         """Parts in my custody, and tokens."""
         effects: list[Effect] = []
         for order in self.orders.values():
-            if self.fleet.tokens.holds(car_token(*order.goal.part)):
+            if self.fleet.tokens.holds(part_token(order.goal.part)):
                 place = order.goal.end if order.state is OrderState.DONE else order.goal.start
                 effects.append(Send(PartAt(self.fleet.node_id, order.goal.part, *place, False)))
         return effects + self.fleet.tokens.statements()
@@ -123,7 +123,7 @@ class GoalManager(Counter[Order]):
 
     def may_take_back(self, order: Order) -> bool:
         """While the part has never left my custody; one that has come back lies where it was wanted."""
-        key = car_token(*order.goal.part)
+        key = part_token(order.goal.part)
         return self.fleet.tokens.holds(key) and key not in self.fleet.tokens.given
 
     def in_turn(self, waiting: Iterable[Order]) -> Iterable[Order]:

@@ -8,8 +8,8 @@ them is ``active``, the most urgent whose part this robot may take (row C15).
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
@@ -17,7 +17,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import last_boot, successor
 from onboard.core.site import Machine, Site
-from onboard.systems.cell.contracts import Contract
+from onboard.systems.cell.contracts import Contract, part_token
 from onboard.systems.cell.generation import ArmGeneration, call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import contract_messages
@@ -47,7 +47,7 @@ MAX_OVER = 32
 
 
 @dataclass(frozen=True)
-class ArmFactory:
+class ArmFactory(BehaviourFactory):
     """Makes robots of a cell."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> ArmGeneration:
@@ -239,10 +239,10 @@ class ArmRobot:
 
     def _yield(self, one: Undertaking, award: Award) -> list[Effect]:
         """Its manager gave to another, or to nobody, what I have not begun: whose part I have not got."""
-        is_mine = one.stage is not Stage.WON or self.fleet.tokens.holds(car_token(*one.contract.goal.part))
+        is_mine = one.stage is not Stage.WON or self.fleet.tokens.holds(part_token(one.contract.goal.part))
         if is_mine or award.sender != one.manager:
             return []
-        self.fleet.tokens.forget(car_token(*one.contract.goal.part))
+        self.fleet.tokens.forget(part_token(one.contract.goal.part))
         effects: list[Effect] = [lost_record(one)]
         if one.sub_goal is not None and one.successor:
             effects += self.fleet.winners.let_go(one.sub_goal.task)
@@ -348,7 +348,7 @@ class ArmRobot:
 
     def _take_back(self, one: Undertaking, now_us: int) -> list[Effect]:
         """A sub-contractor that is lost while its part is in my custody: the rest is called for anew, without it."""
-        if one.sub_goal is None or not self.fleet.tokens.holds(car_token(*one.sub_goal.part)):
+        if one.sub_goal is None or not self.fleet.tokens.holds(part_token(one.sub_goal.part)):
             return []
         reason = self.fleet.winners.lost(one.sub_goal.task, now_us)
         # Before the part lies where it is to be taken it has nothing to do but to wait.
@@ -366,7 +366,7 @@ class ArmRobot:
         effects: list[Effect] = []
         for one in self.in_hand.values():
             if one.stage is Stage.WON:
-                effects += self.fleet.tokens.want(car_token(*one.contract.goal.part), now_us)
+                effects += self.fleet.tokens.want(part_token(one.contract.goal.part), now_us)
         return effects
 
     def _give_back(self, now_us: int) -> list[Effect]:
@@ -385,7 +385,7 @@ class ArmRobot:
     def _parts(self) -> list[Effect]:
         """Where the parts in my custody are."""
         tokens = self.fleet.tokens
-        mine = (one for one in self.in_hand.values() if tokens.holds(car_token(*one.contract.goal.part)))
+        mine = (one for one in self.in_hand.values() if tokens.holds(part_token(one.contract.goal.part)))
         return [self._part_at(one) for one in mine if one.stage in (Stage.TAKEN, Stage.PUT)]
 
     def _part_at(self, one: Undertaking) -> Send:
@@ -400,7 +400,7 @@ class ArmRobot:
         ready = [
             one
             for one in self.in_hand.values()
-            if one.stage in (Stage.WON, Stage.TAKEN) and self.fleet.tokens.holds(car_token(*one.contract.goal.part))
+            if one.stage in (Stage.WON, Stage.TAKEN) and self.fleet.tokens.holds(part_token(one.contract.goal.part))
         ]
         if not ready:
             return self._to(ArmPhase.WAITING if self.in_hand else ArmPhase.IDLE, now_us)

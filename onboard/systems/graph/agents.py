@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from zlib import crc32
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
 from onboard.core.codes import NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Heartbeat, Message, TokenGrant
@@ -35,7 +35,7 @@ WAITING_US = 6_000_000
 
 
 @dataclass(frozen=True)
-class HostFactory:
+class HostFactory(BehaviourFactory):
     """Makes hosts of node agents."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

@@ -5,7 +5,7 @@ from enum import Enum
 from functools import partial
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
 from onboard.core.codes import NOBODY, CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
@@ -97,7 +97,7 @@ class DeskOrder:
 
 
 @dataclass(frozen=True)
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes order desks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

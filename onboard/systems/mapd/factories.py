@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
@@ -12,7 +12,7 @@ from onboard.systems.mapd.site import Mapd
 
 
 @dataclass(frozen=True)
-class _Factory:
+class _Factory(BehaviourFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         """Nothing: tasks are auctioned all together, step by step; a call for one by itself finds nobody."""
         if not isinstance(site, Mapd):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
 from onboard.core.codes import Reason, TaskPhase
 from onboard.core.effects import Effect, Record
 from onboard.core.messages import Bid, Message, Reference, TaskReport
@@ -35,7 +35,7 @@ class Order(CounterOrder):
 
 
 @dataclass(frozen=True)
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes order desks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

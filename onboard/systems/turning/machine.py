@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
 from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
@@ -55,7 +55,7 @@ class Undertaking:
 
 
 @dataclass(frozen=True)
-class LatheFactory:
+class LatheFactory(BehaviourFactory):
     """Makes lathes."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LatheGeneration:

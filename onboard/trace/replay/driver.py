@@ -63,11 +63,12 @@ class Recording:
     has_devices: bool = False
 
 
-class RaisedCosts:
+class RaisedCosts(BehaviourFactory):
     """A factory whose machines bid more than their own computation says: a change that must show in a replay."""
 
     def __init__(self, inner: BehaviourFactory, by: int) -> None:
         self._inner, self._by = inner, by
+        self.fleet_type = inner.fleet_type
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """The machine's own, with the costs of its bids raised."""

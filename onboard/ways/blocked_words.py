@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import Blocked, Clear
-from onboard.core.mirror import Mirror
 from onboard.core.site import Site
+from onboard.ways.obstacles import Obstacles
 
 
 @dataclass
@@ -16,7 +16,7 @@ class BlockedWords:
 
     site: Site
     node_id: int
-    mirror: Mirror
+    obstacles: Obstacles
 
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """After a restart what is in my journal is blocked, or clear, as it was."""
@@ -24,12 +24,12 @@ class BlockedWords:
             if entry.get("record") in ("blocked", "clear"):
                 word = Blocked if entry["record"] == "blocked" else Clear
                 told = word(self.node_id, int(entry["track"]), int(entry["index"]), Reason(int(entry["reason"])))
-                self.mirror.on_word(told, 0)
+                self.obstacles.hear(told, 0)
 
     def hear(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
         """A segment is blocked, or clear again; what I am steward of is in my journal."""
         is_mine = self.site.stewards.get(word.track) == self.node_id
-        if not self.mirror.on_word(word, now_us) or not is_mine:
+        if not self.obstacles.hear(word, now_us) or not is_mine:
             return []
         record = "blocked" if isinstance(word, Blocked) else "clear"
         return [Record({"record": record, "track": word.track, "index": word.index, "reason": int(word.reason)})]
@@ -37,4 +37,4 @@ class BlockedWords:
     def statements(self) -> list[Effect]:
         """What I say again, of the tracks that I am steward of, to whoever asks."""
         tracks = [track for track, steward in self.site.stewards.items() if steward == self.node_id]
-        return [Send(word) for word in self.mirror.obstacles.words(self.node_id, tracks)]
+        return [Send(word) for word in self.obstacles.words(self.node_id, tracks)]
