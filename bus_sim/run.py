@@ -29,6 +29,7 @@ from onboard.systems.contract import codecs_for
 from onboard.systems.registry import compaction_for, factory_for
 from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
+from onboard.ways.site import way_site
 from onboard.wire.decoder import Decoder
 
 #: The fleet bus in a log and on the served socket.
@@ -241,7 +242,9 @@ def buses_of(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> tuple[Me
 def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
     """All parts of a run of a car park, connected but not switched on."""
     fleet, devices = buses_of(site, options, loop)
-    plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()}, options.seed)
+    plant = Plant(
+        way_site(site), loop, {node: medium.attach("plant", node) for node, medium in devices.items()}, options.seed
+    )
     return Simulation(site, options, loop, fleet, devices, plant)
 
 

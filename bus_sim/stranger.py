@@ -19,8 +19,10 @@ from onboard.core.site import Machine, Site
 from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import way_mirror
+from onboard.ways.site import way_site
 
 #: What it says that its first run takes, ms.
 RUN_MS = 10_000
@@ -122,7 +124,7 @@ class _Factory(BehaviourFactory):
         if machine.node_id != self.target:
             return self.robots.estimator(site, machine, mirror)
         bids = _LeastBid if self.how is Stranger.LIAR else _EmptyBid
-        return bids(site, machine, way_mirror(mirror), Program(site))
+        return bids(car_park(site), machine, way_mirror(mirror), Program(way_site(site)))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """What it does."""

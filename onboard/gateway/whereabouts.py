@@ -11,11 +11,12 @@ from typing import Protocol
 
 from onboard.core.codes import Grade, LegAction
 from onboard.core.messages import Itinerary, Message, Progress
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment, Site
 from onboard.systems.graph.messages import RobotAt
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.terminal.messages import PlanHead, PlanStep, StepReport, StepResult
 from onboard.systems.terminal.site import Terminal
+from onboard.ways.site import TrackKind, way_site
 
 #: A graph's robot that has nowhere to go says so with this (onboard/systems/graph/messages.NO_NODE).
 _NO_NODE = 255
@@ -103,7 +104,7 @@ class TrackTracker:
         return replace(at, ahead=tuple(ahead))
 
     def _place(self, segment: Segment, offset_mm: int, speed_mm_s: int, passed: int) -> Whereabouts:
-        track = self._site.tracks.get(segment.track)
+        track = way_site(self._site).tracks.get(segment.track)
         node, driving = str(segment), speed_mm_s != 0
         if track is None:
             return Whereabouts(node, (), passed, driving)
@@ -113,7 +114,7 @@ class TrackTracker:
             passed,
             driving,
             map_of(track.kind, track.number),
-            (self._site.position_mm(segment) + offset_mm) / 1000,
+            (way_site(self._site).position_mm(segment) + offset_mm) / 1000,
             pi / 2 if track.kind is TrackKind.SPUR else 0.0,
             abs(offset_mm) / 1000,
             speed_mm_s / 1000,

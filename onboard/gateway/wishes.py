@@ -20,6 +20,7 @@ from onboard.systems.mapd.site import Mapd
 from onboard.systems.terminal.messages import BoxOrder
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
+from onboard.ways.site import way_site
 
 #: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
 TICKET_AGAIN_US = 30_000_000
@@ -123,7 +124,9 @@ class ParkWishes(NoWishes):
     def __init__(self, site: Site, view: SiteView, place: Callable[[int], str | None]) -> None:
         super().__init__(site)
         self._view, self._place = view, place
-        self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
+        self._desks = {
+            machine.name: node for node, machine in site.machines.items() if node in way_site(site).compartments
+        }
 
     def transport(self, told: dict[str, Any]) -> Wish:
         """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""
@@ -166,7 +169,7 @@ class ParkWishes(NoWishes):
             return False
         if order.wish.car is not None:
             return message.car == order.wish.car and message.station == OUTSIDE
-        bays = {station.number for station in self._site.compartments.values()}
+        bays = {station.number for station in way_site(self._site).compartments.values()}
         return message.car == order.task and message.station not in (*bays, ANY_STATION, OUTSIDE)
 
     def _desk(self, name: str, path: str) -> int:

@@ -40,6 +40,7 @@ from onboard.core.messages import (
 )
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment, Site, Station
+from onboard.ways.site import way_site
 
 _Key = TypeVar("_Key")
 _Record = TypeVar("_Record")
@@ -315,7 +316,7 @@ class SiteView:
         self.say(time_us, f"{self.name(report.sender)} {words}")
 
     def _station(self, number: int) -> str:
-        for node, station in self.site.compartments.items():
+        for node, station in way_site(self.site).compartments.items():
             if station.number == number:
                 return self.name(node)
         return str(Station.from_number(number)) if number not in (ANY_STATION, OUTSIDE) else "outside"

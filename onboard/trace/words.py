@@ -11,6 +11,7 @@ from functools import cache
 from onboard.core.codes import ANY_STATION, NOBODY, OUTSIDE, Criterion, TokenKind
 from onboard.core.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
 from onboard.core.site import Segment, Site, Station
+from onboard.ways.site import way_site
 
 _NODES = frozenset({"initiator", "winner", "holder", "predecessor", "requester", "blocker", "whom", "compartment"}) | {
     "machine",
@@ -33,7 +34,7 @@ class Words:
         self.site = site
         self._names: dict[type[Message], tuple[str, ...]] = {}
         self._criteria: dict[tuple[int, int], Criterion] = {}
-        self._bays = {s.number: n for n, s in site.compartments.items()} if site is not None else {}
+        self._bays = {s.number: n for n, s in way_site(site).compartments.items()} if site is not None else {}
 
     def machine(self, node: int) -> str:
         """A machine's name, or its node-ID where the site has none for it."""

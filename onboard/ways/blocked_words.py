@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import Blocked, Clear
-from onboard.core.site import Site
 from onboard.ways.obstacles import Obstacles
+from onboard.ways.site import WaySite
 
 
 @dataclass
 class BlockedWords:
     """One machine's part in it; all times are bus time in us."""
 
-    site: Site
+    site: WaySite
     node_id: int
     obstacles: Obstacles
 

@@ -21,6 +21,7 @@ from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses,
 from onboard.ways.passing import Plan, next_plan
 from onboard.ways.passing_order import PassingOrder
 from onboard.ways.reservations import Reservations
+from onboard.ways.site import WaySite
 from onboard.ways.standing import Standing
 from onboard.ways.tokens import tokens_of
 
@@ -28,6 +29,8 @@ from onboard.ways.tokens import tokens_of
 @dataclass
 class WayMirror(CarMirror):
     """What one machine believes of the others' ways."""
+
+    site: WaySite
 
     #: Plans with when their first legs began, and what each replaced: the order of passing comes from there.
     plans: dict[int, Plan] = field(default_factory=dict)
@@ -205,6 +208,7 @@ class WayFleet(CarFleet):
 
     mirror_type: ClassVar[type[Mirror]] = WayMirror
 
+    site: WaySite
     mirror: WayMirror
 
 

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from onboard.core.codes import MOBILE_KINDS, Reason
 from onboard.core.messages import Blocked, Clear, Progress
 from onboard.core.mirror import Obstacle
-from onboard.core.site import Machine, Segment, Site
+from onboard.core.site import Machine, Segment
 from onboard.ways.lifts import PLATFORM_INDEX, lift_at, platform
 from onboard.ways.occupancy import standing_segments
 from onboard.ways.reservations import FOREVER, Reservations, Use, Window
+from onboard.ways.site import WaySite
 from onboard.ways.tokens import site_slots
 
 #: Owner of the windows of segments that are blocked by a word on the bus: no node carries it.
@@ -28,7 +29,7 @@ class Obstacles:
     ``changes`` grows with every change, so that nobody need look twice.
     """
 
-    site: Site
+    site: WaySite
     reservations: Callable[[], Reservations]
     machines: dict[int, Obstacle] = field(default_factory=dict)
     #: Segments that somebody says nobody can pass, and those of which it was taken back, each with why.

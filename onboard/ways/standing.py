@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, ManualMode
 from onboard.core.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
 from onboard.ways.occupancy import final_position, turned_in
+from onboard.ways.site import WaySite
 
 #: A machine that says nothing stands for so long after it should have been elsewhere, us: a door or a drive's retries
 #: take less. Ours.
@@ -43,7 +44,7 @@ class _Seen:
 class Standing:
     """What one machine saw of the others' motions, and their plans. All times are bus time in us."""
 
-    site: Site
+    site: WaySite
     itineraries: Mapping[int, Itinerary]
     _seen: dict[int, _Seen] = field(default_factory=dict)
 

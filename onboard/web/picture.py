@@ -16,6 +16,7 @@ from onboard.trace.indicators import Indicators
 from onboard.trace.scene.scene import BusClock
 from onboard.trace.scene.scenes import scene_of
 from onboard.trace.view import CallRecord, SiteView
+from onboard.ways.site import way_site
 
 #: Calls, and lines of events, that a snapshot tells.
 CALLS_SHOWN = 12
@@ -37,7 +38,7 @@ class LivePicture:
         self.view = SiteView(site)
         self.scene = scene_of(site, self.view)
         #: Whether cars are parked and fetched here: the indicators of robots and lifts are of such a site.
-        self.is_car_park = bool(site.tracks)
+        self.is_car_park = bool(way_site(site).tracks)
         self.view.thing = self.scene.thing
         if not self.is_car_park:
             self.view.task_end = self.scene.task_end

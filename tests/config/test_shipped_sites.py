@@ -4,13 +4,14 @@ import pytest
 
 from bus_sim.sites import find_site, site_names
 from onboard.core.codes import KindCode
-from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.core.site import Machine, Segment, Site
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.occupancy import standing_segments
 from onboard.ways.reach import stranded_by
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import NoRoute, Visit, plan_route
+from onboard.ways.site import TrackKind
 
 SECOND = 1_000_000
 #: Floors, positions, places, then compartments, lifts, robots and spurs.

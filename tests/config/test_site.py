@@ -9,7 +9,9 @@ from hypothesis import strategies as st
 
 from onboard.config.site import load_site, parse_site, site_digest
 from onboard.core.codes import KindCode, Side
-from onboard.core.site import Axis, Segment, Station, Timing, Track, TrackKind
+from onboard.core.site import Segment, Station
+from onboard.ways.site import Axis, Track, TrackKind
+from onboard.work.timing import DeviceTiming
 from tests.config.support import ROOT, TWO_FLOORS, changed
 
 SHIPPED = sorted((ROOT / "bus_sim" / "sites").glob("*.toml"))
@@ -81,7 +83,7 @@ def test_defaults_of_speeds_lengths_and_times() -> None:
         Axis(1_083, 500),
     )
     assert (site.carrier_length_mm, site.carrier_clearance_mm, site.shuttle_reach_mm) == (2_300, 50, 5_400)
-    assert site.timing == Timing(
+    assert site.timing == DeviceTiming(
         call_window_us=1_000_000,
         bid_delay_us=300_000,
         bid_half_us=10_000_000,

@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from onboard.core.site import Axis, Segment, Site, Track, TrackKind
+from onboard.core.site import Segment, Site
+from onboard.ways.site import Axis, Track, TrackKind
 from tests.core.lines import line_site
 
 #: Tracks of the lifts at the left and at the right end.

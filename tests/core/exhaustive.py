@@ -9,7 +9,7 @@ departs at ticks. Whole times of departure are bits of an integer; states are st
 from dataclasses import dataclass, field
 from itertools import product
 
-from onboard.core.site import Axis
+from onboard.ways.site import Axis
 
 TICK_US = 5_000
 PITCH_MM = 10

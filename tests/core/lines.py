@@ -1,7 +1,9 @@
 """Small sites made of plain values, with axes and lengths that no site file would accept."""
 
-from onboard.core.site import Axis, Segment, Timing, Track, TrackKind
+from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarLimits, CarPark
+from onboard.ways.site import Axis, Track, TrackKind
+from onboard.work.timing import DeviceTiming
 
 ALLEY = 1
 SPUR = 192
@@ -38,5 +40,5 @@ def line_site(
         lift=Axis(1_083, 500),
         floor_height_mm=2_500,
         cars=CarLimits(1_800, 3_400, 5_300, 2_100, 3_000),
-        timing=Timing(*[1_000] * 12),
+        timing=DeviceTiming(*[1_000] * 10, door_us=1_000, grip_us=1_000),
     )

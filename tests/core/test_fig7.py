@@ -14,12 +14,13 @@ import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.site import Axis, Segment, Site
+from onboard.core.site import Segment, Site
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import are_compatible, ride_us
 from onboard.ways.occupancy import itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import Route, RouteLeg, Visit, plan_route
+from onboard.ways.site import Axis
 from tests.core.buildings import LEFT, RIGHT, building
 from tests.core.lift_itineraries import Ride, lift_itineraries
 

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.core.site import Axis
 from onboard.ways.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
+from onboard.ways.site import Axis
 
 CARRIER = Axis(1_500, 500)  # reaches top speed after 3 s and 2,250 mm
 

@@ -2,7 +2,7 @@ import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.site import Axis, Segment, Site
+from onboard.core.site import Segment, Site
 from onboard.ways.lift_uses import (
     GATE_US,
     Gap,
@@ -16,6 +16,7 @@ from onboard.ways.lift_uses import (
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER, Interval, Reservations, Use, Window
+from onboard.ways.site import Axis
 from tests.core.buildings import LEFT, RIGHT, building
 
 #: As in the tests of occupancy: 10 mm a segment and a floor; one step of either takes 20 ms, each more 10 ms.

@@ -3,8 +3,9 @@
 from dataclasses import replace
 
 from onboard.core.codes import KindCode, Side
-from onboard.core.site import Axis, Machine, Segment, Site, Station, Track, TrackKind
+from onboard.core.site import Machine, Segment, Site, Station
 from onboard.ways.refuges import open_refuges, refuges
+from onboard.ways.site import Axis, Track, TrackKind
 from tests.core.buildings import LEFT, RIGHT, building
 from tests.core.lines import SPUR
 from tests.sites import one_floor

@@ -7,11 +7,12 @@ import pytest
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
 from onboard.core.serial import to_bus_ms
-from onboard.core.site import Axis, Segment, Site
+from onboard.core.site import Segment, Site
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import itinerary_windows, travel_windows
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import NoRoute, Route, RouteLeg, Visit, free_flow_us, plan_route
+from onboard.ways.site import Axis
 from tests.core.lines import ALLEY, SPUR, line_site
 
 CARRIER = Axis(1_500, 500)

@@ -4,12 +4,13 @@ import random
 
 import pytest
 
-from onboard.core.site import Axis, Segment, Site
+from onboard.core.site import Segment, Site
 from onboard.ways import stops
 from onboard.ways.occupancy import itinerary_windows, lift_uses
 from onboard.ways.reservations import Reservations
 from onboard.ways.roads import roads_of
 from onboard.ways.sipp import Route, Visit, plan_route
+from onboard.ways.site import Axis
 from onboard.ways.stops import settling_segments
 from tests.core.buildings import building
 from tests.core.exhaustive import AXIS, PITCH_MM, TICK_US

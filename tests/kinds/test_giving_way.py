@@ -9,12 +9,13 @@ from onboard.core.authority import TokenBook
 from onboard.core.codes import KindCode, LegAction, TokenKind
 from onboard.core.messages import CallForProposals, Itinerary, Stamp, TokenGrant, TokenHeld
 from onboard.core.negotiation import Negotiation, Proposal
-from onboard.core.site import Axis, Machine, Segment, Site
+from onboard.core.site import Machine, Segment, Site
 from onboard.systems.car_park.giving_way import Answer, GivingWay
 from onboard.systems.car_park.program import Program, Step
 from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
+from onboard.ways.site import Axis
 from tests.core.buildings import building
 from tests.core.lines import ALLEY, SPUR, line_site
 

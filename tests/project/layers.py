@@ -20,6 +20,8 @@ CORE_TYPES = (
     "onboard.core.remedies",
     "onboard.core.serial",
     "onboard.core.site",
+    "onboard.ways.site",
+    "onboard.work.timing",
 )
 
 FOLDER = Path(__file__).parents[2] / "onboard" / "systems"
@@ -117,7 +119,8 @@ LAYERS: dict[str, Layer] = {
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(
-        ("onboard.core", "onboard.systems", "onboard.ways"), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
+        ("onboard.core", "onboard.systems", "onboard.ways", "onboard.work.timing"),
+        not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"},
     ),
     "onboard.controller": Layer(
         ("onboard.core", "onboard.wire", "onboard.ports"), not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"}

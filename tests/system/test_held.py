@@ -20,10 +20,11 @@ from onboard.core.messages import (
     ShuttleState,
     TaskReport,
 )
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment, Site
 from onboard.trace.story.why import Why
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at
+from onboard.ways.site import TrackKind
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
 from tests.system.test_spurs import alley

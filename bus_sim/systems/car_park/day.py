@@ -28,6 +28,7 @@ from onboard.core.site import Site
 from onboard.io.signals import ended_by
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import Indicators
+from onboard.ways.site import way_site
 
 #: The run begins so long before the first customer, us: the machines find their places first.
 LEAD_US = 10_000_000
@@ -89,7 +90,7 @@ def choose_demand(options: DayOptions, site: Site | None = None) -> Demand:
     if options.random_s is not None:
         return Demand.by_mean(*options.random_s, options.seed, count=options.cars)
     first, last = _days(options.day)
-    shipped = WHOLE_DAY if site is not None and len(site.compartments) > 1 else LEVEL1_DAY
+    shipped = WHOLE_DAY if site is not None and len(way_site(site).compartments) > 1 else LEVEL1_DAY
     return Demand.from_sessions(
         options.sessions, stations=options.stalls, day=first, until=last, shipped=shipped, seed=options.seed
     )
@@ -198,7 +199,7 @@ class _Day:
         self._begin_s = time.monotonic()
         outside = Outside(simulation, options.serve, options.buses, console)
         clock = Clock(self._zero)
-        show = TerminalShow(simulation.site, simulation.view, clock, lambda: _figures(simulation), console)
+        show = TerminalShow(way_site(simulation.site), simulation.view, clock, lambda: _figures(simulation), console)
         async with AsyncExitStack() as stack:
             # A signal ends a run as its end does: with its figures, a log that is whole, and no process left behind.
             stack.enter_context(ended_by(self._loop, self._interrupt))

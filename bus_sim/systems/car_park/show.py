@@ -12,9 +12,10 @@ from rich.panel import Panel
 from rich.text import Text
 
 from onboard.core.codes import KindCode, MachineState, Side
-from onboard.core.site import Segment, Site, Station, TrackKind
+from onboard.core.site import Segment, Station
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at, lift_tracks, sill
+from onboard.ways.site import TrackKind, WaySite
 
 #: Pictures a second at most; more only costs the simulation time.
 PICTURES_S = 15
@@ -55,7 +56,7 @@ class Clock:
 CELLS = (5, 3, 2)
 
 
-def cell_width(site: Site, width: int) -> int:
+def cell_width(site: WaySite, width: int) -> int:
     """Columns for one position, so that the longest alley fits in ``width`` columns if any does."""
     length = max(track.length for track in site.tracks.values() if track.kind is TrackKind.ALLEY)
     return next(
@@ -63,7 +64,7 @@ def cell_width(site: Site, width: int) -> int:
     )
 
 
-def draw_floor(site: Site, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
+def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
     """Three lines: far places, alley with machines, near places and compartments; ``cell`` columns a position.
 
     A spur is drawn in round brackets beside its mouth, with whoever stands in it.
@@ -115,7 +116,7 @@ def _boxed(text: str, box: str, cell: int) -> str:
     return f"{text[-cell:] or '-':^{cell}}"
 
 
-def _alley(site: Site, view: SiteView, track: int, cell: int) -> Text:
+def _alley(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
     row = Text(" " * _LABEL, no_wrap=True, overflow="crop")
     row.append_text(_shaft(site, view, track, 0, cell))
     here: dict[int, list[int]] = {}
@@ -138,17 +139,17 @@ def _alley(site: Site, view: SiteView, track: int, cell: int) -> Text:
     return row
 
 
-def _is_turning(site: Site, at: Segment) -> bool:
+def _is_turning(site: WaySite, at: Segment) -> bool:
     track = site.tracks.get(at.track)
     return track is not None and track.kind is TrackKind.SPUR and at.index == 0
 
 
-def _shaft_width(site: Site, cell: int) -> int:
+def _shaft_width(site: WaySite, cell: int) -> int:
     """Room for the lifts at the left end, where the site has any."""
     return min(7, cell + 2) if lift_tracks(site) else 0
 
 
-def _shaft(site: Site, view: SiteView, track: int, index: int, cell: int) -> Text:
+def _shaft(site: WaySite, view: SiteView, track: int, index: int, cell: int) -> Text:
     """A lift at one end of an alley: its platform with whoever stands on it, or the empty shaft."""
     width = _shaft_width(site, cell)
     lift = lift_at(site, Segment(track, index))
@@ -162,7 +163,7 @@ def _shaft(site: Site, view: SiteView, track: int, index: int, cell: int) -> Tex
     return Text(f"[{aboard[0][-(width - 2) :] if aboard else '=':^{width - 2}}]", style="bold yellow")
 
 
-def draw(site: Site, view: SiteView, clock: Clock, line: str, width: int = 120) -> Group:
+def draw(site: WaySite, view: SiteView, clock: Clock, line: str, width: int = 120) -> Group:
     """The picture in ``width`` columns: floors from the top, machines' states, the last events, a line of figures."""
     floors: list[Text] = []
     cell = cell_width(site, width)
@@ -181,7 +182,9 @@ def draw(site: Site, view: SiteView, clock: Clock, line: str, width: int = 120) 
 class TerminalShow:
     """A live picture where output is a terminal, else one plain line each simulated hour, or oftener."""
 
-    def __init__(self, site: Site, view: SiteView, clock: Clock, figures: Callable[[], str], console: Console) -> None:
+    def __init__(
+        self, site: WaySite, view: SiteView, clock: Clock, figures: Callable[[], str], console: Console
+    ) -> None:
         self._site = site
         self._view = view
         self._clock = clock

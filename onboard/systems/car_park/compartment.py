@@ -81,7 +81,7 @@ class Compartment:
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
         self.outputs = BayOutputs(self.fleet.node_id)
-        site, machine = self.fleet.site, self.fleet.machine
+        site, machine = car_park(self.fleet.site), self.fleet.machine
         self._robots = CarParkGeneration(site, machine, self.fleet.mirror, Program(site))
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)

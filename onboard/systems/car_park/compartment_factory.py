@@ -8,6 +8,7 @@ from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import WayFleet, way_fleet
 
 
@@ -19,7 +20,7 @@ class CompartmentFactory(BehaviourFactory):
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
         """The compartment's task-generation function."""
-        return BayGeneration(site, machine)
+        return BayGeneration(car_park(site), machine)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:
         """The compartment's steps; ``estimator`` is the one made above."""

@@ -13,13 +13,14 @@ from onboard.core.authority import TokenKey
 from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CarAt, Reference, TokenGrant
-from onboard.core.site import Site, Station
+from onboard.core.site import Station
 from onboard.systems.car_park.bay_memory import car_record
 from onboard.ways.mirror import WayFleet, WayMirror
+from onboard.ways.site import WaySite
 from onboard.ways.tokens import car_token
 
 
-def keeper(site: Site, station: Station) -> int:
+def keeper(site: WaySite, station: Station) -> int:
     """Node that keeps a station's token and its car: the compartment itself, else the track's steward."""
     for node_id, bay in site.compartments.items():
         if bay == station:

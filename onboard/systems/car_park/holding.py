@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from onboard.core.codes import DriveMode, LegAction, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import ManualOrder, Message, Reference, TaskReport
-from onboard.core.site import TrackKind
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import Phase, ShuttleWork
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
+from onboard.ways.site import TrackKind
 from onboard.work.manual import Manual
 
 

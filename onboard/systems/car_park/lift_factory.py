@@ -9,6 +9,7 @@ from onboard.core.site import Machine, Site
 from onboard.systems.car_park.lift import Lift
 from onboard.systems.car_park.lift_generation import LiftGeneration
 from onboard.ways.mirror import WayFleet, way_fleet, way_mirror
+from onboard.ways.site import way_site
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,7 @@ class LiftFactory(BehaviourFactory):
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LiftGeneration:
         """The lift's task-generation function."""
-        return LiftGeneration(site, machine, way_mirror(mirror))
+        return LiftGeneration(way_site(site), machine, way_mirror(mirror))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Lift:
         """The lift's steps; ``estimator`` is the one made above."""

@@ -7,10 +7,10 @@ from onboard.core.codes import Criterion, KindCode, LegAction, Operation
 from onboard.core.effects import Effect
 from onboard.core.messages import CallForProposals, Reference
 from onboard.core.negotiation import Answer, CallTerms
-from onboard.core.site import Site
 from onboard.systems.car_park.program import Step
 from onboard.ways.lifts import sill
 from onboard.ways.mirror import WayFleet
+from onboard.ways.site import WaySite
 
 
 def rides_of(steps: Iterable[Step]) -> list[Step]:
@@ -18,7 +18,7 @@ def rides_of(steps: Iterable[Step]) -> list[Step]:
     return [step for step in steps if step.action is LegAction.RIDE]
 
 
-def ride_terms(site: Site, call: CallForProposals, step: Step) -> CallTerms:
+def ride_terms(site: WaySite, call: CallForProposals, step: Step) -> CallTerms:
     """The call for one ride of a plan for ``call``, wanted when the plan has the carrier stand aboard."""
     return CallTerms(
         task=call.task,
@@ -34,7 +34,7 @@ def ride_terms(site: Site, call: CallForProposals, step: Step) -> CallTerms:
 
 
 def calls_after_winning(
-    site: Site, call: CallForProposals, steps: Iterable[Step], confirmed: tuple[Answer, ...] = ()
+    site: WaySite, call: CallForProposals, steps: Iterable[Step], confirmed: tuple[Answer, ...] = ()
 ) -> list[CallTerms]:
     """A call for each ride of a plan for the task won by ``call``, but for those that a confirmed option answers."""
     parent = Reference(call.sender, call.call)

@@ -15,9 +15,10 @@ from onboard.core.messages import (
     TokenHeld,
 )
 from onboard.core.serial import is_newer
-from onboard.core.site import Segment, Site, Station, TrackKind
+from onboard.core.site import Segment, Station
 from onboard.trace.scene.scene import BusClock, Json
 from onboard.trace.view import SiteView
+from onboard.ways.site import TrackKind, WaySite
 
 
 class CarParkScene:
@@ -25,7 +26,7 @@ class CarParkScene:
 
     noun = "car"
 
-    def __init__(self, site: Site, view: SiteView) -> None:
+    def __init__(self, site: WaySite, view: SiteView) -> None:
         self.site = site
         self.view = view
         self._clock = BusClock()

@@ -4,7 +4,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from onboard.core.site import Axis, Site
+from onboard.core.site import Site
+from onboard.ways.site import Axis, WaySite
+from onboard.work.timing import DeviceTiming
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +31,13 @@ class RideCalls(Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CarPark(Site):
+class CarPark(WaySite):
     """A robotized car park (rows P30 to P33)."""
 
     system: ClassVar[str] = "car-park"
     has_regeneration: ClassVar[bool] = True
 
+    timing: DeviceTiming
     shuttle: Axis
     shuttle_reach_mm: int
     cars: CarLimits

@@ -17,7 +17,7 @@ from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.motion_authority import MotionState, authorised, needs_no_proof
 from onboard.core.serial import successor
-from onboard.core.site import Segment, TrackKind
+from onboard.core.site import Segment
 from onboard.systems.car_park.axis import TrackAxis
 from onboard.systems.car_park.sill import SillProof
 from onboard.systems.car_park.stall import Stall
@@ -25,6 +25,7 @@ from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
 from onboard.ways.mirror import WayFleet
 from onboard.ways.refuges import refuges
+from onboard.ways.site import TrackKind
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
 #: journal writes and frames. Ours.

@@ -8,6 +8,7 @@ from onboard.core.codes import KindCode
 from onboard.core.site import Site
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
+from onboard.work.timing import DeviceTiming
 
 __all__ = ["Area", "Arm", "Cell", "Point", "Wish"]
 
@@ -32,6 +33,7 @@ class Cell(Site):
     system: ClassVar[str] = "cell"
     demand: ClassVar[frozenset[str]] = frozenset({"wishes"})
 
+    timing: DeviceTiming
     arms: dict[int, Arm]
     obstacles: tuple[Area, ...] = ()
     wishes: tuple[Wish, ...] = ()

@@ -41,6 +41,7 @@ from onboard.core.site import Site
 from onboard.trace.chart.svg import Drawing
 from onboard.trace.listener import Said
 from onboard.trace.words import Words
+from onboard.ways.site import way_site
 
 #: The lane for what concerns everybody, and that of the devices and the customer.
 ALL = 0
@@ -73,14 +74,15 @@ class _Story:
     """Picks the messages of one task."""
 
     def __init__(self, site: Site, task: Reference, words: Words) -> None:
+        ways = way_site(site)
         self.task = task
         self.car: Reference | None = None
         self.owner = 0
         self.operation: Operation | None = None
         self.calls: dict[tuple[int, int], CallForProposals] = {}
         self.offers: set[tuple[int, int]] = set()
-        self._lifts = {site.stewards[track]: track for track in site.lifts}
-        self._platforms = set(site.platforms)
+        self._lifts = {site.stewards[track]: track for track in ways.lifts}
+        self._platforms = set(ways.platforms)
         self._words = words
         self._seen: dict[object, object] = {}
         self._desk_event: DeskEvent | None = None

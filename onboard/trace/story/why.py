@@ -26,6 +26,7 @@ from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site, Station
 from onboard.trace.story.calls import is_task
 from onboard.trace.words import Words
+from onboard.ways.site import way_site
 
 #: Heartbeats missed in a row after which a machine counts as silent.
 MISSED_BEATS = 2
@@ -211,7 +212,7 @@ class Why:
         if before is not None:
             return Cause(f"still busy with task {self._words.reference(before.task)}", story.owner)
         body = self._body(story.owner)
-        if not self._site.tracks:
+        if not way_site(self._site).tracks:
             # Machines of other systems tell no place that this fold knows; the task's phase is what there is.
             phase = max(story.phases, default=TaskPhase.AWARDED)
             return Cause(f"has the task, {phase.name.lower()}", story.owner)
@@ -237,7 +238,7 @@ class Why:
 
     def _lift_under(self, body: _Body) -> int | None:
         """Lift track of the platform on which a robot stands."""
-        return self._site.platforms.get(body.at) if body.at is not None else None
+        return way_site(self._site).platforms.get(body.at) if body.at is not None else None
 
     def _ride(self, story: TaskStory, body: _Body, lift: int, now_us: int) -> Cause:
         node = self._site.stewards[lift]
@@ -257,7 +258,7 @@ class Why:
     def _standing(self, story: TaskStory, body: _Body, now_us: int) -> Cause:
         if body.wait is not None:
             at = Segment(body.wait.track, body.wait.index)
-            if at.track in self._site.lifts:
+            if at.track in way_site(self._site).lifts:
                 return self._lift_awaited(self._site.stewards[at.track], now_us)
             why = body.wait.reason.name.lower().replace("_", " ")
             return Cause(f"in the way at {at}: {why}", body.wait.blocker or story.owner)
@@ -296,7 +297,7 @@ class Why:
         if body.refusal is None or now_us - body.refusal[0] > _REFUSAL_US:
             return None
         refusal = body.refusal[1]
-        if refusal.token_kind is TokenKind.SEGMENT and refusal.token >> 8 in self._site.lifts:
+        if refusal.token_kind is TokenKind.SEGMENT and refusal.token >> 8 in way_site(self._site).lifts:
             # Platform and gate are asked for in turn: to the customer it is one wait.
             return self._lift_awaited(refusal.sender, now_us)
         why = refusal.reason.name.lower().replace("_", " ")

@@ -48,8 +48,6 @@ TIMING = Timing(
     token_repeat_us=200_000,
     heartbeat_us=2_000_000,
     bus_time_us=5_000_000,
-    door_us=3_000_000,
-    grip_us=2_000_000,
     drive_refresh_us=200_000,
 )
 

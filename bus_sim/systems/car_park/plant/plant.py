@@ -13,8 +13,8 @@ from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
 from bus_sim.systems.car_park.plant.world import World
 from onboard.core.codes import KindCode
-from onboard.core.site import Site
 from onboard.ports.bus import Bus
+from onboard.ways.site import WaySite
 from onboard.wire.codec import device_codec
 from onboard.wire.decoder import Decoder
 
@@ -22,7 +22,7 @@ from onboard.wire.decoder import Decoder
 class Plant:
     """Everything that is not a controller. ``buses`` has one connection to each machine's device bus, by node-ID."""
 
-    def __init__(self, site: Site, loop: asyncio.AbstractEventLoop, buses: Mapping[int, Bus], seed: int) -> None:
+    def __init__(self, site: WaySite, loop: asyncio.AbstractEventLoop, buses: Mapping[int, Bus], seed: int) -> None:
         self.timers = LoopTimers(loop)
         self.world = World(site, self.timers)
         self.oracle = Oracle(self.world)
