@@ -2,7 +2,8 @@
 
 from dataclasses import replace
 
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.site import Axis, Track, TrackKind
 from tests.core.lines import line_site
 
@@ -21,7 +22,7 @@ def building(
     clearance_mm: int = 0,
     ends: tuple[int, ...] = (LEFT, RIGHT),
     lift: Axis | None = None,
-) -> Site:
+) -> CarPark:
     """Alleys 1 to ``floors``; every lift of ``ends`` serves them all and has ``axis`` where ``lift`` is not given."""
     site = line_site(length, pitch_mm, axis, carrier_length_mm, clearance_mm)
     tracks = {number: Track(number, TrackKind.ALLEY, length, pitch_mm) for number in range(1, floors + 1)}

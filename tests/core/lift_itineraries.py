@@ -2,8 +2,8 @@
 
 from typing import NamedTuple
 
-from onboard.core.site import Site
 from onboard.ways.lifts import lift_index_of, lift_tracks
+from onboard.ways.site import WaySite
 
 
 class Ride(NamedTuple):
@@ -14,7 +14,7 @@ class Ride(NamedTuple):
     to_floor: int
 
 
-def lift_itineraries(site: Site, from_floor: int, to_floor: int, crossings: int = 1) -> list[tuple[Ride, ...]]:
+def lift_itineraries(site: WaySite, from_floor: int, to_floor: int, crossings: int = 1) -> list[tuple[Ride, ...]]:
     """All sequences of rides with at most ``crossings`` alleys crossed from one lift to another between them.
 
     The shortest first, then by lift tracks and floors. For F floors and a lift at each end of each there are, with one
@@ -30,7 +30,7 @@ def lift_itineraries(site: Site, from_floor: int, to_floor: int, crossings: int 
     return found
 
 
-def _next_rides(site: Site, rides: tuple[Ride, ...], from_floor: int, to_floor: int) -> list[Ride]:
+def _next_rides(site: WaySite, rides: tuple[Ride, ...], from_floor: int, to_floor: int) -> list[Ride]:
     """Every ride by another lift than the last, to the goal or to a floor not seen before."""
     here = rides[-1].to_floor if rides else from_floor
     seen = {ride.from_floor for ride in rides} - {to_floor} | {here}

@@ -6,6 +6,7 @@ from onboard.core.codes import ANY_STATION, Reason, TokenKind
 from onboard.core.holon import Holon
 from onboard.core.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
 from onboard.systems.registry import factory_for
+from onboard.ways.mirror import way_mirror
 from onboard.ways.tokens import car_token
 from tests.sites import one_floor
 
@@ -33,16 +34,16 @@ def hears(node: int, *words: Message) -> Holon:
 def test_where_my_car_is_nobody_else_says() -> None:
     bay = hears(BAY)
     bay.tokens.create(car_token(*CAR))
-    bay.mirror.on_car(at(BAY, HERE, 1))
+    way_mirror(bay.mirror).on_car(at(BAY, HERE, 1))
     for version in (1, 2, 9):
         bay.receive(at(LIAR, THERE, version), 10)
-    assert bay.mirror.cars[CAR].station == HERE
+    assert way_mirror(bay.mirror).cars[CAR].station == HERE
     assert bay.drops[Reason.RIGHT_CLAIMED] == 3
 
 
 def test_a_word_of_somebody_else_than_the_custodian_comes_to_nothing() -> None:
     robot = hears(ROBOT, at(BAY, HERE, 1), at(LIAR, THERE, 2))
-    assert robot.mirror.cars[CAR].station == HERE
+    assert way_mirror(robot.mirror).cars[CAR].station == HERE
     assert robot.drops[Reason.NOT_THE_HOLDER] == 1
 
 
@@ -56,4 +57,7 @@ def test_the_tokens_move_proves_the_word_of_its_taker(proof: Message, is_before:
     """Frames can be lost or come late: a word that came first is taken up when its proof is heard."""
     word = at(LIAR, ANY_STATION, 2)
     robot = hears(ROBOT, at(BAY, HERE, 1), *((proof, word) if is_before else (word, proof)))
-    assert (robot.mirror.cars[CAR].station, robot.mirror.cars[CAR].custodian) == (ANY_STATION, LIAR)
+    assert (way_mirror(robot.mirror).cars[CAR].station, way_mirror(robot.mirror).cars[CAR].custodian) == (
+        ANY_STATION,
+        LIAR,
+    )

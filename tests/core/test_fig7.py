@@ -14,7 +14,8 @@ import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import are_compatible, ride_us
 from onboard.ways.occupancy import itinerary_windows, lift_uses
@@ -43,7 +44,7 @@ FAST = Clock(Axis(2_400, 2_400_000_000), Axis(2_500, 2_500_000_000), 8 * SECOND)
 REAL = Clock(Axis(1_500, 500), Axis(1_083, 500), 15 * SECOND)
 
 
-def park(clock: Clock, places_between: int, floors: int = 5) -> Site:
+def park(clock: Clock, places_between: int, floors: int = 5) -> CarPark:
     """The site as seen by a body that keeps so many places free before and behind it."""
     return building(
         floors,

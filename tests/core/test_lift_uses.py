@@ -2,7 +2,8 @@ import pytest
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.lift_uses import (
     GATE_US,
     Gap,
@@ -24,7 +25,7 @@ QUICK = Axis(1_000, 100_000)
 MS = 1_000
 
 
-def quick(floors: int = 3, clearance_mm: int = 0) -> Site:
+def quick(floors: int = 3, clearance_mm: int = 0) -> CarPark:
     return building(floors, 6, QUICK, pitch_mm=10, floor_mm=10, carrier_length_mm=10, clearance_mm=clearance_mm)
 
 

@@ -11,7 +11,7 @@ from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
 from onboard.systems.registry import factory_for
 from onboard.ways.cars import MAX_GONE_CARS
-from onboard.ways.mirror import WayMirror
+from onboard.ways.mirror import WayMirror, way_mirror
 from onboard.ways.tokens import car_token
 from tests.core.walkers import Alley
 from tests.sites import one_floor
@@ -110,12 +110,14 @@ def test_cars_that_left_long_ago_leave_nothing_behind() -> None:
         machine.receive(CarAt(ROBOT, car, SITE.places[0].number, 2, 2500), 10)
         machine.receive(TokenGrant(ROBOT, TokenKind.CAR, car_token(*car).number, 3, STEWARD), 10)
         assert machine.tokens.holds(car_token(*car))
-        machine.mirror.on_car(CarAt(STEWARD, car, OUTSIDE, 3, 2500))
-    for table in (machine.mirror.cars, machine.tokens.seen, machine.tokens.held, machine.tokens.given):
+        way_mirror(machine.mirror).on_car(CarAt(STEWARD, car, OUTSIDE, 3, 2500))
+    for table in (way_mirror(machine.mirror).cars, machine.tokens.seen, machine.tokens.held, machine.tokens.given):
         assert len(table) <= MAX_GONE_CARS + 1
     first = Reference(STEWARD, 1)
     machine.tokens.create(car_token(*first))
-    assert machine.mirror.on_car(CarAt(STEWARD, first, SITE.places[0].number, 1, 2500)), "numbers come again"
+    assert way_mirror(machine.mirror).on_car(CarAt(STEWARD, first, SITE.places[0].number, 1, 2500)), (
+        "numbers come again"
+    )
 
 
 def test_cars_that_are_there_are_never_forgotten_however_many_have_left() -> None:

@@ -4,7 +4,8 @@ from hypothesis import strategies as st
 
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import itinerary_windows, leg_sweeps, standing_segments, travel_windows
 from onboard.ways.reservations import FOREVER, Window
@@ -15,7 +16,7 @@ from tests.core.lines import ALLEY, SPUR, line_site
 QUICK = Axis(1_000, 100_000)
 
 
-def quick_site(length: int = 6, carrier_length_mm: int = 10, clearance_mm: int = 0) -> Site:
+def quick_site(length: int = 6, carrier_length_mm: int = 10, clearance_mm: int = 0) -> CarPark:
     return line_site(length, 10, QUICK, carrier_length_mm, clearance_mm, spur_at=2)
 
 

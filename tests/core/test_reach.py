@@ -3,22 +3,24 @@
 import pytest
 
 from onboard.config.site import parse_site
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.reach import hidden_by, passages, reached, stranded_by
+from onboard.ways.site import WaySite
 
 LIFT = '[[lifts]]\nname = "L{node}"\nnode = {node}\nend = "{end}"\nfloors = {floors}\n'
 
 
-def tower(*lifts: tuple[str, list[int]], floors: int, at: str = "p(1,3)", home: str = "p(2,3)") -> Site:
+def tower(*lifts: tuple[str, list[int]], floors: int, at: str = "p(1,3)", home: str = "p(2,3)") -> CarPark:
     """Alleys of five positions with lifts on nodes 5.., one compartment and one robot."""
     text = f'[site]\nname = "tower"\n[floors]\ncount = {floors}\npositions = 5\n'
     for node, (end, served) in enumerate(lifts, start=5):
         text += LIFT.format(node=node, end=end, floors=served)
     text += f'[[compartments]]\nname = "IOC1"\nnode = 1\nat = "{at}"\n'
-    return parse_site(text + f'[[robots]]\nname = "MR1"\nnode = 11\nhome = "{home}"\n', "tower.toml")
+    return car_park(parse_site(text + f'[[robots]]\nname = "MR1"\nnode = 11\nhome = "{home}"\n', "tower.toml"))
 
 
-def places(site: Site, *floors: int) -> tuple[str, ...]:
+def places(site: WaySite, *floors: int) -> tuple[str, ...]:
     """All places of some floors, in the site's order."""
     return tuple(str(place) for place in site.places if place.track in floors)
 
@@ -50,15 +52,17 @@ def test_shafts_one_above_the_other_strand_all_that_lies_behind() -> None:
 
 def test_a_compartment_on_each_side_of_a_lost_lift_keeps_both_sides() -> None:
     site = tower(("left", [1, 2]), floors=2, at="p(1,3)")
-    text_site = parse_site(
-        """
+    text_site = car_park(
+        parse_site(
+            """
         site = {name = "s"}
         floors = {count = 2, positions = 5}
         lifts = [{name = "L", node = 5, end = "left"}]
         compartments = [{name = "A", node = 1, at = "p(1,3)"}, {name = "B", node = 2, at = "p(2,3)"}]
         robots = [{name = "R", node = 11, home = "p(2,2)"}]
         """,
-        "s.toml",
+            "s.toml",
+        )
     )
     assert stranded_by(site, 128)
     assert not stranded_by(text_site, 128)

@@ -3,7 +3,8 @@
 from dataclasses import replace
 
 from onboard.core.codes import KindCode, Side
-from onboard.core.site import Machine, Segment, Site, Station
+from onboard.core.site import Machine, Segment, Station
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.refuges import open_refuges, refuges
 from onboard.ways.site import Axis, Track, TrackKind
 from tests.core.buildings import LEFT, RIGHT, building
@@ -15,7 +16,7 @@ def test_on_one_floor_everywhere_but_before_the_compartment() -> None:
     assert refuges(one_floor()) == {Segment(1, index) for index in range(1, 13) if index != 4}
 
 
-def park(compartment_floors: tuple[int, ...] = (1,)) -> Site:
+def park(compartment_floors: tuple[int, ...] = (1,)) -> CarPark:
     """Three floors of six places with lifts; a spur joins p(2,3)."""
     site = building(3, 6, Axis(1_500, 500), pitch_mm=2_400, floor_mm=2_500, carrier_length_mm=2_300)
     tracks = site.tracks | {SPUR: Track(SPUR, TrackKind.SPUR, 1, 2_400, (Segment(2, 3),))}
@@ -59,7 +60,7 @@ def test_on_one_floor_with_a_spur_for_each_the_alley_stays_free() -> None:
     assert open_refuges(too_few, ()) == refuges(too_few)
 
 
-def shafts(robots: int) -> Site:
+def shafts(robots: int) -> CarPark:
     """Five floors; one lift serves floors 1 to 3, the other 3 to 5: from floor 3 on up there is no way but floor 3."""
     site = building(5, 6, Axis(1_500, 500), pitch_mm=2_400, floor_mm=2_500, carrier_length_mm=2_300)
     left, right = site.tracks[LEFT], site.tracks[RIGHT]

@@ -7,12 +7,13 @@ import pytest
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
 from onboard.core.serial import to_bus_ms
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import itinerary_windows, travel_windows
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import NoRoute, Route, RouteLeg, Visit, free_flow_us, plan_route
-from onboard.ways.site import Axis
+from onboard.ways.site import Axis, WaySite
 from tests.core.lines import ALLEY, SPUR, line_site
 
 CARRIER = Axis(1_500, 500)
@@ -22,7 +23,7 @@ OTHER = 12
 BOUND = 4_000
 
 
-def alley(length: int = 12, spur_at: int | None = None) -> Site:
+def alley(length: int = 12, spur_at: int | None = None) -> CarPark:
     return line_site(length, 2_400, CARRIER, 2_300, 50, spur_at)
 
 
@@ -30,12 +31,12 @@ def p(index: int) -> Segment:
     return Segment(ALLEY, index)
 
 
-def everywhere(site: Site) -> frozenset[Segment]:
+def everywhere(site: WaySite) -> frozenset[Segment]:
     return frozenset(Segment(t.number, i) for t in site.tracks.values() for i in range(1, t.length + 1))
 
 
 def planned(
-    site: Site,
+    site: WaySite,
     reservations: Reservations,
     start: Segment,
     *visits: Visit,
@@ -50,7 +51,7 @@ def planned(
     return route
 
 
-def windows_of(site: Site, route: Route, start: Segment, start_us: int = 0) -> list[Window]:
+def windows_of(site: WaySite, route: Route, start: Segment, start_us: int = 0) -> list[Window]:
     """What all other machines conclude from the itinerary on the wire."""
     legs = [
         Leg(one.action, one.track, one.from_index, one.to_index, Side.NEAR, to_bus_ms(one.end_us)) for one in route.legs
@@ -195,7 +196,7 @@ def test_a_follower_departs_exactly_a_headway_behind() -> None:
 # --- when there is none -----------------------------------------------------------------------------------------------
 
 
-def none(site: Site, reservations: Reservations, start: Segment, *visits: Visit, bound: int = BOUND) -> NoRoute:
+def none(site: WaySite, reservations: Reservations, start: Segment, *visits: Visit, bound: int = BOUND) -> NoRoute:
     answer = plan_route(site, reservations, MYSELF, start, 0, visits, everywhere(site), bound)
     assert isinstance(answer, NoRoute)
     return answer

@@ -7,13 +7,15 @@ import pytest
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import Itinerary, Leg, Stamp
 from onboard.core.serial import to_bus_ms
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways import lift_uses as lifts_module
 from onboard.ways.lift_uses import are_compatible
 from onboard.ways.lifts import platform
 from onboard.ways.occupancy import itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER, Reservations, Use, Window
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
+from onboard.ways.site import WaySite
 from tests.core.buildings import LEFT, RIGHT, building
 from tests.core.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Place
 from tests.core.exhaustive_lifts import GATE, Building, ExhaustiveLifts, Ridden, empty_run
@@ -73,7 +75,7 @@ def draw(rng: random.Random) -> Building:
     )
 
 
-def site_of(problem: Building) -> Site:
+def site_of(problem: Building) -> CarPark:
     return building(
         problem.floors,
         problem.length,
@@ -102,7 +104,7 @@ def reserved(problem: Building) -> Reservations:
     return reservations
 
 
-def plan(problem: Building, site: Site, reservations: Reservations) -> Route | NoRoute:
+def plan(problem: Building, site: WaySite, reservations: Reservations) -> Route | NoRoute:
     visits = tuple(Visit(Segment(*place), dwell * TICK_US, early * TICK_US) for place, dwell, early in problem.visits)
     return plan_route(
         site,
@@ -125,7 +127,7 @@ def itinerary_of(route: Route, start: Segment, start_us: int) -> Itinerary:
     return Itinerary(MYSELF, 1, Grade.FIRM, Stamp(to_bus_ms(start_us), 1, 1), tuple(legs))
 
 
-def check(problem: Building, site: Site, reservations: Reservations, route: Route) -> None:
+def check(problem: Building, site: WaySite, reservations: Reservations, route: Route) -> None:
     """What all other machines conclude from the itinerary conflicts with nothing; legs follow each other."""
     start, start_us = Segment(*problem.start), problem.start_tick * TICK_US
     itinerary = itinerary_of(route, start, start_us)

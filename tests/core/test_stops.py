@@ -4,13 +4,14 @@ import random
 
 import pytest
 
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.ways import stops
 from onboard.ways.occupancy import itinerary_windows, lift_uses
 from onboard.ways.reservations import Reservations
 from onboard.ways.roads import roads_of
 from onboard.ways.sipp import Route, Visit, plan_route
-from onboard.ways.site import Axis
+from onboard.ways.site import Axis, WaySite
 from onboard.ways.stops import settling_segments
 from tests.core.buildings import building
 from tests.core.exhaustive import AXIS, PITCH_MM, TICK_US
@@ -21,7 +22,7 @@ FLOORS, LENGTH = 3, 14
 BOUND = 100_000
 
 
-def site_of(half_body: int = 1) -> Site:
+def site_of(half_body: int = 1) -> CarPark:
     return building(
         FLOORS,
         LENGTH,
@@ -36,7 +37,7 @@ def somewhere(rng: random.Random) -> Segment:
     return Segment(rng.randint(1, FLOORS), rng.randint(1, LENGTH))
 
 
-def problem(rng: random.Random, site: Site) -> tuple[Reservations, Segment, tuple[Visit, ...], frozenset[Segment]]:
+def problem(rng: random.Random, site: WaySite) -> tuple[Reservations, Segment, tuple[Visit, ...], frozenset[Segment]]:
     """Plans of up to three others, made one after the other, and a query."""
     reservations = Reservations()
     starts = [Segment(floor, rng.randint(2, LENGTH - 1)) for floor in rng.sample(range(1, FLOORS + 1), 3)]

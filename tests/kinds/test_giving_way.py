@@ -15,7 +15,7 @@ from onboard.systems.car_park.program import Program, Step
 from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
-from onboard.ways.site import Axis
+from onboard.ways.site import Axis, WaySite, way_site
 from tests.core.buildings import building
 from tests.core.lines import ALLEY, SPUR, line_site
 
@@ -54,7 +54,7 @@ class Robot(NamedTuple):
         return self.giving_way.heed(itinerary.sender, now_us)
 
 
-def robot(site: Site, node: int, steps: list[Step], *, award_ms: int = 0) -> Robot:
+def robot(site: WaySite, node: int, steps: list[Step], *, award_ms: int = 0) -> Robot:
     machine = Machine(node, f"MR{node}", KindCode.ROBOT, Segment(ALLEY, 1))
     mirror = WayMirror(site, node)
     negotiation = Negotiation(node, KindCode.ROBOT, site.timing, Nobody(), boot=1)
@@ -182,15 +182,17 @@ def test_what_is_over_means_nothing() -> None:
 
 def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) -> list[Step] | None:
     """A route of one robot around all others': to work somewhere, and to stand on a floor of its own."""
-    mirror = WayMirror(place, node)
+    mirror = WayMirror(way_site(place), node)
     for other in robots:
         mirror.on_itinerary(other.told(), 0)
-    length, home = place.tracks[1].length, node - 10
+    length, home = way_site(place).tracks[1].length, node - 10
     start = Segment(home, chance.randint(2, length - 1))
     goal = Segment(chance.randint(1, 3), chance.randint(2, length - 1))
     refuges = frozenset(Segment(home, index) for index in range(2, length))
     visits = (Visit(goal, 20 * MS),)
-    route = plan_route(place, mirror.reservations, node, start, chance.randrange(50) * MS, visits, refuges, 20_000)
+    route = plan_route(
+        way_site(place), mirror.reservations, node, start, chance.randrange(50) * MS, visits, refuges, 20_000
+    )
     if not isinstance(route, Route):
         return None
     return [Step(leg.action, leg.track, leg.from_index, leg.to_index, leg.begin_us, leg.end_us) for leg in route.legs]

@@ -24,10 +24,11 @@ from onboard.core.messages import (
 from onboard.core.site import Segment
 from onboard.systems.car_park.lift import Lift
 from onboard.systems.car_park.robot import Robot
+from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.lifts import gate, platform, says_standing, under_gate
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 BAY, LIFT, ROBOT, OTHER = 1, 5, 11, 12
 SHAFT = 128
 FLOOR = 2

@@ -5,7 +5,8 @@ from onboard.core.codes import DriveMode, KindCode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, TokenGrant, TokenRequest
 from onboard.core.negotiation import Negotiation
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet, WayMirror
 from tests.kinds.test_giving_way import Nobody
@@ -17,7 +18,7 @@ MOUTH_MM = 6 * PITCH_MM
 ROBOT, OTHER, STEWARD = 11, 12, 1
 
 
-def site() -> Site:
+def site() -> CarPark:
     return one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n')
 
 

@@ -10,10 +10,11 @@ from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
+from onboard.systems.car_park.site import car_park
 from onboard.ways.mirror import WayMirror
 from tests.operate.hand import beat
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 ME = min(SITE.machines)
 ROBOT = next(node for node, machine in SITE.machines.items() if machine.name == "MR1")
 NOW_US = 30_000_000

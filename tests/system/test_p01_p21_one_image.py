@@ -24,12 +24,13 @@ from onboard.core.site import Segment, Site
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import Program, Step, to_itinerary
+from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import WayMirror
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 #: All have found each other by then, and no customer has come, s.
 KILLED_S = 9.0
 
