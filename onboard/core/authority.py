@@ -120,7 +120,7 @@ class TokenBook:
     def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
         for entry in entries:
-            if entry.get("record") == "car_left":
+            if entry.get("record") == "retired":
                 self.retire(TokenKey(TokenKind(int(entry["kind"])), int(entry["number"])))
             if entry.get("record") not in ("token_held", "token_given", "token_gone"):
                 continue
@@ -179,7 +179,7 @@ class TokenBook:
         return [self._record("token_held", key, 1, self.node_id)]
 
     def retire(self, key: TokenKey) -> bool:
-        """Forget the token of a car that left so long ago that no frame about it can still be under way; True if so.
+        """Forget the token of what ended so long ago that no frame about it can still be under way; True if so.
 
         Its number comes again after 65,535 others; what was never retired is remembered for good.
         """

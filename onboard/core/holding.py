@@ -125,7 +125,7 @@ class Holding:
         return self._fire(HoldEvent.STOP)
 
     def go(self, named: int) -> Outcome:
-        """A person lifts the emergency stop of node ``named``, or all with 0; my own number lets me go on at all."""
+        """A person ends the emergency stop of node ``named``, or all with 0; my own number lets me go on at all."""
         for stopper in list(self.stops) if named == NOBODY else [named]:
             self.stops.pop(stopper, None)
         if named == self.node_id and self.hold in (Hold.PERSON, Hold.OWN_NUMBER):

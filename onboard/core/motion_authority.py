@@ -17,7 +17,7 @@ def needs_no_proof(segment: Segment) -> Reason:
 class MotionState:
     """What ``authorised`` looks at: the tokens held and whether the machine may move at all.
 
-    ``proof`` says why a slot whose token is held cannot be entered all the same: a platform that nobody said is there.
+    ``proof`` says why a slot whose token is held cannot be entered all the same: nobody said that it is there.
     """
 
     tokens: TokenBook

@@ -14,9 +14,9 @@ from types import ModuleType
 from onboard import systems
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
-from onboard.core.compaction import Entry, compact
 from onboard.core.site import Site
 from onboard.systems.system import System
+from onboard.work.compaction import Entry, compact
 
 #: What a site file is that does not say: those of version 0.1 had no other system.
 FIRST_SYSTEM = "car-park"

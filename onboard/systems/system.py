@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
-from onboard.core.compaction import Rules
 from onboard.core.messages import Message
+from onboard.work.compaction import Rules
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,7 +114,7 @@ class CarMirror(Mirror):
         return [
             Record(
                 {
-                    "record": "car_left",
+                    "record": "retired",
                     "kind": int(TokenKind.CAR),
                     "number": car_token(*car).number,
                     "car_origin": car.origin,

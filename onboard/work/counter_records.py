@@ -1,6 +1,6 @@
 """What of a counter's records outlives compaction (counter.py reads them); the same for each such desk."""
 
-from onboard.core.compaction import MOST_OVER, End, Keep, Rules
+from onboard.work.compaction import MOST_OVER, End, Keep, Rules
 from onboard.work.counter import OVER
 
 _NUMBER = ("number",)

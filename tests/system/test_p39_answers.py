@@ -75,7 +75,7 @@ def ride_call(terms: CallTerms, sender: int, whole: int, call: int = 50) -> Call
     ready_ms = -(-max(0, terms.ready_us - deadline_us) // 100_000) * 100
     return CallForProposals(
         sender, call, terms.task, terms.operation, terms.kind, terms.criterion, 1, 1, to_bus_ms(deadline_us),
-        terms.from_station, terms.to_station, terms.car, terms.wheelbase_mm, Reference(1, whole), 1, ready_ms, 1_500,
+        terms.from_station, terms.to_station, terms.load, terms.load_mm, Reference(1, whole), 1, ready_ms, 1_500,
     )  # fmt: skip
 
 

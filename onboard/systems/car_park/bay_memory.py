@@ -29,7 +29,7 @@ def car_record(statement: CarAt) -> Record:
 
 def cars_at(node_id: int, entries: Iterable[Entry]) -> dict[Reference, CarAt]:
     """What node ``node_id`` has last journalled of each car, as it told it."""
-    return BayMemory(node_id).read(entry for entry in entries if entry.get("record") in ("car_at", "car_left")).cars
+    return BayMemory(node_id).read(entry for entry in entries if entry.get("record") in ("car_at", "retired")).cars
 
 
 def winner_record(car: Reference, winner: int, task: Reference, version: int) -> Record:
@@ -98,7 +98,7 @@ class BayMemory:
                 self.winners.pop(_car(entry), None)
             case "winner":
                 self._take_winner(entry)
-            case "car_left":
+            case "retired":
                 self._forget(_car(entry))
             case "ticket":
                 queue_ticket(self.tickets, _car(entry), urgent="urgent" in entry)

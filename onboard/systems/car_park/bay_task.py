@@ -78,8 +78,8 @@ class BayTask:
             criterion=Criterion.FINISH_TIME,
             from_station=source,
             to_station=sink,
-            car=self.car,
-            wheelbase_mm=self.wheelbase_mm,
+            load=self.car,
+            load_mm=self.wheelbase_mm,
             task_version=self.version,
             floor=floor,
         )

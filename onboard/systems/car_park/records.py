@@ -1,8 +1,8 @@
 """What of a car park's records outlives compaction; who reads each is named beside it."""
 
 from onboard.core.codes import Operation
-from onboard.core.compaction import End, Keep, Rules, Which
 from onboard.systems.car_park.program import Handling
+from onboard.work.compaction import End, Keep, Rules, Which
 
 _CAR = ("car_origin", "car")
 _TASK = ("task_origin", "task")
@@ -22,7 +22,7 @@ RECORDS: Rules = {
     "step": (Keep("step"),),
     "riding": (Keep("riding"),),
     "floor": (Keep("floor"), End(("riding",))),
-    # bay_memory.py: custody of cars, and the bay's own task. ``car_left`` of the core ends what is about a car.
+    # bay_memory.py: custody of cars, and the bay's own task. ``retired`` of the core ends what is about a car.
     # In the order in which cars first came.
     "car_at": (Keep("car_at", _CAR, Which.FIRST_AND_NEWEST),),
     "winner": (Keep("winner", _CAR),),

@@ -27,8 +27,8 @@ def ride_terms(site: WaySite, call: CallForProposals, step: Step) -> CallTerms:
         criterion=Criterion.FINISH_TIME,
         from_station=sill(site, step.track, step.from_index).number,
         to_station=sill(site, step.track, step.to_index).number,
-        car=call.car,
-        wheelbase_mm=call.wheelbase_mm,
+        load=call.car,
+        load_mm=call.wheelbase_mm,
         ready_us=step.begin_us,
     )
 

@@ -1,7 +1,7 @@
 """What of a cell's records outlives compaction: its robots' contracts (memory.py), its desk's orders (counter.py)."""
 
-from onboard.core.compaction import MOST_OVER, End, Keep, Rules, Which
 from onboard.systems.cell.memory import Stage
+from onboard.work.compaction import MOST_OVER, End, Keep, Rules, Which
 from onboard.work.counter_records import RECORDS as COUNTER_RECORDS
 
 _TASK = ("origin", "number")

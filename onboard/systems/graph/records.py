@@ -3,8 +3,8 @@
 Both are taken up in the order in which they first came.
 """
 
-from onboard.core.compaction import MOST_OVER, End, Keep, Rules, Which
 from onboard.systems.graph.desk import Stage
+from onboard.work.compaction import MOST_OVER, End, Keep, Rules, Which
 
 _TASK = ("origin", "number")
 

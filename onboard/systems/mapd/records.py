@@ -1,6 +1,6 @@
 """What of a mapd site's records outlives compaction: a robot's last words (memory.py), a desk's orders (desk.py)."""
 
-from onboard.core.compaction import MOST_OVER, End, Keep, Rules
+from onboard.work.compaction import MOST_OVER, End, Keep, Rules
 
 _TASK = ("task",)
 

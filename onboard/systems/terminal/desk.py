@@ -348,8 +348,8 @@ class Desk:
             criterion=Criterion.FINISH_TIME,
             from_station=self.mirror.station_of(transport.box),
             to_station=transport.target,
-            car=self.site.box(transport.box),
-            wheelbase_mm=0,
+            load=self.site.box(transport.box),
+            load_mm=0,
             detail=(date,),
             floor=partial(least_end_ms, self.site),
         )

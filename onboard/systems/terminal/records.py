@@ -1,6 +1,6 @@
 """What of a terminal's records outlives compaction: plans and boxes (memory.py), the desk's orders (missions.py)."""
 
-from onboard.core.compaction import End, Keep, Rules, Which
+from onboard.work.compaction import End, Keep, Rules, Which
 
 RECORDS: Rules = {
     # A new plan ends the steps of the one before.

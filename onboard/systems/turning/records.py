@@ -1,6 +1,6 @@
 """What of a turning shop's records outlives compaction: jobs of its lathes (machine.py), orders of its desk."""
 
-from onboard.core.compaction import MOST_OVER, End, Keep, Rules
+from onboard.work.compaction import MOST_OVER, End, Keep, Rules
 from onboard.work.counter_records import RECORDS as COUNTER_RECORDS
 
 _TASK = ("origin", "number")

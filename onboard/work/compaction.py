@@ -60,7 +60,7 @@ CORE_RULES: Rules = {
     "token_held": (Keep("token", _TOKEN),),
     "token_given": (Keep("token", _TOKEN), Keep("given", _TOKEN)),
     "token_gone": (Keep("token", _TOKEN), Keep("gone", _TOKEN)),
-    "car_left": (End(("token", "given", "gone"), _TOKEN), End(("car_at", "winner", "ticket"), ("car_origin", "car"))),
+    "retired": (End(("token", "given", "gone"), _TOKEN), End(("car_at", "winner", "ticket"), ("car_origin", "car"))),
     "blocked": (Keep("blocked", _SEGMENT),),
     "clear": (Keep("clear", _SEGMENT),),
     "manual": (Keep("manual"),),
