@@ -16,8 +16,8 @@ from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
 from onboard.ways.site import Axis, WaySite, way_site
-from tests.core.buildings import building
-from tests.core.lines import ALLEY, SPUR, line_site
+from tests.ways.buildings import building
+from tests.ways.lines import ALLEY, SPUR, line_site
 
 #: 10 mm a segment, 1 m/s, top speed after 5 mm and 10 ms: half-millimetre arithmetic by hand, all times in 5 ms.
 QUICK = Axis(1_000, 100_000)

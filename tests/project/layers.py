@@ -113,7 +113,7 @@ LAYERS: dict[str, Layer] = {
     "onboard.ways": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
     "onboard.work": Layer(("onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
     # It knows no system by name; a system's parts are found by the name of their folder.
-    "onboard.systems": Layer(("onboard.core",)),
+    "onboard.systems": Layer(("onboard.core", "onboard.work.compaction")),
     "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),
     **{layer: rule for system in SYSTEMS for layer, rule in _parts_of(system)},
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),

@@ -18,7 +18,7 @@ from onboard.ways.lifts import platform
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER, Interval, Reservations, Use, Window
 from onboard.ways.site import Axis
-from tests.core.buildings import LEFT, RIGHT, building
+from tests.ways.buildings import LEFT, RIGHT, building
 
 #: As in the tests of occupancy: 10 mm a segment and a floor; one step of either takes 20 ms, each more 10 ms.
 QUICK = Axis(1_000, 100_000)

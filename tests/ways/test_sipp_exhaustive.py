@@ -10,8 +10,8 @@ from onboard.core.site import Segment
 from onboard.ways.occupancy import itinerary_windows
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
-from tests.core.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Exhaustive, Place, Problem
-from tests.core.lines import line_site
+from tests.ways.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Exhaustive, Place, Problem
+from tests.ways.lines import line_site
 
 PROBLEMS = 4_000
 CHUNKS = 8

@@ -13,10 +13,10 @@ from onboard.ways.roads import roads_of
 from onboard.ways.sipp import Route, Visit, plan_route
 from onboard.ways.site import Axis, WaySite
 from onboard.ways.stops import settling_segments
-from tests.core.buildings import building
-from tests.core.exhaustive import AXIS, PITCH_MM, TICK_US
-from tests.core.lines import ALLEY
-from tests.core.test_sipp_lifts import itinerary_of
+from tests.ways.buildings import building
+from tests.ways.exhaustive import AXIS, PITCH_MM, TICK_US
+from tests.ways.lines import ALLEY
+from tests.ways.test_sipp_lifts import itinerary_of
 
 FLOORS, LENGTH = 3, 14
 BOUND = 100_000

@@ -22,8 +22,8 @@ from onboard.ways.occupancy import itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import Route, RouteLeg, Visit, plan_route
 from onboard.ways.site import Axis
-from tests.core.buildings import LEFT, RIGHT, building
-from tests.core.lift_itineraries import Ride, lift_itineraries
+from tests.ways.buildings import LEFT, RIGHT, building
+from tests.ways.lift_itineraries import Ride, lift_itineraries
 
 PLACES = 16
 PITCH_MM, FLOOR_MM = 2_400, 2_500

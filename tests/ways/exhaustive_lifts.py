@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from itertools import product
 from typing import NamedTuple
 
-from tests.core.exhaustive import _BITS, HORIZON, Place, _crossing
+from tests.ways.exhaustive import _BITS, HORIZON, Place, _crossing
 
 GATE = 1
 EVER = (1 << _BITS) - 1

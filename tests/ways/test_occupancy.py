@@ -10,7 +10,7 @@ from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import itinerary_windows, leg_sweeps, standing_segments, travel_windows
 from onboard.ways.reservations import FOREVER, Window
 from onboard.ways.site import Axis
-from tests.core.lines import ALLEY, SPUR, line_site
+from tests.ways.lines import ALLEY, SPUR, line_site
 
 #: 10 mm a segment, 1 m/s, top speed after 5 mm and 10 ms: half-millimetre arithmetic by hand, all times in 5 ms.
 QUICK = Axis(1_000, 100_000)

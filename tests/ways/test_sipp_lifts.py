@@ -16,9 +16,9 @@ from onboard.ways.occupancy import itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER, Reservations, Use, Window
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 from onboard.ways.site import WaySite
-from tests.core.buildings import LEFT, RIGHT, building
-from tests.core.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Place
-from tests.core.exhaustive_lifts import GATE, Building, ExhaustiveLifts, Ridden, empty_run
+from tests.ways.buildings import LEFT, RIGHT, building
+from tests.ways.exhaustive import AXIS, BUSY, PITCH_MM, TICK_US, Place
+from tests.ways.exhaustive_lifts import GATE, Building, ExhaustiveLifts, Ridden, empty_run
 
 PROBLEMS = 800
 CHUNKS = 8

@@ -7,9 +7,9 @@ from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.refuges import open_refuges, refuges
 from onboard.ways.site import Axis, Track, TrackKind
-from tests.core.buildings import LEFT, RIGHT, building
-from tests.core.lines import SPUR
 from tests.sites import one_floor
+from tests.ways.buildings import LEFT, RIGHT, building
+from tests.ways.lines import SPUR
 
 
 def test_on_one_floor_everywhere_but_before_the_compartment() -> None:

@@ -14,7 +14,7 @@ from onboard.ways.occupancy import itinerary_windows, travel_windows
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import NoRoute, Route, RouteLeg, Visit, free_flow_us, plan_route
 from onboard.ways.site import Axis, WaySite
-from tests.core.lines import ALLEY, SPUR, line_site
+from tests.ways.lines import ALLEY, SPUR, line_site
 
 CARRIER = Axis(1_500, 500)
 SECOND = 1_000_000

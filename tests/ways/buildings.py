@@ -5,7 +5,7 @@ from dataclasses import replace
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.site import Axis, Track, TrackKind
-from tests.core.lines import line_site
+from tests.ways.lines import line_site
 
 #: Tracks of the lifts at the left and at the right end.
 LEFT, RIGHT = 128, 129
