@@ -19,7 +19,7 @@ help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
 	@echo 'make run ARGS="..." hands options to bus-sim run; make PYTHON=/path/to/python ... chooses the interpreter'
 
-run: $(VENV)/.run ## set up, then show the busiest hour of a real day on the standard site in about a minute
+run: $(VENV)/.run ## set up, then show an hour of a real day on the standard site in about a minute
 	@$(BIN)/bus-sim run $(ARGS)
 
 test: lint ## set up, lint, then all tests on all processors; REQUIRE=all makes a skipped test a failure
@@ -49,7 +49,8 @@ bench: $(VENV)/.test ## all figures of bench/, one table each
 		echo "== $$script"; $(BIN)/python "$$script"; \
 	done
 
-docs: $(VENV)/.test ## write docs/network.md anew from the DBC files, docs/systems.md from docs/systems/
+docs: $(VENV)/.test ## write onboard/contract and docs/network.md anew from the DBC files, docs/systems.md from docs/systems/
+	$(BIN)/python -m onboard.contract.generate
 	$(BIN)/python -m onboard.wire.network_doc
 	$(BIN)/python -m tests.systems_page
 
@@ -57,15 +58,26 @@ clean: ## remove the environment and everything generated
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage htmlcov runs
 	find $(PACKAGES) tests bench -type d -name __pycache__ -prune -exec rm -rf {} +
 
+comma := ,
+# What pip says of a network that is not there is 25 lines; the first mistake and what to do are enough.
+define install
+$(BIN)/python -m pip install --quiet --disable-pip-version-check --retries 2 --editable '$(1)' 2>$(VENV)/pip.log || { \
+	grep 'ERROR: ' $(VENV)/pip.log | head -n 1 >&2; \
+	echo "make: pip could not install what it needs (all of what it said: $(VENV)/pip.log). Without a network: on a" \
+		"computer with one, with the same Python, pip download --dest wheels hatchling editables '$(1)'; bring the folder" \
+		"here, then: PIP_NO_INDEX=1 PIP_FIND_LINKS=wheels make $(MAKECMDGOALS)" >&2; \
+	exit 2; }
+endef
+
 # A stamp is newer than the pyproject.toml that it was installed from.
 $(VENV)/.run: pyproject.toml | $(VENV)/.made
 	@echo "installing into $(VENV): the program and what make run needs"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim,web]'
+	@$(call install,.[sim$(comma)web])
 	@touch $@
 
 $(VENV)/.test: pyproject.toml | $(VENV)/.made
 	@echo "installing into $(VENV): the program and what make test needs"
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sim,web,mqtt,test]'
+	@$(call install,.[sim$(comma)web$(comma)mqtt$(comma)test])
 	@touch $@ $(VENV)/.run
 
 $(VENV)/.made:

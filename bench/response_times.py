@@ -14,8 +14,8 @@ from collections.abc import Sequence
 
 from bus_sim.response import Measured, measure
 from bus_sim.sites import find_site
+from onboard.systems.car_park.traffic import operation
 from onboard.trace.response import utilisation
-from onboard.trace.traffic import operation
 
 SITES = ("level1", "small", "standard")
 RATES = (125_000, 250_000, 500_000)

@@ -42,9 +42,9 @@ exit status:
   2  a mistake in the command line or in a file; one line for each says where and what to do
 
 examples:
-  bus-sim run                          the busiest hour of a real day on the standard site, a minute a second
+  bus-sim run                          an hour of a real day on the standard site, a minute a second
   bus-sim run standard                 that whole day, as fast as possible
-  bus-sim run standard --hour 16:30    from 16:30 to 17:30, after a hurried warm-up
+  bus-sim run standard --hour 16:30    from 16:30 to 17:30, after a short hurried warm-up
   bus-sim run level1                   a day on the one-floor site
   bus-sim run level1 --one-car 300     one car by hand, fetched after five minutes
   bus-sim run small --by-hand          press i for a car in, o for a car out
@@ -93,7 +93,7 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "site",
         nargs="?",
-        help="name of a shipped site, or a site file (default: standard, and of the shipped day its busiest hour)",
+        help="name of a shipped site, or a site file (default: standard, and an hour in which cars come and go)",
     )
     demand = run.add_argument_group("who comes (default: the shipped real day, 2019-07-24)")
     demand.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file (columns as in bus_sim/data)")
@@ -204,7 +204,8 @@ def _add_when(when: argparse._ArgumentGroup) -> None:
     window.add_argument(
         "--hour",
         metavar="HH:MM",
-        help="this hour of the first day, or busiest; what happens before is hurried through. "
+        help="this hour of the first day, or busiest, or two-way: that in which cars come and go; who is inside by "
+        "then is parked before, as fast as possible. "
         "With 2019-07-25T07:00 an hour of another day",
     )
     window.add_argument("--window", metavar="FROM-TO", help="the same with an end of its own, such as 06:30-09:00")
@@ -301,15 +302,15 @@ def _speed(text: str | None) -> float | None:
 
 
 def _window(args: argparse.Namespace, *, live: bool) -> str | None:
-    """The window asked for; without a site and without anything that asks for a whole run the busiest hour."""
-    if args.hour is not None and "-" in args.hour and "T" not in args.hour:
+    """The window asked for; without a site and anything that asks for a whole run the two-way hour."""
+    if args.hour not in {None, "two-way"} and "-" in args.hour and "T" not in args.hour:
         raise OptionError(f"--hour {args.hour}: one time of day, such as 06:30; a window is --window {args.hour}")
     if args.window is not None and "-" not in args.window:
         raise OptionError(f"--window {args.window}: must be FROM-TO, such as 06:30-09:00")
     asked: str | None = args.hour or args.window
     whole = args.site is not None or args.one_car is not None or args.random is not None or args.limit_s is not None
     whole = whole or args.by_hand
-    return asked if asked is not None or whole or live or args.without else "busiest"
+    return asked if asked is not None or whole or live or args.without else "two-way"
 
 
 def _run_scenario(args: argparse.Namespace) -> int:
@@ -392,6 +393,7 @@ def _day_options(args: argparse.Namespace, site: Site) -> DayOptions:
         cars=args.cars,
         seed=args.seed,
         window=window,
+        short_eve=True,
         speed=speed,
         limit_s=args.limit_s,
         without=frozenset(args.without),

@@ -6,7 +6,7 @@ Three sources: recorded sessions (CSV), random intervals by mean and standard de
 import csv
 import io
 import random
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time
 from importlib.resources import files
@@ -180,9 +180,7 @@ def read_sessions(source: Readable) -> Iterator[Session]:
     rows = csv.DictReader(io.StringIO(text, newline=""))
     missing = [column for column in COLUMNS if column not in (rows.fieldnames or ())]
     if missing:
-        raise DemandError(
-            f"{source.name}:1: no column {', '.join(missing)}; the first line must name {', '.join(COLUMNS)}"
-        )
+        raise DemandError(f"{source.name}:1: no column {', '.join(missing)}; {_header_remedy(rows.fieldnames)}")
     names: dict[str, int] = {}
     for row in rows:
         where = f"{source.name}:{rows.line_num}"
@@ -193,6 +191,15 @@ def read_sessions(source: Readable) -> Iterator[Session]:
             )
         names[session.name] = rows.line_num
         yield session
+
+
+def _header_remedy(names: Sequence[str] | None) -> str:
+    """What to do about a first line that does not name the columns; spreadsheets often divide by other characters."""
+    if names is not None and len(names) == 1:
+        for mark, word in ((";", "semicolons"), ("\t", "tabs")):
+            if mark in names[0]:
+                return f"its columns are divided by {word}; save it with commas"
+    return f"the first line must name {', '.join(COLUMNS)}, divided by commas"
 
 
 def _session(row: dict[str, str | None], where: str) -> Session:

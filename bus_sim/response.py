@@ -12,8 +12,8 @@ from onboard.core.codes import TaskPhase
 from onboard.core.frame import Frame
 from onboard.core.messages import TaskReport
 from onboard.core.site import Site
+from onboard.systems.registry import part
 from onboard.trace.response import Stream, fifo_bounds, priority_bounds
-from onboard.trace.traffic import excess, operation, power_up
 from onboard.wire.codec import fleet_codec
 
 #: Mean and standard deviation of the time between arrivals, s.
@@ -104,12 +104,14 @@ async def _play(site: Site, minutes: float, seed: int, loop: VirtualTimeLoop) ->
 
 def judge(site: Site, meter: Meter, load: float, worst_second: float) -> Measured:
     """Bounds of a site's traffic, and where a run was above them."""
-    running, starting = operation(site), power_up(site)
+    traffic = part(site.system, "traffic")
+    assert traffic is not None, f"what machines of a {site.system} may send at most is not written down"
+    running, starting = traffic.operation(site), traffic.power_up(site)
     bounds = worst_by_message(running, site.bitrate)
     start = [bound.response_us for bound in fifo_bounds(starting, site.bitrate)]
     power_up_us = None if None in start else max(bound for bound in start if bound is not None)
-    wrong = excess(starting, [one for one in meter.queued if one[0] < POWER_UP_US])
-    wrong += excess(running, [one for one in meter.queued if one[0] >= POWER_UP_US])
+    wrong = traffic.excess(starting, [one for one in meter.queued if one[0] < POWER_UP_US])
+    wrong += traffic.excess(running, [one for one in meter.queued if one[0] >= POWER_UP_US])
     for (at_start, name), worst_us in sorted(meter.worst.items()):
         bound_us = power_up_us if at_start else bounds.get(name, (None, None))[0]
         if bound_us is not None and worst_us > bound_us:

@@ -22,11 +22,11 @@ from onboard.core.codes import KindCode
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.messages import Message
-from onboard.core.serial import next_boot
+from onboard.core.records import next_boot
 from onboard.core.site import Machine, Site, journal_owner
 from onboard.ports.bus import Bus
 from onboard.systems.contract import codecs_for
-from onboard.systems.registry import compaction_for, factory_for
+from onboard.systems.registry import compaction_for, condition_for, factory_for
 from onboard.trace.candump import CandumpWriter
 from onboard.trace.view import SiteView
 from onboard.ways.site import way_site
@@ -134,7 +134,7 @@ class BusRun:
             self.factories(self.site, machine.kind),
             boot=next_boot(entries),
             entries=entries,
-            journal=journal.condition,
+            journal=condition_for(self.site, journal.condition, entries, journal.name),
         )
         ports = Ports(
             self.fleet.attach(machine.name, machine.node_id),

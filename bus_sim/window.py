@@ -1,7 +1,8 @@
-"""A window of a day: the busiest hour of a demand, an hour by the clock, and the densest minutes of arrivals."""
+"""A window of a day: the busiest hour, the one in which cars come and go, any by the clock; and what came before."""
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 from bus_sim.demand import Demand, DemandError
@@ -11,6 +12,9 @@ HOUR_US = 60 * MINUTE_US
 DAY_US = 24 * HOUR_US
 #: Arrivals are densest in so long a time, us: the worst five minutes are reported by themselves.
 BURST_US = 5 * MINUTE_US
+#: On a short eve a car comes to each compartment once in so long, us. Parking one takes half a minute and the way
+#: back as long (bound in docs/figures.md), so nobody queues when the window begins.
+EVE_US = 3 * MINUTE_US
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,26 +46,60 @@ def busiest_hour(demand: Demand) -> Window:
     Looked for among those that begin on a full minute, so that a person can ask for the same by the clock. Raises
     ``DemandError`` where nobody comes.
     """
+    return _best_hour(demand, lambda come, go: (come + go, 0))
+
+
+def two_way_hour(demand: Demand) -> Window:
+    """The 60 minutes in which cars come and go: the lesser of the two counts is greatest; of equal ones the busiest.
+
+    Found as the busiest hour is, and the same as it where no hour has both. Raises ``DemandError`` where nobody comes.
+    """
+    return _best_hour(demand, lambda come, go: (min(come, go), come + go))
+
+
+def _best_hour(demand: Demand, worth: Callable[[int, int], tuple[int, int]]) -> Window:
+    """The first of the hours whose counts of arrivals and departures are worth most."""
     if not demand.stays:
         raise DemandError("busiest hour: nobody comes at all; give other days or stalls")
-    events = sorted(
-        [stay.arrival_us for stay in demand.stays]
-        + [stay.departure_us for stay in demand.stays if stay.departure_us is not None]
-    )
-    first = max(0, (events[0] - HOUR_US) // MINUTE_US)
-    starts = range(first * MINUTE_US, events[-1] + 1, MINUTE_US)
-    begin_us = max(starts, key=lambda start: (_count(events, start, start + HOUR_US), -start))
+    come = sorted(stay.arrival_us for stay in demand.stays)
+    go = sorted(stay.departure_us for stay in demand.stays if stay.departure_us is not None)
+    first = max(0, (come[0] - HOUR_US) // MINUTE_US)
+    starts = range(first * MINUTE_US, max(come[-1], go[-1] if go else 0) + 1, MINUTE_US)
+
+    def key(start: int) -> tuple[tuple[int, int], int]:
+        return worth(_count(come, start, start + HOUR_US), _count(go, start, start + HOUR_US)), -start
+
+    begin_us = max(starts, key=key)
     return Window(begin_us, begin_us + HOUR_US)
 
 
-def choose_window(demand: Demand, text: str) -> Window:
-    """The window that a person asked for: ``busiest``, ``HH:MM`` (an hour) or ``HH:MM-HH:MM``, on the first day.
+def with_short_eve(demand: Demand, window: Window, compartments: int) -> Demand:
+    """The same window without the hours before it: who is inside when it begins came shortly before, one by one.
 
-    With ``YYYY-MM-DDTHH:MM`` an hour of another day. An end that is not after its begin is on the next day. Raises
-    ``DemandError`` for what is none of these, and for an hour before the demand's first day.
+    Who has left by then does not come at all. Nobody comes sooner than they did, and the window itself is as it was.
+    """
+    before = [stay for stay in demand.stays if stay.arrival_us < window.begin_us]
+    inside = [stay for stay in before if stay.departure_us is None or stay.departure_us >= window.begin_us]
+    inside.sort(key=lambda stay: stay.arrival_us)
+    every_us = EVE_US // max(1, compartments)
+    eve = [
+        replace(stay, arrival_us=max(stay.arrival_us, window.begin_us - every_us * (len(inside) - at)))
+        for at, stay in enumerate(inside)
+    ]
+    later = [stay for stay in demand.stays if stay.arrival_us >= window.begin_us]
+    return replace(demand, stays=(*eve, *later))
+
+
+def choose_window(demand: Demand, text: str) -> Window:
+    """The window that a person asked for: ``busiest``, ``two-way``, ``HH:MM`` (an hour) or ``HH:MM-HH:MM``.
+
+    Times are of the first day. With ``YYYY-MM-DDTHH:MM`` an hour of another day. An end that is not after its begin is
+    on the next day. Raises ``DemandError`` for what is none of these, and for an hour before the demand's first day.
     """
     if text == "busiest":
         return busiest_hour(demand)
+    if text == "two-way":
+        return two_way_hour(demand)
     begin, _, end = text.partition("-") if "T" not in text else (text, "", "")
     begin_us = _moment_us(demand, begin, text)
     if begin_us < 0:
@@ -107,4 +145,4 @@ def _clock_us(text: str, whole: str) -> int:
         time_us = int(hours) * HOUR_US + int(minutes) * MINUTE_US
         if time_us <= DAY_US:
             return time_us
-    raise DemandError(f"{whole}: not a time of day; write an hour as 06:30 or busiest, a window as 06:30-08:00")
+    raise DemandError(f"{whole}: no time of day; write an hour as 06:30, busiest or two-way, a window as 06:30-08:00")

@@ -58,7 +58,7 @@ def build_parser() -> argparse.ArgumentParser:
     root.add_argument("--out", type=Path, default=Path("dist/root"), metavar="DIR")
     _add_image(commands)
     machines = commands.add_parser("machines", help="the machine files of a whole fleet")
-    machines.add_argument("site", type=Path, help="site file (docs/site-file.md)")
+    machines.add_argument("site", type=Path, help="site file (docs/site-file.md), or a shipped site's name")
     machines.add_argument("--out", type=Path, default=Path("dist/machines"), metavar="DIR")
     machines.add_argument("--fleet", default="can0", metavar="CHANNEL", help="interface of the fleet bus (can0)")
     machines.add_argument(

@@ -3,7 +3,8 @@
 from pathlib import Path
 
 from onboard.config.machine_text import BusTable, machine_text
-from onboard.config.site import load_site
+from onboard.config.shipped import site_source
+from onboard.config.site import parse_site
 from onboard.core.site import Site
 
 
@@ -18,8 +19,8 @@ def machine_file(site: Site, node: int, fleet: str, device: str) -> str:
 
 def write_fleet(site_file: Path, to: Path, fleet: str = "can0", device: str = "can1") -> list[Path]:
     """Write ``to/NAME/machine.toml`` and ``site.toml`` for every machine. Raises ``ConfigError``, ``OSError``."""
-    site = load_site(site_file)
-    text = site_file.read_text(encoding="utf-8")
+    text, name = site_source(site_file)
+    site = parse_site(text, name)
     folders = []
     for node, machine in site.machines.items():
         folder = to / machine.name

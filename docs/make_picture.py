@@ -1,4 +1,4 @@
-"""Draws docs/standard.svg, the terminal picture of the real day at a busy moment.
+"""Draws docs/standard.svg, the terminal picture of the hour that ``make run`` shows, at a busy moment.
 
 Run: ``python docs/make_picture.py``.
 """
@@ -16,9 +16,12 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.day import LEAD_US, DayOptions, choose_demand
 from bus_sim.systems.car_park.show import Clock, draw
 from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.window import two_way_hour, with_short_eve
 
-#: 07:33:10 local time: cars come in at two compartments, robots share the street's alley.
-MOMENT_S = 7 * 3600 + 33 * 60 + 10
+#: 15:39:10 local time: a car comes in, others are asked for, robots share the street's alley.
+MOMENT_S = 15 * 3600 + 39 * 60 + 10
+#: Of the picture.
+COLUMNS, LINES = 112, 30
 
 
 async def _picture() -> str:
@@ -26,6 +29,7 @@ async def _picture() -> str:
     assert isinstance(loop, VirtualTimeLoop)
     site = find_site("standard")
     demand = choose_demand(DayOptions(), site)
+    demand = with_short_eve(demand, two_way_hour(demand), len(site.compartments))
     first_us = demand.stays[0].arrival_us
     simulation = build(site, RunOptions(), loop)
     simulation.plant.street.add_all(demand, LEAD_US - first_us)
@@ -33,14 +37,14 @@ async def _picture() -> str:
     await asyncio.sleep(MOMENT_S - first_us / 1e6 + LEAD_US / 1e6)
     assert demand.zero is not None
     clock = Clock(demand.zero + timedelta(microseconds=first_us - LEAD_US))
-    console = Console(record=True, width=124, file=StringIO())
+    console = Console(record=True, width=COLUMNS, file=StringIO())
     street = simulation.plant.street.summary()
     line = (
-        f" cars in {street.parked}   out {street.served}   inside {street.inside}   "
-        f"calls {simulation.view.calls_opened}   bids {simulation.view.bids}   "
+        f"cars in {street.parked}  out {street.served}  inside {street.inside}  "
+        f"calls {simulation.view.calls_opened}  bids {simulation.view.bids}  "
         f"bus load {simulation.fleet.statistics().mean_load:.2%}"
     )
-    console.print(draw(site, simulation.view, clock, line, 124))
+    console.print(draw(site, simulation.view, clock, line, COLUMNS, LINES))
     svg = console.export_svg(title="bus-sim run")
     # rich's template asks another host for its font; the reader's own does as well.
     return re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL).replace("Fira Code", "DejaVu Sans Mono")

@@ -10,10 +10,10 @@ from hil.short_circuit import ShortCircuit
 from onboard.config.site import parse_site
 from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon
-from onboard.core.serial import next_boot
+from onboard.core.records import next_boot
 from onboard.core.site import Machine
 from onboard.ports.bus import BusHealth
-from onboard.systems.registry import factory_for
+from onboard.systems.registry import condition_for, factory_for
 
 
 class SimulatedDevice:
@@ -40,7 +40,7 @@ class SimulatedDevice:
             factory_for(site, machine.kind),
             boot=next_boot(entries),
             entries=entries,
-            journal=self._journal.condition,
+            journal=condition_for(site, self._journal.condition, entries, self._journal.name),
         )
         self._cables = (
             Cable(lambda: self._attach(simulation.fleet.attach)),

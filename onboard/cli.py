@@ -13,7 +13,7 @@ from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
 from onboard.core.holon import Holon
-from onboard.core.serial import next_boot
+from onboard.core.records import next_boot
 from onboard.core.site import journal_owner
 from onboard.gateway.options import add_mqtt_arguments
 from onboard.gateway.settings import GatewayError
@@ -28,7 +28,7 @@ from onboard.life import Life
 from onboard.ports.broker import BrokerError
 from onboard.ports.telemetry import Telemetry
 from onboard.systems.contract import codecs_for
-from onboard.systems.registry import compaction_for, factory_for, system_of
+from onboard.systems.registry import compaction_for, condition_for, factory_for, system_of
 from onboard.web.address import is_installed as is_web_installed
 from onboard.wire.codec import Codec
 
@@ -202,7 +202,7 @@ async def run(
             factory_for(config.site, config.machine.kind),
             boot=boot,
             entries=entries,
-            journal=journal.condition,
+            journal=condition_for(config.site, journal.condition, entries, journal.name),
         )
         buses = await life.open_buses(fleet_settings, BusSettings.of(config.device_bus))
         if buses is None:

@@ -24,7 +24,7 @@ from onboard.controller.shell import Controller, Ports
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
-from onboard.core.serial import next_boot
+from onboard.core.records import next_boot
 from onboard.core.site import Machine, Site
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
 from onboard.systems.contract import codecs_for

@@ -55,9 +55,9 @@ class Ledger:
             raise DemandError(f"--add-to {path}: cannot be read as results of campaigns ({error})") from error
         return ledger
 
-    def _take(self, entry: dict[str, str | int]) -> None:
-        if (entry["state"], entry["campaign"]) == (state(), self.campaign):
-            self.done[int(entry["number"])] = Verdict(str(entry["verdict"])), str(entry["why"])
+    def _take(self, line: dict[str, str | int]) -> None:
+        if (line["state"], line["campaign"]) == (state(), self.campaign):
+            self.done[int(line["number"])] = Verdict(str(line["verdict"])), str(line["why"])
         else:
             self.others += 1
 

@@ -212,10 +212,10 @@ class _Reader:
             return []
         lines = [number for number, line in enumerate(self._lines, start=1) if line.strip().startswith("[[fault]]")]
         faults = []
-        for index, entry in enumerate(entries):
-            settings = ",".join(f"{key}={value}" for key, value in entry.items() if key != "kind")
+        for index, row in enumerate(entries):
+            settings = ",".join(f"{key}={value}" for key, value in row.items() if key != "kind")
             try:
-                faults.append(parse_injection(f"{entry.get('kind', '')}:{settings}"))
+                faults.append(parse_injection(f"{row.get('kind', '')}:{settings}"))
             except ValueError as error:
                 line = lines[index] if index < len(lines) else 0
                 self._problems.add(line, f"fault {index + 1}", None, str(error), "correct it")

@@ -12,7 +12,7 @@ from bus_sim.run import Simulation
 from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, ShuttleAction, TokenKind
 from onboard.core.effects import Send
 from onboard.core.messages import CarAt, Message, ShuttleOrder, TokenGrant
-from onboard.systems.car_park.handling import Phase
+from onboard.systems.car_park.program import Phase
 from onboard.systems.car_park.site import car_park
 from onboard.ways.tokens import car_token
 

@@ -16,6 +16,8 @@ class Page:
     def __init__(self, source: Source, where: str, console: Console) -> None:
         """Raises ``WebError``."""
         self._server = WebServer(source, where)
+        #: Where a browser finds it.
+        self.address = self._server.address
         self._console = console
         self._serving: asyncio.Task[None] | None = None
 

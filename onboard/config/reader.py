@@ -1,7 +1,7 @@
 """Typed look-ups in a TOML document that note every mistake and go on with a stand-in value."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -140,6 +140,10 @@ class Table:
             self.bad(name, values, "not an array of tables", f"write [[{path_text((*self.path, name))}]]")
             return []
         return [self._below((*self.path, name, number), value) for number, value in enumerate(values)]
+
+    def pass_over(self, is_such: Callable[[str], bool]) -> None:
+        """Call no such key unknown: which are known follows from something that is mistaken."""
+        self.asked.update(name for name in self.values if is_such(name))
 
     def check_unknown(self) -> None:
         """Note every key here and below that nobody asked for, with the nearest known name."""

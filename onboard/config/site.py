@@ -9,9 +9,10 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-from onboard.config.files import read_text, root_table
+from onboard.config.files import root_table
 from onboard.config.problems import Problems
 from onboard.config.reader import Common, Table
+from onboard.config.shipped import site_source
 from onboard.core.site import Site
 from onboard.systems.registry import FIRST_SYSTEM, part, system_names
 
@@ -19,8 +20,11 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 
 def load_site(path: Path) -> Site:
-    """Read a site file. Raises ``ConfigError`` with every mistake, or with one problem where it cannot be read."""
-    return parse_site(read_text(path, "site"), str(path))
+    """Read a site file, or a shipped site by its name (``site_source``).
+
+    Raises ``ConfigError`` with every mistake, or with one problem where it cannot be read.
+    """
+    return parse_site(*site_source(path))
 
 
 def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:

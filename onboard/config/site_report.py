@@ -1,87 +1,15 @@
-"""What a site is, in lines for a person: size, machines, refuges, and what the loss of a lift strands."""
+"""What a site is, in lines for a person: as its system's folder tells it (``report.py``), else its machines by kind."""
 
-from onboard.core.codes import KindCode
-from onboard.core.site import Machine, Segment, Site, Station
-from onboard.systems.car_park.room import ranges_text, robots_of, robots_text, room_text
-from onboard.ways.reach import hidden_by, reached, stranded_by
-from onboard.ways.site import TrackKind, way_site
-
-_KINDS = (
-    (KindCode.COMPARTMENT, "compartment"),
-    (KindCode.LIFT, "lift"),
-    (KindCode.ROBOT, "robot"),
-)
+from onboard.core.site import Site
+from onboard.systems.registry import part
 
 
 def site_report(site: Site) -> list[str]:
-    """One line each on floors, places, machines and refuges, then one on each lift; else the machines by kind."""
-    ways = way_site(site)
-    if not ways.tracks:
-        kinds = sorted({machine.kind for machine in site.machines.values()})
-        words = (f"{kind.name.lower()}: {', '.join(_named(site, kind))}" for kind in kinds)
-        return [f"system: {site.system}", *words]
-    lifts = [machine for machine in site.machines.values() if machine.kind is KindCode.LIFT]
-    return [
-        _floors_line(site),
-        f"places: {len(ways.places)}",
-        f"machines: {', '.join(_machine_words(site, kind, word) for kind, word in _KINDS if _named(site, kind))}",
-        f"{room_text(ways, robots_of(ways))}, {robots_text(robots_of(ways))}",
-        *(_loss_line(site, lift) for lift in lifts),
-    ]
-
-
-def _floors_line(site: Site) -> str:
-    ways = way_site(site)
-    lengths = {track.length for track in ways.tracks.values() if track.kind is TrackKind.ALLEY}
-    count = sum(1 for track in ways.tracks.values() if track.kind is TrackKind.ALLEY)
-    spurs = sum(1 for track in ways.tracks.values() if track.kind is TrackKind.SPUR)
-    span = f"{min(lengths)} to {max(lengths)}" if len(lengths) > 1 else f"{max(lengths)}"
-    beside = f", {_counted(spurs, 'spur')}" if spurs else ""
-    return f"floors: {count} of {span} positions{beside}"
-
-
-def _machine_words(site: Site, kind: KindCode, word: str) -> str:
-    names = _named(site, kind)
-    return f"{_counted(len(names), word)} ({', '.join(names)})"
-
-
-def _named(site: Site, kind: KindCode) -> list[str]:
-    return [machine.name for machine in site.machines.values() if machine.kind is kind]
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count} {word}{'' if count == 1 else 's'}"
-
-
-def _loss_line(site: Site, lift: Machine) -> str:
-    """What stays possible when a lift is lost while every robot stands at its home."""
-    ways = way_site(site)
-    track = lift.home.track
-    stranded = stranded_by(ways, track)
-    served = ranges_text([sill.track for sill in ways.tracks[track].joins])
-    parts = [_stranded_words(site, track, stranded) if stranded else "all places can be reached"]
-    homes = [one.home for one in site.machines.values() if one.kind is KindCode.ROBOT]
-    hidden = hidden_by(ways, homes, lost=(track,)) if len(homes) > 1 else ()
-    if hidden:
-        others = " others" if stranded else ""
-        parts.append(f"{len(hidden)}{others} lie before or behind robots at home, which serve them or give way")
-    return f"without {lift.name} (floors {served}): {'; '.join(parts)}"
-
-
-def _stranded_words(site: Site, lost: int, stranded: tuple[Station, ...]) -> str:
-    floors = sorted({place.track for place in stranded})
-    found = {segment.track for segment in reached(way_site(site), lost=(lost,))}
-    robots = [one for one in site.machines.values() if one.kind is KindCode.ROBOT]
-    there = [one.name for one in robots if _alley(site, one.home) not in found]
-    words = f"{_counted(len(stranded), 'place')} on floor{'s' if len(floors) > 1 else ''} "
-    words += f"{ranges_text(floors)} cannot be reached"
-    if there:
-        words += f", and {', '.join(there)} cannot leave"
-        words += ": no robot is left for the others" if len(there) == len(robots) else ""
-    return words
-
-
-def _alley(site: Site, home: Segment) -> int:
-    """The alley at which a home is, a spur's by its mouth."""
-    track = way_site(site).tracks[home.track]
-    return track.joins[0].track if track.kind is TrackKind.SPUR else track.number
+    """The lines on a site."""
+    module = part(site.system, "report")
+    if module is not None:
+        own: list[str] = module.lines(site)
+        return own
+    kinds = sorted({machine.kind for machine in site.machines.values()})
+    names = {kind: [one.name for one in site.machines.values() if one.kind is kind] for kind in kinds}
+    return [f"system: {site.system}", *(f"{kind.name.lower()}: {', '.join(names[kind])}" for kind in kinds)]

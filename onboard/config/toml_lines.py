@@ -62,8 +62,18 @@ def parse(text: str, file: str, problems: Problems) -> Document:
         found = _LINE_IN_MESSAGE.search(str(error))
         line = int(found.group(1)) if found else 0
         what = _LINE_IN_MESSAGE.sub("", str(error))
-        problems.add(line, "", None, f"not TOML: {what}", "correct the syntax there (https://toml.io)")
+        problems.add(line, "", None, f"not TOML: {what}", _remedy(what))
     return Document(file)
+
+
+def _remedy(what: str) -> str:
+    """Of what tomllib says; a table written twice is most often one of several."""
+    found = re.search(r"Cannot (?:declare|mutate immutable namespace) \('([A-Za-z0-9_-]+)',\)", what)
+    if found is not None:
+        return f"where there are several, each begins with [[{found.group(1)}]]"
+    if "overwrite" in what:
+        return "it is there above already; write it once, or [[NAME]] each time"
+    return "correct the syntax there (https://toml.io)"
 
 
 class _Scanner:

@@ -7,15 +7,17 @@ time and never doubles a token. Whatever ends a grant is in the journal, so that
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.core.backoff import BackOff
 from onboard.core.belief import Belief, Beliefs, Key
-from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason, TokenKind
+from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason
 from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.journal_records import Entry, records_in
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
+from onboard.core.records import RetiredRecord, TokenGivenRecord, TokenGoneRecord, TokenHeldRecord, TokenRecord
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Site
 from onboard.core.token_keys import TokenKey, genesis_holder, may_exist, segment_token, station_token
@@ -117,25 +119,24 @@ class TokenBook:
         self.backoff = BackOff(self.site.timing.token_repeat_us)
         self.beliefs = Beliefs(self._first_holder)
 
-    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+    def replay(self, entries: Iterable[Entry]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
-        for entry in entries:
-            if entry.get("record") == "retired":
-                self.retire(TokenKey(TokenKind(int(entry["kind"])), int(entry["number"])))
-            if entry.get("record") not in ("token_held", "token_given", "token_gone"):
+        for record in records_in(entries, RetiredRecord, TokenHeldRecord, TokenGivenRecord, TokenGoneRecord):
+            if isinstance(record, RetiredRecord):
+                self.retire(TokenKey(record.kind, record.number))
+            if not isinstance(record, TokenRecord):
                 continue
-            key = TokenKey(TokenKind(int(entry["kind"])), int(entry["number"]))
-            version, holder = int(entry["version"]), int(entry["holder"])
+            key, version, holder = TokenKey(record.kind, record.number), record.version, record.holder
             self.seen[key] = max(version, self.seen.get(key, 0))
             self.held.pop(key, None)
             self.leaving.pop(key, None)
-            has_come = entry["record"] != "token_given"
+            has_come = not isinstance(record, TokenGivenRecord)
             self.beliefs.take_up(key, version, holder, confirmed=has_come)
-            if entry["record"] == "token_held":
+            if isinstance(record, TokenHeldRecord):
                 self.held[key] = version
             else:
                 self.given[key] = Belief(version, holder, has_come)
-            if entry["record"] == "token_given":
+            if isinstance(record, TokenGivenRecord):
                 self.leaving[key] = Grant(version, holder, 0)
 
     def holds(self, key: TokenKey) -> bool:
@@ -176,7 +177,7 @@ class TokenBook:
         if self.is_known(key):
             raise ValueError(f"token {key} exists already")
         self._hold(key, 1)
-        return [self._record("token_held", key, 1, self.node_id)]
+        return [_record(TokenHeldRecord, key, 1, self.node_id)]
 
     def retire(self, key: TokenKey) -> bool:
         """Forget the token of what ended so long ago that no frame about it can still be under way; True if so.
@@ -235,7 +236,7 @@ class TokenBook:
         self.beliefs.take_up(key, version, to, giver=self.node_id)
         self.backoff.forget(("leaving", key))
         self.leaving[key] = Grant(version, to, self.backoff.say(("leaving", key), now_us))
-        return [self._record("token_given", key, version, to), Send(self._grant(key, version, to))]
+        return [_record(TokenGivenRecord, key, version, to), Send(self._grant(key, version, to))]
 
     # --- words of others ---------------------------------------------------------------------------------------
 
@@ -411,7 +412,7 @@ class TokenBook:
         self._hold(key, grant.version)
         return [
             *first,
-            self._record("token_held", key, grant.version, self.node_id),
+            _record(TokenHeldRecord, key, grant.version, self.node_id),
             Send(TokenHeld(self.node_id, key.kind, key.number, grant.version)),
         ]
 
@@ -442,7 +443,7 @@ class TokenBook:
             del self.leaving[key]
             self.backoff.forget(("leaving", key))
             self.given[key] = Belief(pending.version, pending.holder, confirmed=True)
-            effects.append(self._record("token_gone", key, pending.version, pending.holder))
+            effects.append(_record(TokenGoneRecord, key, pending.version, pending.holder))
         disputed = self._disputed.pop(key, None)
         return effects if disputed is None else effects + self._offered(key, disputed, now_us)
 
@@ -488,10 +489,9 @@ class TokenBook:
     def _grant(self, key: TokenKey, version: int, to: int) -> TokenGrant:
         return TokenGrant(self.node_id, key.kind, key.number, version, to)
 
-    def _record(self, record: str, key: TokenKey, version: int, holder: int) -> Record:
-        return Record(
-            {"record": record, "kind": int(key.kind), "number": key.number, "version": version, "holder": holder}
-        )
+
+def _record(record: type[TokenRecord], key: TokenKey, version: int, holder: int) -> Record:
+    return Record(record(key.kind, key.number, version, holder))
 
 
 def _told(version: int) -> int:

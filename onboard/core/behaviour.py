@@ -5,13 +5,13 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 """
 
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, runtime_checkable
 
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect
+from onboard.core.journal_records import Entry
 from onboard.core.messages import CallForProposals, Message
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
@@ -32,7 +32,7 @@ class Fleet:
     tokens: TokenBook
     mirror: Mirror
     negotiation: Negotiation
-    entries: tuple[Mapping[str, str | int], ...] = ()
+    entries: tuple[Entry, ...] = ()
     #: Input that came to nothing, by reason: the holon's own count.
     drops: Counter[Reason] = field(default_factory=Counter)
     petitions: Petitions = field(init=False)

@@ -1,9 +1,9 @@
 """What the core asks of its shell. Effects are carried out in order; a ``Record`` must be durable before the next."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from onboard.core.codes import Reason
+from onboard.core.journal_records import Entry, JournalRecord
 from onboard.core.messages import Message
 
 
@@ -23,9 +23,14 @@ class Actuate:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Write this journal entry durably before anything that follows."""
+    """Write this to the journal, durably before anything that follows."""
 
-    entry: Mapping[str, str | int]
+    what: JournalRecord
+
+    @property
+    def entry(self) -> Entry:
+        """As it stands in the journal."""
+        return self.what.entry
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +40,7 @@ class Renew:
     For rights that were regenerated: the only write that a journal which is short or foreign takes.
     """
 
-    entries: tuple[Mapping[str, str | int], ...]
+    entries: tuple[Entry, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,12 +6,14 @@ of the protocol's review: the machine goes on by itself only once the bus was he
 somebody made or moved a right under its number a person decides.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
 from onboard.core.codes import NOBODY, Reason
+from onboard.core.journal_records import Entry, records_in
+from onboard.core.records import HeldRecord, ReleasedRecord
 from onboard.core.recovery_messages import Halted
 
 #: An emergency stop holds so long after it was last heard, us (docs/contract-2.md).
@@ -185,18 +187,18 @@ class Holding:
 
     # --- the journal -------------------------------------------------------------------------------------------
 
-    def record(self) -> dict[str, str | int]:
+    def record(self) -> HeldRecord | ReleasedRecord:
         """The journal's entry about a hold for a person, or about its end."""
         if self.hold is not Hold.PERSON:
-            return {"record": "released"}
-        return {"record": "held", "reason": int(self._decision.reason), "cause": self._decision.cause}
+            return ReleasedRecord()
+        return HeldRecord(self._decision.reason, self._decision.cause)
 
-    def replay(self, entries: Iterable[Mapping[str, str | int]], of_journal: Reason = Reason.NONE) -> None:
+    def replay(self, entries: Iterable[Entry], of_journal: Reason = Reason.NONE) -> None:
         """Take up a hold for a person that was not ended before the process was; ``of_journal``: its own reason."""
-        for entry in entries:
-            if entry.get("record") == "held":
-                self.for_person(Reason(int(entry["reason"])), int(entry["cause"]))
-            elif entry.get("record") == "released" and self.hold is Hold.PERSON:
+        for record in records_in(entries, HeldRecord, ReleasedRecord):
+            if isinstance(record, HeldRecord):
+                self.for_person(record.reason, record.cause)
+            elif self.hold is Hold.PERSON:
                 self._fire(HoldEvent.GO)
         if of_journal is not Reason.NONE:
             self.for_person(of_journal, NOBODY)

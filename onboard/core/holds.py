@@ -24,6 +24,7 @@ from onboard.core.messages import (
 )
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
+from onboard.core.records import BootRecord
 from onboard.core.recovery_messages import Go, Halted, TokenDispute, TokenGiven
 
 #: Words that make a contract, or claim or move a right: not those of a machine whose journal is not to be relied on.
@@ -92,7 +93,7 @@ class Holds:
         """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
         boot, ask = self.new_life(now_us)
         self.presence.listen_anew(now_us)
-        records: list[Effect] = [Record(self.holding.record()), Record({"record": "boot", "boot": boot})]
+        records: list[Effect] = [Record(self.holding.record()), Record(BootRecord(boot))]
         return [*records, Report("comes back: nobody sends under its number any more"), *self.words(), *ask]
 
 

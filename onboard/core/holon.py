@@ -5,7 +5,7 @@ when to call ``wake`` again. Inside, all times are bus time. You can drive one f
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from onboard.core.admission import Admission
@@ -17,6 +17,7 @@ from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
 from onboard.core.holding import Hold, Holding
 from onboard.core.holds import Holds, without_rights
+from onboard.core.journal_records import Entry, records_in
 from onboard.core.journal_state import INTACT, OLD, RIGHTS_LOST, JournalCondition, reason_of, still_counting
 from onboard.core.messages import (
     Award,
@@ -38,6 +39,7 @@ from onboard.core.messages import (
 from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_of
 from onboard.core.own_number import OwnNumber
 from onboard.core.presence import Presence
+from onboard.core.records import BootRecord
 from onboard.core.recovery_messages import Go, Halted, Regeneration
 from onboard.core.regeneration import Regenerating
 from onboard.core.rights import Rights
@@ -64,7 +66,7 @@ class Holon:
         factory: BehaviourFactory,
         *,
         boot: int = 1,
-        entries: Iterable[Mapping[str, str | int]] = (),
+        entries: Iterable[Entry] = (),
         journal: JournalCondition = INTACT,
     ) -> None:
         self.site = site
@@ -80,7 +82,7 @@ class Holon:
         self.tokens = TokenBook(site, machine.node_id)
         entries = still_counting(journal, entries)
         self.tokens.replay(entries)
-        self._has_past = any(entry.get("record") == "boot" for entry in entries)
+        self._has_past = any(records_in(entries, BootRecord))
         self.mirror = factory.fleet_type.mirror_type(site, machine.node_id)
         self.mirror.replay(entries)
         self.time = Timekeeper(site, machine, self.mirror, self.drops)
@@ -149,10 +151,10 @@ class Holon:
 
     def _first_entries(self, journal: JournalCondition) -> list[Effect]:
         """Of a short journal only that it was: another is begun, that stands for the hold until a person ends it."""
-        boot: dict[str, str | int] = {"record": "boot", "boot": self.boot}
+        boot = BootRecord(self.boot)
         if journal.is_reliable:
             return [Record(boot)]
-        return [Renew((*self.fleet.entries, boot, self.holding.record())), Report(journal.told)]
+        return [Renew((*self.fleet.entries, boot.entry, self.holding.record().entry)), Report(journal.told)]
 
     def listen(self, speakers: Speakers) -> None:
         """From now on only who may say a message, by the contract of the wire, is heard with it."""

@@ -1,16 +1,18 @@
 """What a machine knows of its own journal when it starts: whole, harmlessly cut, mended, or not to be relied on."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
 from onboard.core.codes import Reason
+from onboard.core.journal_records import Entry, RecordTypes, misshapen, records_in
+from onboard.core.records import CORE_RECORDS, BlockedRecord, BootRecord, ClearRecord, EpochRecord, ManualRecord
 
 #: Why a machine holds whose rights nobody knows any more; only regeneration gives it any (docs/contract-2.md).
 RIGHTS_LOST = (Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN)
 #: Of a short journal these records still mean something: which lives there were, and what a person has decided. What
 #: it says of rights, tasks and places may be long over: nobody knows how much is missing.
-_STILL_COUNTS = frozenset({"boot", "epoch", "manual", "blocked", "clear"})
+_STILL_COUNTS: RecordTypes = (BootRecord, EpochRecord, ManualRecord, BlockedRecord, ClearRecord)
 
 
 class JournalState(Enum):
@@ -74,10 +76,19 @@ def reason_of(condition: JournalCondition) -> Reason:
     return Reason.JOURNAL_FOREIGN if condition.state is JournalState.FOREIGN else Reason.JOURNAL_SHORT
 
 
-def still_counting(
-    condition: JournalCondition, entries: Iterable[Mapping[str, str | int]]
-) -> tuple[Mapping[str, str | int], ...]:
+def still_counting(condition: JournalCondition, entries: Iterable[Entry]) -> tuple[Entry, ...]:
     """What of a journal's entries a machine may go by: all where it is reliable, little where it is short."""
     if condition.is_reliable:
         return tuple(entries)
-    return tuple(entry for entry in entries if entry.get("record") in _STILL_COUNTS and not condition.is_foreign)
+    return () if condition.is_foreign else tuple(one.entry for one in records_in(entries, *_STILL_COUNTS))
+
+
+def condition_of(
+    condition: JournalCondition, entries: Iterable[Entry], types: RecordTypes, name: str
+) -> JournalCondition:
+    """``condition``, or SHORT where a record of a known type has not its form: what it said is missing.
+
+    ``types``: beside the core's; ``name`` is how a person finds the journal.
+    """
+    why = misshapen(entries, (*CORE_RECORDS, *types)) if condition.is_reliable else ""
+    return JournalCondition(JournalState.SHORT, 1, 0, f"{name}: {why}") if why else condition

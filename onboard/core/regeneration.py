@@ -6,7 +6,7 @@ hears that it counts (somebody lives in the new epoch) or that it does not (some
 """
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,8 +14,10 @@ from onboard.core.authority import TokenBook, TokenKey, may_exist
 from onboard.core.belief import Belief
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason, RegenerationPhase, TokenKind
 from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.journal_records import Entry, records_in
 from onboard.core.messages import Heartbeat, Message, TokenHeld
 from onboard.core.mirror import Mirror
+from onboard.core.records import AssignedRecord, EpochRecord, ReadBackRecord, TokenGoneRecord, TokenHeldRecord
 from onboard.core.recovery_messages import (
     Regeneration,
     RegenerationState,
@@ -76,25 +78,19 @@ class Regenerating:
         """Handler by message class."""
         return {Regeneration: self.on_word, TokenAssigned: self.on_assigned}
 
-    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+    def replay(self, entries: Iterable[Entry]) -> None:
         """The epoch, and a list that was read back and of which nobody said yet whether it counts."""
         known: dict[int, dict[TokenKey, TokenAssigned]] = {}
-        for entry in entries:
-            match entry.get("record"):
-                case "assigned":
-                    one = TokenAssigned(
-                        NOBODY,
-                        TokenKind(int(entry["kind"])),
-                        int(entry["number"]),
-                        int(entry["version"]),
-                        int(entry["holder"]),
-                    )
-                    known.setdefault(int(entry["epoch"]), {})[TokenKey(one.token_kind, one.token)] = one
-                case "read_back":
-                    self._next, self._lost = int(entry["epoch"]), int(entry["lost"])
+        for record in records_in(entries, AssignedRecord, ReadBackRecord, EpochRecord):
+            match record:
+                case AssignedRecord():
+                    one = TokenAssigned(NOBODY, record.kind, record.number, record.version, record.holder)
+                    known.setdefault(record.epoch, {})[TokenKey(one.token_kind, one.token)] = one
+                case ReadBackRecord():
+                    self._next, self._lost = record.epoch, record.lost
                     self._list, self.phase = known.get(self._next, {}), RegenerationPhase.READ_BACK
-                case "epoch":
-                    self.epoch, self.phase = int(entry["epoch"]), RegenerationPhase.NONE
+                case EpochRecord():
+                    self.epoch, self.phase = record.epoch, RegenerationPhase.NONE
 
     # --- words -------------------------------------------------------------------------------------------------
 
@@ -206,20 +202,20 @@ class Regenerating:
             return [state]
         self.phase = RegenerationPhase.READ_BACK
         lines = [self._line(one) for one in self._list.values()]
-        return [*lines, Record({"record": "read_back", "epoch": self._next, "lost": self._lost}), state]
+        return [*lines, Record(ReadBackRecord(self._next, self._lost)), state]
 
     def _commit(self, now_us: int) -> list[Effect]:
         effects = self._take_up()
         self.mirror.takes_over({key for key, one in self._list.items() if one.holder == self.node_id})
         self.epoch, self.phase = self._next, RegenerationPhase.NONE
         self.tokens.changes += 1
-        effects.append(Record({"record": "epoch", "epoch": self.epoch}))
+        effects.append(Record(EpochRecord(self.epoch)))
         effects.append(self._state(RegenerationPhase.COMMIT, 0, 0))
         return [*effects, *self.on_end(self._lost, now_us)]
 
     def _give_up(self, why: str, now_us: int) -> list[Effect]:
         # The journal says the epoch once more: what was read back is over.
-        record: list[Effect] = [Record({"record": "epoch", "epoch": self.epoch})] if self.is_kept else []
+        record: list[Effect] = [Record(EpochRecord(self.epoch))] if self.is_kept else []
         self.phase, self._say_us = RegenerationPhase.NONE, None
         return [*record, Report(f"nothing has changed: {why}"), *self.on_end(NOBODY, now_us)]
 
@@ -258,13 +254,11 @@ class Regenerating:
             book.forget(key)
         else:
             book.given[key] = Belief(version, holder, confirmed=True)
-        record = "token_held" if is_mine else "token_gone"
-        entry = {"kind": int(key.kind), "number": key.number, "version": version, "holder": holder}
-        return [Record({"record": record, **entry})]
+        record = TokenHeldRecord if is_mine else TokenGoneRecord
+        return [Record(record(key.kind, key.number, version, holder))]
 
     def _line(self, one: TokenAssigned) -> Effect:
-        entry: dict[str, str | int] = {"record": "assigned", "epoch": self._next, "kind": int(one.token_kind)}
-        return Record({**entry, "number": one.token, "version": one.version, "holder": one.holder})
+        return Record(AssignedRecord(self._next, one.token_kind, one.token, one.version, one.holder))
 
     def slots(self) -> tuple[Segment, ...]:
         """Segments that the list gives to this node."""

@@ -1,6 +1,6 @@
 """Serial-number arithmetic for counters and times that wrap (RFC 1982)."""
 
-from collections.abc import Iterable, Mapping
+from onboard.contract.base import Stamp
 
 #: Bus time on the wire is in milliseconds modulo this.
 BUS_MS_MODULUS = 1 << 32
@@ -31,6 +31,15 @@ def ms_after(bus_ms: int, other_ms: int) -> int:
     return away(bus_ms, other_ms, BUS_MS_MODULUS)
 
 
+def ranks_before(one: Stamp, other: Stamp) -> bool:
+    """Whether ``one`` plan keeps its windows before the ``other``; of two that differ always exactly one does."""
+    after_ms = ms_after(one.award_ms, other.award_ms)
+    if after_ms == ms_after(other.award_ms, one.award_ms):
+        # The same time, or half the way round, where nobody can say which came first.
+        return one < other
+    return after_ms < 0
+
+
 def away(value: int, other: int, modulus: int) -> int:
     """``value`` - ``other`` by the shorter way round, from -``modulus`` / 2 to one less than its half (RFC 1982)."""
     half = modulus >> 1
@@ -46,17 +55,3 @@ def from_bus_ms(bus_ms: int, near_us: int) -> int:
     """The bus time in us nearest to ``near_us`` that reads ``bus_ms`` on the wire (within 24.8 days of it)."""
     near_ms = near_us // 1000
     return (near_ms + ms_after(bus_ms, near_ms)) * 1000
-
-
-def last_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
-    """The boot counter last journalled, 1 to 255; 0 where there is none."""
-    last = 0
-    for entry in entries:
-        if entry.get("record") == "boot":
-            last = int(entry["boot"])
-    return last
-
-
-def next_boot(entries: Iterable[Mapping[str, str | int]]) -> int:
-    """The boot counter after the last one journalled, 1 to 255, going round."""
-    return successor(last_boot(entries), 8)

@@ -92,6 +92,8 @@ class Site:
     system: ClassVar[str] = ""
     #: Whether rights can be made anew one by one: only where it is known whose each right is, and what stands where.
     has_regeneration: ClassVar[bool] = False
+    #: Why a person cannot hold one machine by itself; empty where that can be.
+    no_hold: ClassVar[str] = ""
     #: Names of the fields that say what comes to the site in a run of the simulator. No machine knows them, so they are
     #: not in the digest.
     demand: ClassVar[frozenset[str]] = frozenset()

@@ -7,16 +7,17 @@ from onboard.core.messages import CallForProposals, CarAt, ManualState, Message,
 from onboard.core.site import Site
 from onboard.gateway.actions import InstantActions
 from onboard.gateway.dialect import Json, timestamp
+from onboard.gateway.edge import edge_of
 from onboard.gateway.factsheet import MOST_ID
 from onboard.gateway.inbox import Inbox, Incoming
-from onboard.gateway.order import Life, Order
+from onboard.gateway.order import Order
 from onboard.gateway.orders import Orders, Outcome, name_of
 from onboard.gateway.pauses import MODES, Closed, Pauses
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
+from onboard.gateway.records import Life
 from onboard.gateway.reports import Reports
 from onboard.gateway.settings import level
 from onboard.gateway.state import Subject
-from onboard.gateway.wishes import wishes_of
 from onboard.ports.broker import Publication
 
 #: Publications that wait to be judged; of more the newest is counted and stays with the broker until the next session.
@@ -48,7 +49,7 @@ class OrderDesk:
         settings, fleet = publisher.settings, publisher.fleet
         assert settings.node_id is not None, "who only listens takes no orders"
         self.inbox = Inbox(settings.dialect, publisher.root, settings.manufacturer)
-        wishes = wishes_of(site, fleet.picture.view, fleet.place)
+        wishes = edge_of(site).wishes(fleet.picture.view, fleet.place)
         seed = (settings.epoch_us + now_us) // 1_000_000
         self.orders = Orders(site, wishes, settings.node_id, reports.others, now_us=now_us, seed=seed)
         reports.keep = self.orders.entries

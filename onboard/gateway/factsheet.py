@@ -4,14 +4,10 @@ A site file names no width and no height of a carrier: they are told as 0, which
 no masses or speeds tells them as 0 as well.
 """
 
-from dataclasses import dataclass
-
 from onboard.core.site import Machine, Site
 from onboard.gateway.dialect import Dialect, Json
+from onboard.gateway.edge import edge_of
 from onboard.gateway.settings import GatewaySettings
-from onboard.systems.car_park.site import CarPark
-from onboard.systems.graph.site import FactoryGraph
-from onboard.systems.mapd.site import Mapd
 
 #: Largest payload taken, bytes; see onboard/gateway/inbox.
 MOST_BYTES = 65_536
@@ -19,19 +15,11 @@ MOST_BYTES = 65_536
 MOST_ID, MOST_ACTIONS = 64, 8
 
 
-@dataclass(frozen=True, slots=True)
-class _Body:
-    """Speed m/s, acceleration m/s^2, length m, most load kg; 0 where the site file is silent."""
-
-    speed: float = 0.0
-    acceleration: float = 0.0
-    length: float = 0.0
-    load: float = 0.0
-
-
 def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewaySettings) -> Json:
     """The body of a `factsheet` message, in the keys of the version."""
-    body, takes_orders = _body(site), isinstance(site, FactoryGraph)
+    edge = edge_of(site)
+    body, takes_orders = edge.body(), edge.takes_visits
+    actions = _actions(dialect, site, takes_orders=takes_orders)
     kinematic, navigation = (
         ("DIFFERENTIAL", "VIRTUAL_LINE_GUIDED") if dialect.is_third else ("DIFF", "VIRTUAL_LINE_GUIDED")
     )
@@ -65,45 +53,22 @@ def factsheet(dialect: Dialect, site: Site, machine: Machine, settings: GatewayS
                 "visualizationInterval": settings.visualization_us / 1e6,
             },
         },
-        "protocolFeatures": {"optionalParameters": [], "agvActions": _actions(dialect, site)},
+        "protocolFeatures": {"optionalParameters": [], "agvActions": actions},
         "agvGeometry": {},
-        "loadSpecification": _loads(site),
+        "loadSpecification": edge.loads(),
     }
     renamed: Json = dialect.renamed(told)
     return renamed
 
 
-def _body(site: Site) -> _Body:
-    if isinstance(site, CarPark):
-        axis = site.carrier
-        return _Body(
-            axis.speed_mm_s / 1000,
-            axis.acceleration_mm_s2 / 1000,
-            site.carrier_length_mm / 1000,
-            float(site.cars.max_load_kg),
-        )
-    if isinstance(site, FactoryGraph):
-        return _Body(speed=site.speed_mm_s / 1000)
-    return _Body()
-
-
-def _loads(site: Site) -> Json:
-    if not isinstance(site, CarPark):
-        return {}
-    limits = site.cars
-    dimensions = {"length": limits.max_length_mm / 1000, "width": 0.0, "height": limits.max_height_mm / 1000}
-    one = {"setName": "car", "loadType": "car", "loadDimensions": dimensions, "maxWeight": float(limits.max_load_kg)}
-    return {"loadSets": [one]}
-
-
-def _actions(dialect: Dialect, site: Site) -> list[Json]:
+def _actions(dialect: Dialect, site: Site, *, takes_orders: bool) -> list[Json]:
     """Instant actions that are carried out, and what machines do by themselves."""
     found = [_action(dialect, "stateRequest", "a state is told at once")]
     found.append(_action(dialect, "factsheetRequest", "the factsheet is told again"))
-    if not isinstance(site, Mapd):
+    if not site.no_hold:
         found.append(_action(dialect, "startPause", "held: comes to rest where its rights end, and stands"))
         found.append(_action(dialect, "stopPause", "goes on with the same task"))
-    if isinstance(site, FactoryGraph):
+    if takes_orders:
         found.append(_action(dialect, "cancelOrder", "ends its edge and does nothing more for the order"))
     return found
 

@@ -12,11 +12,10 @@ from onboard.core.codes import CallResult, KindCode, Operation, Reason, TaskPhas
 from onboard.core.messages import Award, CallForProposals, Heartbeat, Message, Progress, Reference, TaskReport
 from onboard.core.site import Segment, Site
 from onboard.gateway.dialect import Json, timestamp
+from onboard.gateway.edge import edge_of
 from onboard.gateway.machines import TRAVELLERS
 from onboard.gateway.settings import GatewaySettings
 from onboard.gateway.state import reference_text
-from onboard.systems.graph.site import FactoryGraph
-from onboard.systems.terminal.site import Terminal
 from onboard.trace.view import CallRecord
 from onboard.trace.words import Words
 from onboard.ways.site import way_site
@@ -46,6 +45,7 @@ class FleetTopics:
         self.picture = LivePicture(site)
         self._epoch_us = settings.epoch_us
         self._words = Words(site)
+        self._edge = edge_of(site)
         self._hour: int | None = None
 
     def set_epoch(self, epoch_us: int) -> None:
@@ -106,12 +106,8 @@ class FleetTopics:
         return told
 
     def place(self, number: int) -> str | None:
-        """A station as the site's own topics name it: a node of a graph, an entity of a terminal, a place."""
-        if isinstance(self.site, FactoryGraph):
-            return str(number)
-        if isinstance(self.site, Terminal):
-            return self.site.entities[number].name if number in self.site.entities else None
-        return self._words.station(number)
+        """A station as the site's own topics name it."""
+        return self._edge.place(number)
 
     def operation_of(self, reference: Reference) -> Operation | None:
         """What a task asks for, where its call was heard."""
@@ -144,8 +140,13 @@ class FleetTopics:
             yield "task", self.task(report.task, now_us) | extra | _coded(report.reason)
 
     def _call(self, record: CallRecord) -> Json:
-        where = {"from": self.place(record.call.from_station), "to": self.place(record.call.to_station)}
-        return self.picture.call(record) | where
+        call = record.call
+        return self.picture.call(record) | {
+            "task": reference_text(call.task),
+            "car": reference_text(call.car) if call.car.number else None,
+            "from": self.place(call.from_station),
+            "to": self.place(call.to_station),
+        }
 
     def _phase(self, message: Message) -> TaskPhase | None:
         record = self.picture.view.tasks.get(message.task) if isinstance(message, TaskReport) else None

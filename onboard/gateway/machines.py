@@ -28,7 +28,8 @@ from onboard.core.messages import (
 )
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Segment, Site
-from onboard.gateway.whereabouts import Tracker, Whereabouts, tracker_of
+from onboard.gateway.edge import edge_of
+from onboard.gateway.whereabouts import Tracker, Whereabouts
 
 #: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/core/presence.py).
 SILENT_BEATS = 3
@@ -90,7 +91,7 @@ class Machines:
     def __post_init__(self) -> None:
         mobile = sorted(node for node, one in self.site.machines.items() if one.kind in TRAVELLERS)
         self.bodies = {node: Body(self.site.machines[node]) for node in mobile}
-        self._tracker = tracker_of(self.site)
+        self._tracker = edge_of(self.site).tracker()
 
     def where(self, node_id: int) -> Whereabouts:
         """Where a mobile machine is."""

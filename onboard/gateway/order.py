@@ -2,27 +2,10 @@
 
 import zlib
 from dataclasses import dataclass, replace
-from enum import Enum
 
 from onboard.core.messages import Reference
+from onboard.gateway.records import Life, WishRecord
 from onboard.ports.journal import Entry
-
-
-class Life(Enum):
-    """Where an order is (docs/mqtt.md). ACCEPTED is durable; CALLED and what follows is heard on the bus."""
-
-    ACCEPTED = "accepted"
-    CALLED = "called"
-    AWARDED = "awarded"
-    MOVING = "moving"
-    DONE = "done"
-    REFUSED = "refused"
-
-    @property
-    def is_over(self) -> bool:
-        """Whether nothing follows."""
-        return self in (Life.DONE, Life.REFUSED)
-
 
 #: In the order in which they come; an order never goes back but to CALLED, when it is called again.
 RANK = {life: rank for rank, life in enumerate(Life)}
@@ -75,63 +58,57 @@ class Order:
     def entry(self) -> Entry:
         """The whole order, for the journal; the newest record of a name counts."""
         wish = self.wish
-        found: dict[str, str | int] = {
-            "record": "order",
-            "name": self.name,
-            "what": wish.what,
-            "node": wish.node,
-            "stops": _words(wish.stops),
-            "ahead": ",".join(_words(stops) for stops in self.ahead),
-            "base": wish.base[0],
-            "sequence": wish.base[1],
-            "open": int(wish.is_open),
-            "cancelled": int(self.is_cancelled),
-            "number": wish.number,
-            "urgent": int(wish.urgent),
-            "content": self.content,
-            "update": self.update,
-            "life": self.life.value,
-            "reason": self.reason,
-            "why": self.why,
-            "owner": self.owner,
-            "said": int(self.was_said),
-        }
-        for key, one in (("car", wish.car), ("task", self.task)):
-            if one is not None:
-                found |= {f"{key}_origin": one.origin, key: one.number}
-        if self.before_us is not None:
-            found["before_us"] = self.before_us
-        return found
+        return WishRecord(
+            self.name,
+            wish.what,
+            wish.node,
+            wish.stops,
+            wish.number,
+            wish.urgent,
+            self.content,
+            self.update,
+            self.life,
+            self.reason,
+            self.why,
+            self.owner,
+            self.was_said,
+            ahead=",".join(_words(stops) for stops in self.ahead),
+            base=wish.base[0],
+            sequence=wish.base[1],
+            open=wish.is_open,
+            cancelled=self.is_cancelled,
+            car=wish.car,
+            task=self.task,
+            before_us=self.before_us,
+        ).entry
 
 
-def read_order(entry: Entry) -> Order:
+def order_of(record: WishRecord) -> Order:
     """Inverse of ``Order.entry``."""
-    ahead = str(entry.get("ahead", ""))
     wish = Wish(
-        str(entry["what"]),
-        int(entry["node"]),
-        _reference(entry, "car"),
-        _numbers(entry["stops"]),
-        int(entry["number"]),
-        bool(entry["urgent"]),
-        (str(entry.get("base", "")), int(entry.get("sequence", 0))),
-        bool(entry.get("open", 0)),
+        record.what,
+        record.node,
+        record.car,
+        record.stops,
+        record.number,
+        record.urgent,
+        (record.base, record.sequence),
+        record.open,
     )
-    before = int(entry["before_us"]) if "before_us" in entry else None
     return Order(
-        str(entry["name"]),
+        record.name,
         wish,
-        int(entry["content"]),
-        before,
-        int(entry["update"]),
-        Life(str(entry["life"])),
-        str(entry["reason"]),
-        str(entry["why"]),
-        _reference(entry, "task"),
-        int(entry["owner"]),
-        bool(entry["said"]),
-        ahead=tuple(_numbers(stops) for stops in ahead.split(",")) if ahead else (),
-        is_cancelled=bool(entry.get("cancelled", 0)),
+        record.content,
+        record.before_us,
+        record.update,
+        record.life,
+        record.reason,
+        record.why,
+        record.task,
+        record.owner,
+        record.said,
+        ahead=tuple(_numbers(stops) for stops in record.ahead.split(",")) if record.ahead else (),
+        is_cancelled=record.cancelled,
     )
 
 
@@ -149,9 +126,5 @@ def _words(stops: tuple[int, ...]) -> str:
     return " ".join(str(stop) for stop in stops)
 
 
-def _numbers(words: str | int) -> tuple[int, ...]:
-    return tuple(int(one) for one in str(words).split())
-
-
-def _reference(entry: Entry, key: str) -> Reference | None:
-    return Reference(int(entry[f"{key}_origin"]), int(entry[key])) if key in entry else None
+def _numbers(words: str) -> tuple[int, ...]:
+    return tuple(int(one) for one in words.split())

@@ -12,11 +12,13 @@ from datetime import datetime
 from typing import Any
 
 from onboard.core.codes import TaskPhase
+from onboard.core.journal_records import records_in
 from onboard.core.messages import Message, Reference, TaskReport
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Site
 from onboard.gateway.inbox import Incoming
-from onboard.gateway.order import RANK, Life, Order, Wish, read_order, same_content, with_number
+from onboard.gateway.order import RANK, Order, Wish, order_of, same_content, with_number
+from onboard.gateway.records import Life, WishRecord
 from onboard.gateway.schema import TRANSPORT
 from onboard.gateway.wishes import LISTEN_US, RefusedError, Wishes, is_robot
 from onboard.ports.journal import Entry
@@ -64,12 +66,11 @@ class Orders:
         self._asked = False
         self._ready_us = now_us + LISTEN_US
         numbers: list[int] = []
-        for entry in entries:
-            if entry.get("record") == "order":
-                order = read_order(entry)
-                self.book.pop(order.name, None)
-                self.book[order.name] = order
-                numbers += [order.wish.number] if order.wish.number else []
+        for record in records_in(entries, WishRecord):
+            order = order_of(record)
+            self.book.pop(order.name, None)
+            self.book[order.name] = order
+            numbers += [order.wish.number] if order.wish.number else []
         for place, number in enumerate(numbers):
             # The newest by serial arithmetic, for an older order may have been written about last.
             self._number = number if not place or is_newer(number, self._number, 16) else self._number

@@ -9,6 +9,8 @@ import base64
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator
 
+from onboard.core.journal_records import records_in
+from onboard.gateway.records import DeliveredRecord, ReportRecord
 from onboard.ports.broker import Publication
 from onboard.ports.journal import Entry, Journal
 
@@ -37,11 +39,10 @@ class Reports:
         self._kept = 0
         for entry in journal.replay():
             self._records += 1
-            name = str(entry.get("name", ""))
-            match entry.get("record"):
-                case "report":
-                    self._take(name, _publication(entry))
-                case "delivered":
+            match next(records_in([entry], ReportRecord, DeliveredRecord), None):
+                case ReportRecord() as report:
+                    self._take(report.name, _publication(report))
+                case DeliveredRecord(name=name):
                     self._done(name)
                 case _:
                     self.others.append(entry)
@@ -61,7 +62,7 @@ class Reports:
     async def delivered(self, name: str) -> None:
         """The broker has it. Raises ``OSError``: it may then be sent again after a restart."""
         self._done(name)
-        await self.append({"record": "delivered", "name": name})
+        await self.append(DeliveredRecord(name).entry)
 
     async def append(self, entry: Entry) -> None:
         """One more record, and the journal anew where it has grown too long. Raises ``OSError``."""
@@ -76,7 +77,7 @@ class Reports:
         """What counts, oldest first."""
         yield from self.keep()
         for name in self._known:
-            yield {"record": "delivered", "name": name}
+            yield DeliveredRecord(name).entry
         for name, publication in self.pending.items():
             yield _entry(name, publication)
 
@@ -95,15 +96,8 @@ class Reports:
 
 def _entry(name: str, publication: Publication) -> Entry:
     payload = base64.b64encode(publication.payload).decode()
-    return {
-        "record": "report",
-        "name": name,
-        "topic": publication.topic,
-        "payload": payload,
-        "retain": int(publication.retain),
-    }
+    return ReportRecord(name, publication.topic, payload, publication.retain).entry
 
 
-def _publication(entry: Entry) -> Publication:
-    payload = base64.b64decode(str(entry["payload"]))
-    return Publication(str(entry["topic"]), payload, 1, bool(entry["retain"]))
+def _publication(record: ReportRecord) -> Publication:
+    return Publication(record.topic, base64.b64decode(record.payload), 1, record.retain)

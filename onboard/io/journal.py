@@ -56,6 +56,11 @@ class FileJournal:
         self._closed = False
 
     @property
+    def name(self) -> str:
+        """How a person finds it."""
+        return str(self._path)
+
+    @property
     def size_bytes(self) -> int:
         """Length of the file, 0 where there is none yet."""
         return self._tail.end if self._tail is not None else 0

@@ -39,7 +39,7 @@ class OpenBus(Bus, Protocol):
 
 def add_site_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what every program needs that joins the bus of a site: the site file, and the bus."""
-    parser.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    parser.add_argument("--site", type=Path, required=True, metavar="SITE", help="site file, or a shipped site's name")
     add_bus_arguments(parser)
 
 

@@ -26,6 +26,7 @@ from dataclasses import dataclass, field
 from hashlib import blake2s
 from typing import NamedTuple
 
+from onboard.core.journal_records import JournalRecord, records_in
 from onboard.core.journal_state import JournalCondition, JournalState
 from onboard.ports.journal import Entry
 
@@ -47,6 +48,16 @@ class Line(NamedTuple):
     entry: Entry
     link: bytes
     text: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class HeadRecord(JournalRecord):
+    """The line before the first record: whose journal this is, and which."""
+
+    NAME = "journal"
+
+    owner: str
+    identity: str
 
 
 class Seal(NamedTuple):
@@ -143,7 +154,7 @@ def read(content: bytes, owner: str, name: str) -> Reading:
         return _refused([], JournalState.FOREIGN, 0, f"{name}: this is the journal of {found}, not of {owner}")
     if seal is None:
         return _refused(entries, JournalState.SHORT, None, f"{name}: {_UNREADABLE}: nobody knows what is missing")
-    if lines and str(lines[0].entry.get("identity")) != seal.identity:
+    if lines and _said(lines[0]).identity != seal.identity:
         return _refused([], JournalState.FOREIGN, 0, f"{name}: seal and records are of two journals")
     return _compare(content, seal, lines, name)
 
@@ -180,7 +191,7 @@ def _refused(entries: list[Entry], state: JournalState, missing: int | None, why
 
 def _other_owner(seal: Seal | None, lines: list[Line], owner: str) -> str | None:
     owners = [seal.owner] if seal is not None else []
-    owners += [str(line.entry.get("owner")) for line in lines[:1]]
+    owners += [_said(line).owner for line in lines[:1]]
     return next((one for one in owners if one != owner), None)
 
 
@@ -221,8 +232,13 @@ def _checked(text: bytes, number: int, before: bytes) -> Line | None:
     return Line(number, entry, fields[0], text)
 
 
+def _said(head: Line) -> HeadRecord:
+    """What the first line says; of one that is no head, nobody's."""
+    return next(records_in([head.entry], HeadRecord), HeadRecord("nobody", ""))
+
+
 def _head(owner: str, identity: str) -> Line:
-    entry: Entry = {"record": "journal", "owner": owner, "identity": identity}
+    entry = HeadRecord(owner, identity).entry
     text = _line(b"", 0, _json(entry))
     return Line(0, entry, text[:_LINK_CHARS], text)
 

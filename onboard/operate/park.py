@@ -6,7 +6,8 @@ from onboard.core.codes import CONTRACT_VERSION, MAX_NODE_ID, NOBODY, MachineSta
 from onboard.core.messages import Blocked, Clear, Diagnostic, EmergencyStop, Heartbeat, ManualState, Message
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Segment, Site
-from onboard.gateway.whereabouts import Tracker, tracker_of
+from onboard.gateway.edge import edge_of
+from onboard.gateway.whereabouts import Tracker
 
 #: Heartbeats missed before a machine counts as silent, as the machines themselves count (onboard/core/mirror.py).
 SILENT_BEATS = 3
@@ -48,7 +49,7 @@ class Park:
 
     def __post_init__(self) -> None:
         self.machines = {node: Known(machine) for node, machine in self.site.machines.items()}
-        self._tracker = tracker_of(self.site)
+        self._tracker = edge_of(self.site).tracker()
 
     def feed(self, message: Message, now_us: int) -> None:
         """Take up one message."""

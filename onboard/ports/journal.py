@@ -1,12 +1,13 @@
 """What a controller needs of durable storage."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
+from onboard.core import journal_records
 from onboard.core.journal_state import JournalCondition
 
-#: One journal entry: a flat record of plain values, ``record`` naming its type.
-Entry = Mapping[str, str | int]
+#: One journal entry: a flat record of plain values.
+Entry = journal_records.Entry
 #: Entries in, fewer entries that mean the same out.
 Compaction = Callable[[list[Entry]], list[Entry]]
 

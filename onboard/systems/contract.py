@@ -7,6 +7,5 @@ from onboard.wire.codec import Codecs, codecs
 
 def codecs_for(site: Site | None) -> Codecs:
     """Both codecs of a site; without one those of what every system says. No machine of the system is loaded."""
-    system = site.system if site is not None else ""
-    module = part(system, "messages") if system else None
-    return codecs(system, module.MESSAGES if module is not None else ())
+    module = part(site.system, "frames") if site is not None else None
+    return codecs(module.FRAMES if module is not None else ())

@@ -6,7 +6,7 @@ asked for: a board loads the machines of its own system and nothing of the other
 
 import importlib
 import pkgutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache, partial
 from importlib import metadata, util
 from types import ModuleType
@@ -14,9 +14,11 @@ from types import ModuleType
 from onboard import systems
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
+from onboard.core.journal_records import Entry
+from onboard.core.journal_state import JournalCondition, condition_of
 from onboard.core.site import Site
 from onboard.systems.system import System
-from onboard.work.compaction import Entry, compact
+from onboard.work.compaction import compact
 
 #: What a site file is that does not say: those of version 0.1 had no other system.
 FIRST_SYSTEM = "car-park"
@@ -88,3 +90,8 @@ def factory_for(site: Site, kind: KindCode) -> BehaviourFactory:
 def compaction_for(site: Site) -> Callable[[list[Entry]], list[Entry]]:
     """What a journal of this site may leave out: entries in, those that still mean something out."""
     return partial(compact, system_of(site).records)
+
+
+def condition_for(site: Site, found: JournalCondition, entries: Iterable[Entry], name: str) -> JournalCondition:
+    """The condition in which a journal of this site was ``found``, or SHORT where a record has not its form."""
+    return condition_of(found, entries, system_of(site).records, name)

@@ -102,7 +102,7 @@ class FleetIndicators:
             f"plans anew   {replans}   give-ways {self.give_ways}",
             f"promises     promised minus actual: {told if slack.count else 'none'}   ({slack.count})",
             f"robots       travelled {self.robots_travel_mm / 1e3:,.0f} m, {self.robots_empty_share:.0%} without a car",
-            "machine   with a task  riding driving handling standing    idle  travel m   empty  longest wait s",
+            "machine   busy riding driving handling standing   idle travel m empty max wait s",
         ]
         return text + [_line(machine) for machine in self.machines]
 
@@ -110,9 +110,9 @@ class FleetIndicators:
 def _line(machine: Utilisation) -> str:
     shares = (machine.riding, machine.driving, machine.handling, machine.standing, machine.idle)
     return (
-        f"{machine.machine:<9} {machine.with_task:>10.1%} "
-        + " ".join(f"{share:>7.1%}" if at else f"{share:>8.1%}" for at, share in enumerate(shares))
-        + f" {machine.travel_mm / 1000:>9,.0f} {machine.empty_share:>7.0%} {machine.longest_wait_s:>15.1f}"
+        f"{machine.machine:<8}{machine.with_task:>6.1%}"
+        + "".join(f"{share:>{width}.1%}" for share, width in zip(shares, (7, 8, 9, 9, 7), strict=True))
+        + f"{machine.travel_mm / 1000:>9,.0f}{machine.empty_share:>6.0%}{machine.longest_wait_s:>11.1f}"
     )
 
 

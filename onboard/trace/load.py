@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.site import Site
+from onboard.systems.registry import part
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.raw import RawFrame
 from onboard.trace.response import Bound, fifo_bounds, priority_bounds
-from onboard.trace.traffic import operation
 from onboard.wire.codec import Codecs
 
 _SECOND_US = 1_000_000
@@ -104,8 +104,14 @@ def _name(frame: RawFrame, codecs: Codecs) -> str:
 
 
 def bounds_of(site: Site) -> dict[str, tuple[int | None, int | None]]:
-    """Worst cases by message, us: of nodes with one queue in order, as ours are, and of nodes that send by priority."""
-    streams = operation(site)
+    """Worst cases by message, us: of nodes with one queue in order, as ours are, and of nodes that send by priority.
+
+    None where a system's folder does not say (``traffic.py``) what its machines may send at most.
+    """
+    traffic = part(site.system, "traffic")
+    if traffic is None:
+        return {}
+    streams = traffic.operation(site)
     in_order, by_priority = fifo_bounds(streams, site.bitrate), priority_bounds(streams, site.bitrate)
     names = dict.fromkeys(stream.name for stream in streams)
     return {name: (_greatest(in_order, name), _greatest(by_priority, name)) for name in names}

@@ -39,8 +39,8 @@ from onboard.core.messages import (
     Waiting,
 )
 from onboard.core.recovery_messages import Halted
-from onboard.core.site import Segment, Site, Station
-from onboard.ways.site import way_site
+from onboard.core.site import Segment, Site
+from onboard.systems.words import words_of
 
 _Key = TypeVar("_Key")
 _Record = TypeVar("_Record")
@@ -91,6 +91,8 @@ class TaskRecord:
     phase_us: dict[TaskPhase, int] = field(default_factory=dict)
     promised_ms: int | None = None
     depth: int = 0
+    #: What is carried or worked on; where no call told it, the task's own name.
+    load: Reference | None = None
     #: Whether its last call ended without a winner and was not opened again: until it is called once more.
     is_closed: bool = False
 
@@ -125,18 +127,14 @@ class SiteView:
         self.blocked: set[Segment] = set()
         #: Why each machine that does not act does not, by its own last word, or by a neighbour's.
         self.halts: dict[int, Halted] = {}
-        #: How people name what is carried or ordered, and what became of a task; systems other than the car park have
-        #: their own words.
-        self.thing: Callable[[Reference], str] = lambda reference: f"car {reference.number}"
-        self.task_end: Callable[[Reference, int], str] | None = None
+        self.words = words_of(site)
         self.events: deque[tuple[int, str]] = deque(maxlen=EVENT_LIMIT)
         for machine in site.machines.values():
             self.positions[machine.node_id] = (machine.home, 0)
 
     def name(self, node: int) -> str:
         """A machine's name, or its node-ID where the site has none for it."""
-        machine = self.site.machines.get(node)
-        return machine.name if machine is not None else f"node {node}"
+        return self.words.machine(node)
 
     def _on_halted(self, halted: Halted, time_us: int) -> None:
         before = self.halts.get(halted.machine)
@@ -144,13 +142,14 @@ class SiteView:
         what = halted.reason, halted.cause, halted.needs_person
         if before is not None and what == (before.reason, before.cause, before.needs_person):
             return
-        why = halted.reason.name.lower().replace("_", " ") + (f", by {self.name(halted.cause)}" if halted.cause else "")
+        why = self.words.reason(halted.reason) + (f", by {self.name(halted.cause)}" if halted.cause else "")
         person = "; a person must decide" if halted.needs_person else ""
         self.say(time_us, f"{self.name(halted.machine)} does not act: {why}{person}")
 
     def feed(self, message: Message, time_us: int) -> None:
         """Take up one message of the fleet bus."""
         self.now_us = time_us
+        self.words.hear(message)
         self.messages[type(message).__name__] += 1
         match message:
             case Heartbeat():
@@ -199,8 +198,7 @@ class SiteView:
         """What is said of one segment, or of a person's hand in a machine, in words."""
         if isinstance(message, ManualState):
             return f"{self.name(message.sender)} {_HANDS[message.manual_mode, message.at_rest]}"
-        where = Segment(message.track, message.index)
-        why = message.reason.name.lower().replace("_", " ")
+        where, why = self.words.slot(message.track, message.index), self.words.reason(message.reason)
         if isinstance(message, Waiting):
             blocker = f" of {self.name(message.blocker)}" if message.blocker else ""
             return f"{self.name(message.sender)} waits for {where}{blocker}: {why}"
@@ -234,8 +232,12 @@ class SiteView:
             self.tasks[call.task].depth = call.depth
         self.tasks[call.task].calls += 1
         self.tasks[call.task].is_closed = False
+        self.tasks[call.task].load = call.car
         _bound(self.calls, CALL_LIMIT, lambda record: record.result is not None)
-        self.say(time_us, f"{self.name(call.sender)} calls: {call.operation.name.lower()} {self.thing(call.car)}")
+        self.say(
+            time_us,
+            f"{self.name(call.sender)} calls: {self.words.operation(call.operation)} {self.words.thing(call.car)}",
+        )
 
     def open_task(self, reference: Reference, operation: Operation, time_us: int) -> bool:
         """A task is told for the first time, by a call or otherwise; False where it was known."""
@@ -264,7 +266,7 @@ class SiteView:
         record = self.calls.get((bid.initiator, bid.call))
         if record is not None:
             record.bids.append((time_us, bid.sender, bid.cost))
-            self.say(time_us, f"{self.name(bid.sender)} bids for {self.thing(record.call.car)}")
+            self.say(time_us, f"{self.name(bid.sender)} bids for {self.words.thing(record.call.car)}")
 
     def _on_award(self, award: Award, time_us: int) -> None:
         record = self.calls.get((award.sender, award.call))
@@ -286,9 +288,9 @@ class SiteView:
             task.owner = award.winner
             if record.call.criterion is Criterion.FINISH_TIME:
                 task.promised_ms = next((cost for _, node, cost in reversed(record.bids) if node == award.winner), None)
-            self.say(time_us, f"{self.name(award.winner)} wins {self.thing(record.call.car)}")
+            self.say(time_us, f"{self.name(award.winner)} wins {self.words.thing(record.call.car)}")
         else:
-            self.say(time_us, f"call for {self.thing(record.call.car)} ends: {award.result.name.lower()}")
+            self.say(time_us, f"call for {self.words.thing(record.call.car)} ends: {award.result.name.lower()}")
 
     def _on_report(self, report: TaskReport, time_us: int) -> None:
         task = self.tasks.get(report.task)
@@ -300,45 +302,19 @@ class SiteView:
             # Ordered by name, without a call.
             task.owner = report.sender
         task.phase_us.setdefault(report.phase, time_us)
-        if not first or report.phase not in _WORDS:
+        if not first:
             return
         if report.phase is TaskPhase.DONE:
             self.done += 1
             self.done_us += time_us - task.phase_us.get(TaskPhase.OPEN, time_us)
             self.parked += task.operation is Operation.PARK
             self.fetched += task.operation is Operation.RETRIEVE
-        where = self._station(report.station)
-        what = "parked" if task.operation is Operation.PARK else "fetched"
-        words = _WORDS[report.phase].format(what=what, where=where)
-        if self.task_end is not None:
-            words = _OTHER_WORDS[report.phase].format(thing=self.thing(report.task))
-            words = self.task_end(report.task, report.station) if report.phase is TaskPhase.DONE else words
-        self.say(time_us, f"{self.name(report.sender)} {words}")
-
-    def _station(self, number: int) -> str:
-        for node, station in way_site(self.site).compartments.items():
-            if station.number == number:
-                return self.name(node)
-        return str(Station.from_number(number)) if number not in (ANY_STATION, OUTSIDE) else "outside"
+        words = self.words.report(task.operation, report.phase, task.load or report.task, report.station)
+        if words:
+            self.say(time_us, f"{self.name(report.sender)} {words}")
 
 
 def _bound(records: dict[_Key, _Record], most: int, is_over: Callable[[_Record], bool]) -> None:
     """Drop the oldest that is over, else the oldest, where there are more than ``most``."""
     if len(records) > most:
         del records[next((key for key, record in records.items() if is_over(record)), next(iter(records)))]
-
-
-_WORDS = {
-    TaskPhase.LOADED: "has loaded the car at {where}",
-    TaskPhase.DONE: "has {what} the car: {where}",
-    TaskPhase.REFUSED: "refuses the car at {where}",
-    TaskPhase.FORFEITED: "gives the task up at {where}",
-}
-
-#: The same for tasks of other systems; what a task that is done came to, each says in its own words.
-_OTHER_WORDS = {
-    TaskPhase.LOADED: "has loaded {thing}",
-    TaskPhase.DONE: "",
-    TaskPhase.REFUSED: "refuses {thing}",
-    TaskPhase.FORFEITED: "gives {thing} up",
-}

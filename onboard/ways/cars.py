@@ -14,6 +14,7 @@ from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Record
 from onboard.core.messages import CarAt, Message, Reference
 from onboard.core.mirror import Mirror
+from onboard.core.records import RetiredRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Station
 from onboard.core.token_keys import TokenKey
@@ -111,18 +112,7 @@ class CarMirror(Mirror):
     def forgotten(self) -> list[Effect]:
         """Cars that left long ago, for the journal: what it has of them may go."""
         left, self._left = self._left, []
-        return [
-            Record(
-                {
-                    "record": "retired",
-                    "kind": int(TokenKind.CAR),
-                    "number": car_token(*car).number,
-                    "car_origin": car.origin,
-                    "car": car.number,
-                }
-            )
-            for car in left
-        ]
+        return [Record(RetiredRecord(TokenKind.CAR, car_token(*car).number, car)) for car in left]
 
     def is_laden(self, node: int) -> bool:
         """Whether a machine has a car aboard."""

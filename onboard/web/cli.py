@@ -41,7 +41,7 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "log", nargs="?", metavar="LOG", help="a log instead of a bus: candump -L, Vector ASC or pcapng"
     )
-    parser.add_argument("--site", type=Path, required=True, metavar="FILE", help="the site file")
+    parser.add_argument("--site", type=Path, required=True, metavar="SITE", help="site file, or a shipped site's name")
     parser.add_argument(
         "--web",
         default=f"127.0.0.1:{DEFAULT_PORT}",
@@ -78,6 +78,8 @@ def _read(film: Film, name: str) -> None:
     with Log(name, bar=sys.stderr) as log:
         try:
             film.read(log)
+        except LogOpenError:
+            raise
         except ValueError as error:
             raise WebError(f"{name}: {error}; name a log of this site") from error
         for line in log.faults.lines():

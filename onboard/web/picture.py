@@ -37,11 +37,8 @@ class LivePicture:
         self.site = site
         self.view = SiteView(site)
         self.scene = scene_of(site, self.view)
-        #: Whether cars are parked and fetched here: the indicators of robots and lifts are of such a site.
-        self.is_car_park = bool(way_site(site).tracks)
-        self.view.thing = self.scene.thing
-        if not self.is_car_park:
-            self.view.task_end = self.scene.task_end
+        #: Whether machines move along tracks here: the indicators of robots and lifts are of such a site.
+        self.has_tracks = bool(way_site(site).tracks)
         self.indicators = Indicators(site)
         self._heard: dict[int, int] = {}
         self._waits: dict[int, tuple[int, Waiting]] = {}
@@ -91,7 +88,7 @@ class LivePicture:
         view, passed_s = self.view, (time_us - self._sampled_us) / 1e6
         load = (self._bits - self._bits_sampled) / self.site.bitrate / passed_s
         waiting = sum(task.is_waiting for task in view.tasks.values())
-        ends = [view.parked, view.fetched] if self.is_car_park else [view.done]
+        ends = [view.parked, view.fetched] if self.has_tracks else [view.done]
         self._samples.append([time_us / 1e6, round(load, 5), waiting, *ends])
         self._sampled_us, self._bits_sampled = time_us, self._bits
 
@@ -104,9 +101,9 @@ class LivePicture:
             "site": site.name,
             "system": site.system,
             "bitrate": site.bitrate,
-            "noun": self.scene.noun,
+            "noun": self.view.words.noun,
             **self.scene.layout(),
-            "series": ["bus load", "open tasks", *(["parked", "fetched"] if self.is_car_park else ["done"])],
+            "series": ["bus load", "open tasks", *(["parked", "fetched"] if self.has_tracks else ["done"])],
             "machines": [
                 {
                     "node": machine.node_id,
@@ -122,7 +119,7 @@ class LivePicture:
     def snapshot(self) -> dict[str, Any]:
         """Everything that changes, as it is now."""
         view = self.view
-        ends = {"parked": view.parked, "fetched": view.fetched} if self.is_car_park else {"done": view.done}
+        ends = {"parked": view.parked, "fetched": view.fetched} if self.has_tracks else {"done": view.done}
         return {
             "now_us": view.now_us,
             "machines": {node: self._machine(node) for node in self.site.machines},
@@ -137,7 +134,7 @@ class LivePicture:
     def figures(self) -> dict[str, Any]:
         """The indicators up to now; dearer than a snapshot. Of other systems: mean times and messages a task."""
         view = self.view
-        if self.is_car_park:
+        if self.has_tracks:
             return self.indicators.figures(view.now_us).to_json()
         mean_s = view.done_us / view.done / 1e6 if view.done else None
         return {"mean_time_s": mean_s, "messages_per_task": self._frames / view.done if view.done else None}
@@ -150,7 +147,7 @@ class LivePicture:
             told["wait"] = {
                 "at": [wait[1].track, wait[1].index],
                 "for": view.name(wait[1].blocker) if wait[1].blocker else None,
-                "why": wait[1].reason.name.lower().replace("_", " "),
+                "why": view.words.reason(wait[1].reason),
                 "since_us": wait[0],
             }
         return told
@@ -168,12 +165,12 @@ class LivePicture:
         return {
             "id": f"{call.sender}.{call.call}",
             "by": view.name(call.sender),
-            "what": call.operation.name.lower().replace("_", " "),
-            "task": f"{call.task.origin}.{call.task.number}",
-            "car": f"{call.car.origin}.{call.car.number}" if call.car.number else None,
-            "thing": self.scene.thing(call.car) if call.car.number else None,
-            "from": self.scene.place(call.from_station),
-            "to": self.scene.place(call.to_station),
+            "what": view.words.operation(call.operation),
+            "task": view.words.reference(call.task),
+            "car": view.words.load(call.car) if call.car.number else None,
+            "thing": view.words.thing(call.car) if call.car.number else None,
+            "from": view.words.place(call.from_station),
+            "to": view.words.place(call.to_station),
             "opened_us": record.opened_us,
             "deadline_us": self._clock.log_us(call.deadline_ms, view.now_us),
             "attempt": call.attempt,
@@ -184,7 +181,7 @@ class LivePicture:
             "winner": view.name(record.winner) if record.winner else None,
             "result": record.result.name.lower() if record.result is not None else None,
             "won": record.result is CallResult.AWARDED,
-            **({"reason": record.reason.name.lower().replace("_", " ")} if record.reason is not Reason.NONE else {}),
+            **({"reason": view.words.reason(record.reason)} if record.reason is not Reason.NONE else {}),
         }
 
     def _cost(self, criterion: Criterion, cost: int) -> dict[str, Any]:
@@ -199,9 +196,9 @@ class LivePicture:
         view = self.view
         return [
             {
-                "task": f"{reference.origin}.{reference.number}",
+                "task": view.words.reference(reference),
                 "at": view.name(reference.origin),
-                "what": task.operation.name.lower(),
+                "what": view.words.operation(task.operation),
                 "phase": task.phase.name.lower(),
                 "owner": view.name(task.owner) if task.owner else None,
                 "since_us": task.phase_us.get(TaskPhase.OPEN, view.now_us),

@@ -113,6 +113,40 @@ def read_nodes(text: str) -> tuple[tuple[str, str], ...]:
     return tuple((node.name, node.comment or "") for node in _load(text).nodes)
 
 
+class Annotations(NamedTuple):
+    """What a DBC says for the generator of ``onboard/contract``, beside its layouts: tables, attributes, the order."""
+
+    version: int
+    tables: dict[str, tuple[tuple[int, str], ...]]
+    messages: dict[str, dict[str, str]]
+    signals: dict[tuple[str, str], dict[str, str]]
+    order: dict[str, tuple[str, ...]]
+
+
+def read_annotations(text: str) -> Annotations:
+    """Value tables by name, attributes by message and signal, and the signals of each message in the file's order."""
+    database = _load(text)
+    assert database.dbc is not None
+    return Annotations(
+        int(database.dbc.attributes["ContractVersion"].value),
+        {
+            name: tuple(sorted((value, str(word)) for value, word in choices.items()))
+            for name, choices in database.dbc.value_tables.items()
+        },
+        {message.name: _attributes(message) for message in database.messages},
+        {
+            (message.name, signal.name): _attributes(signal)
+            for message in database.messages
+            for signal in message.signals
+        },
+        {message.name: tuple(signal.name for signal in message.signals) for message in database.messages},
+    )
+
+
+def _attributes(of: DbcMessage | DbcSignal) -> dict[str, str]:
+    return {name: str(one.value) for name, one in of.dbc.attributes.items()} if of.dbc is not None else {}
+
+
 #: The node of a DBC that is a machine's controller on its own device bus: others do not hear what it says there.
 CONTROLLER = "Controller"
 

@@ -3,14 +3,26 @@
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
+from onboard.contract.base import SetFrame
 from onboard.core.codes import Grade, Reason
 from onboard.core.frame import Frame
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Reference, Stamp
+from onboard.core.messages import (
+    NO_REFERENCE,
+    Call,
+    CallForProposals,
+    CallLoad,
+    CallParent,
+    CallTerms,
+    Itinerary,
+    ItineraryHead,
+    ItineraryLeg,
+    Leg,
+    Message,
+)
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Machine
-from onboard.wire.codec import NO_WHEELBASE_MM, Codec, Part
+from onboard.wire.codec import NO_WHEELBASE_MM, Codec
 from onboard.wire.speakers import why_unheard
 
 #: A set whose frames do not all come within this is dropped, us. A set is sent in one go: milliseconds.
@@ -19,16 +31,16 @@ SET_TIMEOUT_US = 1_000_000
 #: node can take.
 MAX_SETS = 256
 
-_CALL_PARTS = frozenset({"Call", "CallTerms", "CallLoad", "CallParent"})
-_EVERY_CALLS_PARTS = _CALL_PARTS - {"CallParent"}
+#: Keys of a set: what it is, who says it, under which number.
+_Key = tuple[str, int, int]
 
 
 @dataclass
 class _Set:
-    """Frames of one set so far. For an itinerary ``parts`` is keyed by leg number, -1 for the head."""
+    """Frames of one set so far, by class, legs of an itinerary by their numbers."""
 
     started_us: int
-    parts: dict[str | int, tuple[Any, ...]] = field(default_factory=dict)
+    parts: dict[type[SetFrame] | int, SetFrame] = field(default_factory=dict)
 
 
 class Decoder:
@@ -39,9 +51,9 @@ class Decoder:
         self.drops: Counter[Reason] = Counter()
         self._codec = codec
         self._machines = machines
-        self._sets: dict[tuple[str, int, int], _Set] = {}
+        self._sets: dict[_Key, _Set] = {}
         #: Sets that were whole, from then on: what is said twice on a bus may come twice.
-        self._whole: dict[tuple[str, int, int], _Set] = {}
+        self._whole: dict[_Key, _Set] = {}
 
     def feed(self, frame: Frame, now_us: int) -> Message | None:
         """The message that this frame completes, if any. Never raises, whatever the frame."""
@@ -56,98 +68,81 @@ class Decoder:
 
     def _put_together(self, frame: Frame, now_us: int) -> Message | None:
         part = self._codec.decode_part(frame)
-        if isinstance(part, Message):
-            return part
         if isinstance(part, Reason):
             self.drops[part] += 1
             return None
+        if not isinstance(part, SetFrame):
+            return part
         if self._sets or self._whole:
             self._expire(now_us)
-        if part.name in _CALL_PARTS:
-            return self._feed_call(part, now_us)
-        return self._feed_itinerary(part, now_us)
+        match part:
+            case Call() | CallTerms() | CallLoad() | CallParent():
+                return self._feed_call(part, now_us)
+            case ItineraryHead():
+                return self._feed_head(part, now_us)
+            case ItineraryLeg():
+                return self._feed_leg(part, now_us)
+        return None
 
     @property
     def unfinished(self) -> int:
         """How many sets wait for more of their frames; at the end of a log they came to nothing."""
         return len(self._sets)
 
-    def _feed_call(self, part: Part, now_us: int) -> Message | None:
-        key = ("call", part.sender, part.values[0])
+    def _feed_call(self, part: Call | CallTerms | CallLoad | CallParent, now_us: int) -> Message | None:
+        key = ("call", part.sender, part.call)
         # Another call under this number, from a sender that has lost count: nothing of the older one may complete it.
-        self._drop_other(key, part.name, part.values)
-        if part.name != "Call" and self._is_repeat(key, part.name, part.values):
+        self._drop_other(key, type(part), part)
+        if not isinstance(part, Call) and self._is_repeat(key, type(part), part):
             return None
-        collected = self._open(key, now_us, begins=part.name == "Call")
-        collected.parts[part.name] = part.values
-        if not _is_whole_call(collected.parts):
-            return None
-        self._complete(key, now_us)
-        call, task_origin, task_number, operation, kind, criterion, attempt, depth, part_number = collected.parts[
-            "Call"
-        ]
-        _, deadline_ms, from_station = collected.parts["CallTerms"]
-        _, to_station, car_origin, car_number, wheelbase_mm = collected.parts["CallLoad"]
-        _, parent_origin, parent_number, ready_ms, hold_ms = collected.parts.get("CallParent", (call, 0, 0, 0, 0))
-        return CallForProposals(
-            part.sender,
-            call,
-            Reference(task_origin, task_number),
-            operation,
-            kind,
-            criterion,
-            attempt,
-            depth,
-            deadline_ms,
-            from_station,
-            to_station,
-            Reference(car_origin, car_number),
-            0 if wheelbase_mm == NO_WHEELBASE_MM else wheelbase_mm,
-            Reference(parent_origin, parent_number),
-            part_number,
-            ready_ms,
-            hold_ms,
-        )
+        collected = self._open(key, now_us, begins=isinstance(part, Call))
+        collected.parts[type(part)] = part
+        whole = _call(collected.parts)
+        if whole is not None:
+            self._complete(key, now_us)
+        return whole
 
-    def _feed_itinerary(self, part: Part, now_us: int) -> Message | None:
-        key = ("itinerary", part.sender, part.values[0])
-        if part.name == "ItineraryHead":
-            # Another head under this version begins the set anew: legs of the older one must not complete it.
-            self._drop_other(key, -1, part.values)
-            if part.values[1] is Grade.RELEASED and part.values[2]:
-                self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
-                return None
-            collected = self._open(key, now_us, begins=True)
-            collected.parts[-1] = part.values
-        else:
-            self._drop_other(key, part.values[2], part.values)
-            found = self._sets.get(key)
-            if found is None:
-                if not self._is_repeat(key, part.values[2], part.values):
-                    self.drops[Reason.INCOMPLETE_SET] += 1
-                return None
-            collected = found
-            collected.parts[part.values[2]] = part.values
-        version, grade, count, award_ms, initiator, call = collected.parts[-1]
-        if any(number not in collected.parts for number in range(count)):
+    def _feed_head(self, head: ItineraryHead, now_us: int) -> Message | None:
+        key = ("itinerary", head.sender, head.version)
+        # Another head under this version begins the set anew: legs of the older one must not complete it.
+        self._drop_other(key, ItineraryHead, head)
+        if head.grade is Grade.RELEASED and head.legs:
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             return None
-        self._complete(key, now_us)
-        legs = tuple(_leg(collected.parts[number], award_ms) for number in range(count))
-        return Itinerary(part.sender, version, grade, Stamp(award_ms, initiator, call), legs)
+        collected = self._open(key, now_us, begins=True)
+        collected.parts[ItineraryHead] = head
+        return self._itinerary(key, collected, now_us)
 
-    def _drop_other(self, key: tuple[str, int, int], name: str | int, values: tuple[Any, ...]) -> None:
+    def _feed_leg(self, leg: ItineraryLeg, now_us: int) -> Message | None:
+        key = ("itinerary", leg.sender, leg.version)
+        self._drop_other(key, leg.leg, leg)
+        collected = self._sets.get(key)
+        if collected is None:
+            if not self._is_repeat(key, leg.leg, leg):
+                self.drops[Reason.INCOMPLETE_SET] += 1
+            return None
+        collected.parts[leg.leg] = leg
+        return self._itinerary(key, collected, now_us)
+
+    def _itinerary(self, key: _Key, collected: _Set, now_us: int) -> Itinerary | None:
+        whole = _itinerary(collected.parts)
+        if whole is not None:
+            self._complete(key, now_us)
+        return whole
+
+    def _drop_other(self, key: _Key, place: type[SetFrame] | int, part: SetFrame) -> None:
         """Drop a set that holds this part with another content. A part that comes twice as it was is inert."""
         collected = self._sets.get(key)
-        if collected is not None and collected.parts.get(name, values) != values:
+        if collected is not None and collected.parts.get(place, part) != part:
             del self._sets[key]
             self.drops[Reason.INCOMPLETE_SET] += 1
 
-    def _is_repeat(self, key: tuple[str, int, int], name: str | int, values: tuple[Any, ...]) -> bool:
+    def _is_repeat(self, key: _Key, place: type[SetFrame] | int, part: SetFrame) -> bool:
         """Whether no set is open and the last whole one had this very part: doubled on the wire, or said again."""
         whole = self._whole.get(key)
-        return key not in self._sets and whole is not None and whole.parts.get(name) == values
+        return key not in self._sets and whole is not None and whole.parts.get(place) == part
 
-    def _open(self, key: tuple[str, int, int], now_us: int, *, begins: bool) -> _Set:
+    def _open(self, key: _Key, now_us: int, *, begins: bool) -> _Set:
         """The set of a frame. One that ``begins`` a set and comes again says that all of it is being sent again."""
         collected = self._sets.pop(key, None) if begins else self._sets.get(key)
         if collected is None:
@@ -166,7 +161,7 @@ class Decoder:
         del self._sets[next(key for key in self._sets if senders[key[1]] == most)]
         self.drops[Reason.INCOMPLETE_SET] += 1
 
-    def _complete(self, key: tuple[str, int, int], now_us: int) -> None:
+    def _complete(self, key: _Key, now_us: int) -> None:
         self._whole.pop(key, None)
         self._whole[key] = self._sets.pop(key)
         self._whole[key].started_us = now_us
@@ -182,18 +177,50 @@ class Decoder:
             del self._whole[next(iter(self._whole))]
 
 
-def _is_old(sets: dict[tuple[str, int, int], _Set], now_us: int) -> bool:
+def _is_old(sets: dict[_Key, _Set], now_us: int) -> bool:
     return now_us - sets[next(iter(sets))].started_us > SET_TIMEOUT_US
 
 
-def _is_whole_call(parts: dict[str | int, tuple[Any, ...]]) -> bool:
-    """Whether all frames are there: a sub-call, and no other, has the fourth."""
-    if not all(name in parts for name in _EVERY_CALLS_PARTS):
-        return False
-    depth = parts["Call"][7]
-    return depth == 0 or "CallParent" in parts
+def _call(parts: dict[type[SetFrame] | int, SetFrame]) -> CallForProposals | None:
+    """The call, where all its frames are there: a sub-call, and no other, has the fourth."""
+    call, terms, load, parent = (parts.get(one) for one in (Call, CallTerms, CallLoad, CallParent))
+    if not (isinstance(call, Call) and isinstance(terms, CallTerms) and isinstance(load, CallLoad)):
+        return None
+    if not isinstance(parent, CallParent):
+        if call.depth:
+            return None
+        parent = CallParent(call.sender, call.call, NO_REFERENCE, 0, 0)
+    return CallForProposals(
+        call.sender,
+        call.call,
+        call.task,
+        call.operation,
+        call.kind,
+        call.criterion,
+        call.attempt,
+        call.depth,
+        terms.deadline_ms,
+        terms.from_station,
+        load.to_station,
+        load.car,
+        0 if load.wheelbase_mm == NO_WHEELBASE_MM else load.wheelbase_mm,
+        parent.parent,
+        call.part,
+        parent.ready_ms,
+        parent.hold_ms,
+    )
 
 
-def _leg(values: tuple[Any, ...], award_ms: int) -> Leg:
-    _, action, _, side, track, from_index, to_index, end_ms = values
-    return Leg(action, track, from_index, to_index, side, (award_ms + end_ms) % BUS_MS_MODULUS)
+def _itinerary(parts: dict[type[SetFrame] | int, SetFrame]) -> Itinerary | None:
+    """The itinerary, where its head and all legs that it tells of are there."""
+    head = parts.get(ItineraryHead)
+    if not isinstance(head, ItineraryHead):
+        return None
+    told = [parts.get(number) for number in range(head.legs)]
+    legs = tuple(_leg(leg, head.stamp.award_ms) for leg in told if isinstance(leg, ItineraryLeg))
+    return Itinerary(head.sender, head.version, head.grade, head.stamp, legs) if len(legs) == head.legs else None
+
+
+def _leg(leg: ItineraryLeg, award_ms: int) -> Leg:
+    end_ms = (award_ms + leg.end_ms) % BUS_MS_MODULUS
+    return Leg(leg.action, leg.track, leg.from_index, leg.to_index, leg.side, end_ms)

@@ -2,10 +2,10 @@
 
 from collections.abc import Iterable, Mapping
 
+from onboard.contract.base import FrameCode
 from onboard.core.codes import MAX_NODE_ID, KindCode, Reason
-from onboard.core.messages import CallForProposals, EmergencyStop, Itinerary, Message, Speakers
+from onboard.core.messages import EmergencyStop, Message, Speakers
 from onboard.core.site import Machine
-from onboard.wire.dbc_file import MessageLayout
 
 #: The node of the fleet contract that stands for people's tools and bridges to other buses.
 GATEWAY = "Gateway"
@@ -18,8 +18,6 @@ _ROLES: dict[KindCode, str] = {
 }
 #: What machines of all other kinds are there; in the contract of their system they go by their kind's name.
 _MACHINE = "Machine"
-#: The first frame of each message that travels as a set of frames.
-_SETS: dict[str, type[Message]] = {"Call": CallForProposals, "ItineraryHead": Itinerary}
 
 
 def is_in(kind: KindCode, nodes: Iterable[str]) -> bool:
@@ -43,12 +41,10 @@ def why_unheard(message: Message, machines: Mapping[int, Machine], speakers: Spe
     return Reason.NONE if kind in kinds else Reason.NOT_OF_KIND
 
 
-def speakers_of(layouts: Iterable[MessageLayout], classes: Mapping[str, type[Message]]) -> Speakers:
-    """By class of message the kinds that may say it; ``classes`` are those that travel as one frame, by DBC name."""
-    found: dict[type[Message], frozenset[KindCode]] = {}
-    for layout in layouts:
-        cls = _SETS.get(layout.name) or classes.get(layout.name)
-        if cls is not None:
-            kinds = (kind for kind in KindCode if kind is not KindCode.ANY and is_in(kind, layout.senders))
-            found[cls] = frozenset(kinds)
-    return found
+def speakers_of(frames: Iterable[FrameCode]) -> Speakers:
+    """By class of message the kinds that may say it."""
+    return {
+        one.says: frozenset(kind for kind in KindCode if kind is not KindCode.ANY and is_in(kind, one.senders))
+        for one in frames
+        if one.says is not None
+    }

@@ -5,12 +5,14 @@ rights, its load and its tasks stay its own. The order is in the journal: a mach
 started again, since whoever held it may stand before it.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import ManualMode
 from onboard.core.effects import Effect, Record, Send
+from onboard.core.journal_records import Entry, records_in
 from onboard.core.messages import ManualOrder, ManualState
+from onboard.core.records import ManualRecord
 
 
 @dataclass
@@ -29,12 +31,10 @@ class Manual:
         """Whether nobody has a hand in."""
         return self.mode is ManualMode.AUTOMATIC
 
-    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+    def replay(self, entries: Iterable[Entry]) -> None:
         """After a restart the machine is held if it was; a step by hand is not begun anew."""
-        for entry in entries:
-            if entry.get("record") == "manual":
-                self.mode = ManualMode(int(entry["mode"]))
-                self.number, self.by = int(entry["number"]), int(entry["by"])
+        for record in records_in(entries, ManualRecord):
+            self.mode, self.number, self.by = record.mode, record.number, record.by
         if self.mode is ManualMode.STEP:
             self.mode = ManualMode.HELD
 
@@ -51,8 +51,7 @@ class Manual:
             return []
         self.mode, self.by, self.number = order.manual_mode, order.sender, order.number
         self.at_rest = False
-        entry: dict[str, str | int] = {"record": "manual", "mode": int(self.mode), "by": self.by, "number": self.number}
-        return [Record(entry), self.told()]
+        return [Record(ManualRecord(self.mode, self.by, self.number)), self.told()]
 
     def rests(self, at_rest: bool) -> list[Effect]:
         """Note whether the machine stands and does nothing; it says so where that is news."""

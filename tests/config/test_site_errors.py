@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from bus_sim.sites import site_text
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site, parse_site
 from tests.config.support import TWO_FLOORS, changed, problems_of
@@ -76,7 +77,17 @@ ONE_MISTAKE = {
     "lift to no floor": (
         'end = "right"',
         'end = "right"\nfloors = []',
-        "s.toml:17: lifts[1].floors = []: not a rising row of floors; write each floor from the lowest to the highest",
+        "s.toml:17: lifts[1].floors = []: no floor at all; a lift stops at every floor of its shaft; write [1, 2]",
+    ),
+    "lift with its floors from the top": (
+        'end = "right"',
+        'end = "right"\nfloors = [2, 1]',
+        "s.toml:17: lifts[1].floors = [2, 1]: not from the lowest to the highest; write [1, 2]",
+    ),
+    "number of floors with decimals, and a floor of its own": (
+        "count = 2",
+        "count = 2.0\n2.positions = 9",
+        "s.toml:5: floors.count = 2.0: is a decimal number; write a whole number from 1 to 127",
     ),
     "no place": (
         "positions = 8",
@@ -124,7 +135,7 @@ ONE_MISTAKE = {
     "key twice": (
         "count = 2",
         "count = 2\ncount = 3",
-        "s.toml:6: not TOML: Cannot overwrite a value; correct the syntax there (https://toml.io)",
+        "s.toml:6: not TOML: Cannot overwrite a value; it is there above already; write it once, or [[NAME]] each time",
     ),
     "value that would break the line": (
         'home = "p(2,3)"',
@@ -179,3 +190,10 @@ def test_a_file_that_is_not_there_and_one_that_is_no_text(tmp_path: Path) -> Non
 
 def test_the_base_of_these_tests_is_in_order() -> None:
     assert parse_site(TWO_FLOORS, "s.toml").name == "two"
+
+
+def test_which_stewards_there_are_is_not_judged_where_the_floors_are_mistaken() -> None:
+    text = site_text("small").replace("count = 3", "count = 3.0")
+    with pytest.raises(ConfigError) as raised:
+        parse_site(text, "s.toml")
+    assert [problem.key for problem in raised.value.problems] == ["floors.count"]

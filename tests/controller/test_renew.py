@@ -10,10 +10,11 @@ from onboard.controller.shell import Controller
 from onboard.core.effects import Effect, Record, Renew, Send
 from onboard.core.journal_state import JournalState
 from onboard.core.messages import Message, SyncRequest
+from onboard.core.records import BootRecord
 from onboard.ports.journal import Entry
 
 ROBOT = 11
-ENTRIES: tuple[Entry, ...] = ({"record": "boot", "boot": 9},)
+ENTRIES: tuple[Entry, ...] = (BootRecord(9).entry,)
 
 
 @pytest.mark.parametrize("renews", [True, False])
@@ -22,7 +23,7 @@ def test_a_short_journal_begins_anew_before_what_follows_is_said(renews: bool) -
     simulation = build(site, RunOptions(), loop)
 
     def start(_: int) -> list[Effect]:
-        first = Renew(ENTRIES) if renews else Record(ENTRIES[0])
+        first = Renew(ENTRIES) if renews else Record(BootRecord(9))
         return [first, Send(SyncRequest(ROBOT, 0))]
 
     def prepare(controller: Controller) -> None:

@@ -13,7 +13,9 @@ DAY_US = 86_400_000_000
 
 
 def started() -> Holon:
-    holon = Holon(SITE, SITE.machines[LIFT], factory_for(SITE, KindCode.LIFT), boot=2, entries=[{"record": "boot"}])
+    holon = Holon(
+        SITE, SITE.machines[LIFT], factory_for(SITE, KindCode.LIFT), boot=2, entries=[{"record": "boot", "boot": 1}]
+    )
     holon.start(0)
     holon.receive(BusTime(BAY, 1_000_000), 1_000_000)
     return holon

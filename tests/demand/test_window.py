@@ -7,7 +7,18 @@ import pytest
 
 from bus_sim.demand import WHOLE_DAY, Demand, DemandError, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody
-from bus_sim.window import DAY_US, HOUR_US, MINUTE_US, Window, busiest_hour, choose_window, densest
+from bus_sim.window import (
+    DAY_US,
+    EVE_US,
+    HOUR_US,
+    MINUTE_US,
+    Window,
+    busiest_hour,
+    choose_window,
+    densest,
+    two_way_hour,
+    with_short_eve,
+)
 
 CAR = CarBody("car", 2700, 4300, 1500, 1400)
 
@@ -42,6 +53,28 @@ def test_departures_count_as_much_as_arrivals_and_the_first_of_equal_hours_wins(
     quiet_morning = demand((0, 300), (10, 310), (200, 320), (500, None))
     assert busiest_hour(quiet_morning) == Window(261 * MINUTE_US, 261 * MINUTE_US + HOUR_US)
     assert busiest_hour(demand((30, None), (400, None))).begin_us == 0
+
+
+def test_the_two_way_hour_of_the_shipped_day_has_cars_that_come_and_cars_that_go() -> None:
+    whole = Demand.from_sessions(shipped=WHOLE_DAY)
+    window = two_way_hour(whole)
+    assert choose_window(whole, "two-way") == window and window.told(whole) == "2019-07-24 15:31 to 16:31"
+    assert sum(window.begin_us <= stay.arrival_us < window.end_us for stay in whole.stays) == 9
+    assert sum(window.begin_us <= (stay.departure_us or 0) < window.end_us for stay in whole.stays) == 21
+    one_way = demand((0, None), (10, None), (200, 900))
+    assert two_way_hour(one_way) == busiest_hour(one_way)
+
+
+def test_a_short_eve_brings_who_is_inside_and_leaves_the_window_as_it_is() -> None:
+    whole = demand((0, 700), (1, 90), (2, None), (3, 130), (95, 700), (119, 125), (130, 140))
+    window = Window(120 * MINUTE_US, 180 * MINUTE_US)
+    eve = with_short_eve(whole, window, 3)
+    assert EVE_US == 3 * MINUTE_US
+    arrivals = [stay.arrival_us / MINUTE_US for stay in eve.stays]
+    assert arrivals == [115, 116, 117, 118, 119, 130], "one a minute, and nobody sooner than they came"
+    assert [stay.departure_us for stay in eve.stays] == [
+        stay.departure_us for stay in whole.stays if stay.departure_us != 90 * MINUTE_US
+    ]
 
 
 def test_an_hour_without_anybody_is_told() -> None:

@@ -51,7 +51,7 @@ CALL = CallForProposals(
     TASK,
     2_700,
 )
-BOOT: Entry = {"record": "boot"}
+BOOT: Entry = {"record": "boot", "boot": 1}
 AWARDED: tuple[Entry, Entry] = BOOT, award_record(CALL, BAY, PLACE, 1).entry
 TAKEN = handled_record(Work(Handling.TAKE, BAY, TASK, 2_700, CALL)).entry
 MOVED_US = 20_000_000

@@ -7,12 +7,14 @@ import pytest
 from onboard.core.authority import station_token
 from onboard.core.codes import (
     ANY_STATION,
+    OUTSIDE,
     DeskInput,
     DeskText,
     DoorPosition,
     DriveMode,
     LightColour,
     Operation,
+    Reason,
     ShuttleMode,
     Side,
     TaskPhase,
@@ -23,11 +25,13 @@ from onboard.core.holon import Holon
 from onboard.core.messages import (
     BayState,
     BusTime,
+    CallForProposals,
     CarAt,
     DeskEvent,
     DeskOrder,
     DoorState,
     DriveState,
+    EmergencyStop,
     Message,
     Reference,
     ShuttleState,
@@ -36,7 +40,10 @@ from onboard.core.messages import (
     TokenGrant,
     TokenHeld,
 )
+from onboard.core.negotiation.winners import LOST_AFTER_US
+from onboard.core.recovery_messages import Go
 from onboard.core.site import Station
+from onboard.systems.car_park.bay_memory import winner_record
 from onboard.systems.registry import factory_for
 from onboard.ways.tokens import car_token
 from tests.sites import one_floor
@@ -47,6 +54,8 @@ CAR, TASK, WHEELBASE_MM = Reference(BAY, 1), Reference(BAY, 7), 2_600
 HERE = SITE.compartments[BAY].number
 PLACE = SITE.places[0].number
 Entry = dict[str, str | int]
+PARKING: Entry = {"record": "job", "task_origin": BAY, "task": 1, "operation": int(Operation.PARK)}
+PARKING |= {"car_origin": BAY, "car": 1, "wheelbase_mm": WHEELBASE_MM}
 
 
 def token_entry(record: str, version: int, holder: int) -> Entry:
@@ -171,17 +180,26 @@ def test_a_robot_killed_before_it_said_done_says_so_when_it_knows_where_it_is(ha
 
 
 def test_who_presses_again_inside_gets_the_ticket_that_the_power_failed_to_print() -> None:
-    entries = [
-        token_entry("token_held", 1, BAY),
-        {"record": "job", "task_origin": BAY, "task": 1, "operation": int(Operation.PARK), "car_origin": BAY, "car": 1}
-        | {"wheelbase_mm": WHEELBASE_MM},
-    ]
-    bay = machine(BAY, entries)
+    bay = machine(BAY, [token_entry("token_held", 1, BAY), PARKING])
     bay.sense(DoorState(BAY, DoorPosition.OPEN, DoorPosition.LOCKED, LightColour.GREEN), 10)
     first = bay.sense(BayState(BAY, 1_500, 4_300, 1_500, WHEELBASE_MM, True, False), 20)
     assert CarAt(BAY, CAR, HERE, 1, WHEELBASE_MM) in said(first), "nor had it been said that the car is here"
     assert tickets(first) == []
     assert tickets(bay.sense(DeskEvent(BAY, 1, DeskInput.KEY, Reference(0, 0)), 30)) == [CAR]
+
+
+def test_a_car_that_its_driver_took_out_while_the_bay_was_off_is_called_for_by_nobody() -> None:
+    """It was given back, or its driver left by himself; the compartment knows by its sensors only."""
+    entries = [token_entry("token_held", 1, BAY), journalled_place(BAY, HERE, 1), PARKING]
+    bay, words = machine(BAY, entries), list[Message]()
+    for now_us in range(100_000, 20_000_000, 100_000):
+        doors = DoorState(BAY, DoorPosition.LOCKED, DoorPosition.LOCKED, LightColour.RED)
+        for sensed in (doors, BayState(BAY, 0, 0, 0, 0, False, False)):
+            words += said(bay.sense(sensed, now_us))
+        words += said(bay.wake(now_us))
+    assert not any(isinstance(word, CallForProposals) for word in words)
+    assert TaskReport(BAY, CAR, TaskPhase.REFUSED, HERE, Reason.CANCELLED) in words
+    assert CarAt(BAY, CAR, OUTSIDE, 1, WHEELBASE_MM) in words
 
 
 def tickets(effects: list[Effect]) -> list[Reference]:
@@ -193,3 +211,20 @@ def journalled_place(node: int, station: int, version: int) -> Entry:
     assert Station.from_number(station) in (*SITE.places, *SITE.compartments.values()), node
     place = {"station": station, "version": version, "wheelbase_mm": WHEELBASE_MM}
     return {"record": "car_at", "car_origin": CAR.origin, "car": CAR.number, **place}
+
+
+def test_a_steward_that_was_held_counts_no_winner_as_lost_by_that_time() -> None:
+    """All were held by the same stop: whoever is let go first took the others' tasks from them."""
+    winner = dict(winner_record(CAR, ROBOT, TASK, 1).entry)
+    entries = [token_entry("token_held", 3, BAY), journalled_place(BAY, PLACE, 3), winner]
+    steward, let_go_us, given_back_us = machine(BAY, entries), 40_000_000, list[int]()
+    for now_us in range(100_000, 60_000_000, 100_000):
+        if now_us < let_go_us and not now_us % 1_000_000:
+            steward.receive(EmergencyStop(251, Reason.OPERATOR), now_us)
+        if now_us == let_go_us:
+            steward.receive(Go(251, 0), now_us)
+        words = said(steward.wake(now_us))
+        given_back_us += [
+            now_us for word in words if isinstance(word, TaskReport) and word.phase is TaskPhase.FORFEITED
+        ]
+    assert given_back_us and given_back_us[0] >= let_go_us + LOST_AFTER_US

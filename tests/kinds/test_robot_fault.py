@@ -14,7 +14,9 @@ STEP_US = 1_000_000
 
 def test_a_shuttle_that_fails_right_after_a_restart_does_not_keep_the_robot_awake() -> None:
     """Found by the fuzzer: the end of the pause stayed due for ever, and no wake changed that."""
-    robot = Holon(SITE, SITE.machines[ROBOT], factory_for(SITE, KindCode.ROBOT), boot=2, entries=[{"record": "boot"}])
+    robot = Holon(
+        SITE, SITE.machines[ROBOT], factory_for(SITE, KindCode.ROBOT), boot=2, entries=[{"record": "boot", "boot": 1}]
+    )
     robot.start(0)
     robot.receive(BusTime(STEWARD, 0), 0)
     home_mm = (SITE.machines[ROBOT].home.index - 1) * SITE.tracks[1].pitch_mm

@@ -17,8 +17,7 @@ from onboard.core.messages import (
     Stamp,
 )
 from onboard.core.site import Segment
-from onboard.systems.car_park.handling import Phase
-from onboard.systems.car_park.program import Program, Step, to_itinerary
+from onboard.systems.car_park.program import Phase, Program, Step, to_itinerary
 from tests.kinds.board import AWARDED, BOOT, MOVED_US, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, Board, Entry
 
 

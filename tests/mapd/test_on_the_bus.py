@@ -13,12 +13,12 @@ from bus_sim.systems.mapd.steps import Day
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play
 from onboard.cli import main as onboard
-from onboard.systems.mapd.messages import MESSAGES, StepAward, StepState, TransportBid, TransportCall
+from onboard.systems.mapd.messages import StepAward, StepState, TransportBid, TransportCall
 from onboard.systems.mapd.site import Mapd
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts
 from tests.mapd.sites import drawn, made, played, site_text
-from tests.wire.samples import random_value
+from tests.wire.samples import frames_of, message_of, random_value
 
 
 def without_bus(site: Mapd) -> Day:
@@ -99,19 +99,16 @@ def test_the_published_mean_is_printed_beside_a_whole_file_only() -> None:
 
 
 def test_whatever_is_on_the_bus_no_machine_raises() -> None:
-    chance, both = random.Random(4), codecs("mapd", MESSAGES)
+    chance, both = random.Random(4), codecs(frames_of("mapd"))
     site = made(3, drawn(4, 1))
-    flags = ("bidding", "kept", "loaded", "served")
 
     def babble(run: BusRun) -> None:
         bus = run.fleet.attach("noise", None)
         for number in range(400):
             layout = chance.choice(system_layouts("mapd")[0])
-            kind = next(one for one in MESSAGES if one.__name__ == layout.name)
             values = {one.name: random_value(one, chance) for one in layout.signals}
-            named = {name: bool(value) if name in flags else value for name, value in values.items()}
             # From a machine that there is not; a robot's own number would only show that it stops for a double.
-            for frame in both.fleet.encode(kind(77, **named)):
+            for frame in both.fleet.encode(message_of(layout.name, 77, values)):
                 run.loop.call_at(3 + number / 100, bus.send, frame)
 
     run = play(site, SystemOptions(quiet=True, limit_s=200), make_plant, prepare=babble)

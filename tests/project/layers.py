@@ -12,10 +12,13 @@ from pathlib import Path
 
 #: What holds no decision: values and names that every layer may share.
 CORE_TYPES = (
+    "onboard.contract",
     "onboard.core.codes",
     "onboard.core.frame",
+    "onboard.core.journal_records",
     "onboard.core.journal_state",
     "onboard.core.messages",
+    "onboard.core.records",
     "onboard.core.recovery_messages",
     "onboard.core.remedies",
     "onboard.core.serial",
@@ -27,11 +30,9 @@ CORE_TYPES = (
 FOLDER = Path(__file__).parents[2] / "onboard" / "systems"
 #: The systems: each is a folder.
 SYSTEMS = tuple(sorted(folder.name for folder in FOLDER.iterdir() if (folder / "system.py").is_file()))
-#: What each system's machines know beforehand and what they say beyond the messages of all: values as well.
-SYSTEM_TYPES = tuple(f"onboard.systems.{system}.{noun}" for system in SYSTEMS for noun in ("messages", "site"))
 
 #: How the parts of a site's own system are found.
-REGISTRY = ("onboard.systems.contract", "onboard.systems.registry")
+REGISTRY = ("onboard.systems.contract", "onboard.systems.registry", "onboard.systems.words")
 
 #: Standard modules without I/O, clock, chance or tasks: all that decisions may use.
 PURE_STDLIB = frozenset(
@@ -55,6 +56,7 @@ ORDERING = frozenset({"heappush", "heapify", "insort", "max", "min", "nlargest",
 
 ALL_OF_ONBOARD = (
     "onboard.config",
+    "onboard.contract",
     "onboard.controller",
     "onboard.core",
     "onboard.io",
@@ -83,7 +85,7 @@ class Layer:
 def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
     """The layers of one system's folder: its machines decide and nothing else; reader, judges and drawing do not."""
     own = f"onboard.systems.{system}"
-    machines = ("onboard.core", "onboard.ways", "onboard.work", "onboard.systems.system")
+    machines = ("onboard.contract", "onboard.core", "onboard.ways", "onboard.work", "onboard.systems.system")
     yield own, Layer(machines, only_stdlib=PURE_STDLIB, pure=True)
     config = Layer(
         ("onboard.config", "onboard.core", "onboard.ways", own), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
@@ -92,9 +94,16 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
         (*CORE_TYPES, own, "onboard.trace", "onboard.ways", "onboard.wire"),
         not_stdlib=frozenset({"asyncio", "random", "threading"}),
     )
+    words = Layer((*CORE_TYPES, own, "onboard.systems.words"), only_stdlib=PURE_STDLIB, pure=True)
+    edge = Layer(
+        (*CORE_TYPES, own, "onboard.gateway", "onboard.trace.view"),
+        not_stdlib=frozenset({"random", "socket", "threading", "time"}),
+    )
     parts = {
-        **dict.fromkeys(("constants", "layout", "machines", "missions_reader", "reader", "room"), config),
-        **dict.fromkeys(("chart", "checks", "scene"), history),
+        "gateway": edge,
+        "words": words,
+        **dict.fromkeys(("constants", "layout", "machines", "missions_reader", "reader", "report", "room"), config),
+        **dict.fromkeys(("chart", "checks", "diagram", "scene", "traffic"), history),
     }
     folder = FOLDER / system
     yield from ((f"{own}.{noun}", rule) for noun, rule in parts.items() if _is_part(folder / noun))
@@ -109,9 +118,12 @@ FINDER = "onboard/systems/registry.py"
 
 #: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
-    "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.ways": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.work": Layer(("onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.contract": Layer(only_stdlib=PURE_STDLIB),
+    # Writes the rest of it; runs where somebody changes a DBC, never on a board.
+    "onboard.contract.generate": Layer(("onboard.contract", "onboard.wire.dbc_file", "dbc")),
+    "onboard.core": Layer(("onboard.contract",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.ways": Layer(("onboard.contract", "onboard.core"), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.work": Layer(("onboard.contract", "onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
     # It knows no system by name; a system's parts are found by the name of their folder.
     "onboard.systems": Layer(("onboard.core", "onboard.work.compaction")),
     "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),
@@ -127,8 +139,7 @@ LAYERS: dict[str, Layer] = {
     ),
     "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
     "onboard.trace": Layer(
-        (*CORE_TYPES, *SYSTEM_TYPES, *REGISTRY, "onboard.wire"),
-        not_stdlib=frozenset({"asyncio", "random", "threading"}),
+        (*CORE_TYPES, *REGISTRY, "onboard.wire"), not_stdlib=frozenset({"asyncio", "random", "threading"})
     ),
     # The trace's own command line reads site files; the composition root loads it where it is asked for.
     "onboard.trace.cli": Layer((*CORE_TYPES, "onboard.config", "onboard.trace")),
@@ -143,7 +154,7 @@ LAYERS: dict[str, Layer] = {
     ),
     # What is published is decided from the decoded bus alone; sessions, files and buses come in through ports.
     "onboard.gateway": Layer(
-        (*CORE_TYPES, *SYSTEM_TYPES, "onboard.ports", "onboard.trace", "onboard.web.picture", "onboard.wire"),
+        (*CORE_TYPES, *REGISTRY, "onboard.ports", "onboard.trace", "onboard.web.picture", "onboard.wire"),
         not_stdlib=frozenset({"random", "socket", "threading", "time"}),
     ),
     # Its command line is a composition root: it opens the bus, the journal and the broker.
@@ -162,10 +173,10 @@ LAYERS: dict[str, Layer] = {
     "onboard.operate": Layer(
         (
             *CORE_TYPES,
-            *SYSTEM_TYPES,
             "onboard.config.problems",
             *(f"onboard.core.{name}" for name in ("authority", "holding", "regeneration")),
             "onboard.ways.lifts",
+            "onboard.gateway.edge",
             "onboard.ways.tokens",
             "onboard.gateway.pauses",
             "onboard.gateway.whereabouts",

@@ -163,7 +163,7 @@ def test_all_counters_may_wrap_in_the_middle_of_the_work() -> None:
         if isinstance(one.behaviour, Robot):
             one.behaviour.program.version = 0xFE
         if isinstance(one.behaviour, Compartment):
-            one.behaviour._number = 0xFFFE
+            one.behaviour.memory.number = 0xFFFE
 
     scene = scene_with(before_start=nearly_full)
     assert scene.simulation.plant.oracle.finish() == []

@@ -10,11 +10,20 @@ from bus_sim.run import Simulation
 from bus_sim.sites import find_site
 from onboard.core.codes import CallResult, Grade, KindCode, Operation, Reason, TaskPhase
 from onboard.core.frame import Frame
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
+from onboard.core.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    Itinerary,
+    ItineraryHead,
+    ItineraryLeg,
+    Message,
+    TaskReport,
+)
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.robot import Robot
-from onboard.wire.codec import Part, fleet_codec
+from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
@@ -22,13 +31,13 @@ SITE = find_site("small")
 
 
 @pytest.fixture(scope="module")
-def frames() -> dict[int, list[Message | Part]]:
+def frames() -> dict[int, list[Message]]:
     """What each machine put on the fleet bus, frame by frame, in order."""
-    heard: dict[int, list[Message | Part]] = {}
+    heard: dict[int, list[Message]] = {}
 
     def on_frame(frame: Frame, _time_us: int, _sender: str) -> None:
         part = fleet_codec().decode_part(frame)
-        assert isinstance(part, Message | Part)
+        assert isinstance(part, Message)
         heard.setdefault(part.sender, []).append(part)
 
     scene = play(SITE, stays((0, 400), (60, 500)), before=lambda simulation: simulation.fleet.tap(on_frame))
@@ -36,17 +45,17 @@ def frames() -> dict[int, list[Message | Part]]:
     return heard
 
 
-def group_after(said: list[Message | Part], number: int) -> tuple[Part, list[Part]]:
+def group_after(said: list[Message], number: int) -> tuple[ItineraryHead, list[ItineraryLeg]]:
     """The head and the legs that follow a frame without any other of the same sender between."""
     head = said[number + 1]
-    assert isinstance(head, Part) and head.name == "ItineraryHead", said[number + 1]
-    legs = said[number + 2 : number + 2 + head.values[2]]
-    assert all(isinstance(leg, Part) and leg.name == "ItineraryLeg" for leg in legs)
-    return head, [leg for leg in legs if isinstance(leg, Part)]
+    assert isinstance(head, ItineraryHead), said[number + 1]
+    legs = [leg for leg in said[number + 2 : number + 2 + head.legs] if isinstance(leg, ItineraryLeg)]
+    assert len(legs) == head.legs
+    return head, legs
 
 
 def test_p48_performance_pre_assignment_and_tentative_itinerary_are_one_group_of_frames(
-    frames: dict[int, list[Message | Part]],
+    frames: dict[int, list[Message]],
 ) -> None:
     """Bid, head and legs one after the other; head and legs carry the version that the bid names."""
     groups = 0
@@ -55,30 +64,33 @@ def test_p48_performance_pre_assignment_and_tentative_itinerary_are_one_group_of
             if not isinstance(one, Bid) or SITE.machines[node].kind is not KindCode.ROBOT:
                 continue
             head, legs = group_after(said, number)
-            version, grade, count = head.values[:3]
-            assert (version, grade) == (one.itinerary_version, Grade.TENTATIVE)
-            assert [leg.values[:1] + leg.values[2:3] for leg in legs] == [(version, leg) for leg in range(count)]
+            assert (head.version, head.grade) == (one.itinerary_version, Grade.TENTATIVE)
+            assert [(leg.version, leg.leg) for leg in legs] == [(head.version, number) for number in range(head.legs)]
             # The last leg's end is beyond what was bid for: the way to a refuge follows.
-            assert count >= 3 and (head.values[3] + legs[-1].values[7]) >= one.cost
+            assert head.legs >= 3 and head.stamp.award_ms + legs[-1].end_ms >= one.cost
             groups += 1
     assert groups == 4
 
 
 def test_p47_the_firm_itinerary_engages_the_way_that_the_tentative_one_pre_engaged(
-    frames: dict[int, list[Message | Part]],
+    frames: dict[int, list[Message]],
 ) -> None:
     for node, said in frames.items():
-        heads = [(i, p) for i, p in enumerate(said) if isinstance(p, Part) and p.name == "ItineraryHead"]
+        heads = [(i, p) for i, p in enumerate(said) if isinstance(p, ItineraryHead)]
         for at, (number, head) in enumerate(heads):
-            if head.values[1] is not Grade.TENTATIVE:
+            if head.grade is not Grade.TENTATIVE:
                 continue
             following, firm = heads[at + 1]
-            assert firm.values[1] is Grade.FIRM and firm.values[0] != head.values[0], "another grade, another version"
+            assert firm.grade is Grade.FIRM and firm.version != head.version, "another grade, another version"
             _, tentative = group_after(said, number - 1)
             _, engaged = group_after(said, following - 1)
             # Tracks and indices of the whole way; kept steps of the task before may come first.
-            way = [leg.values[1:2] + leg.values[4:7] for leg in tentative]
-            assert [leg.values[1:2] + leg.values[4:7] for leg in engaged][-len(way) :] == way, node
+            way = [_place(leg) for leg in tentative]
+            assert [_place(leg) for leg in engaged][-len(way) :] == way, node
+
+
+def _place(leg: ItineraryLeg) -> tuple[int, ...]:
+    return leg.action, leg.track, leg.from_index, leg.to_index
 
 
 # --- outbid ----------------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.plant.bodies import Aboard
 from bus_sim.systems.car_park.show import Clock, draw
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.codes import KindCode
+from onboard.core.codes import KindCode, MachineState
 from onboard.core.site import Station
 from onboard.systems.car_park.site import car_park
 from onboard.trace.candump_reader import CandumpReader
@@ -101,6 +101,28 @@ def test_p54_the_picture_shows_the_plant_as_it_is(run: tuple[Simulation, list[st
     for car in view.cars:
         assert f"|{car.number:^3}|" in last
     assert last.count("MR1") >= 2 and "idle" in last
+
+
+@pytest.mark.parametrize("name", ["level1", "small", "standard", "large"])
+@pytest.mark.parametrize("size", [(80, 24), (80, 40), (120, 40), (60, 12), (40, 7)])
+def test_p54_the_picture_fits_the_terminal_with_the_newest_event_the_figures_and_the_address(
+    name: str, size: tuple[int, int]
+) -> None:
+    site, (width, height) = find_site(name), size
+    view = SiteView(site)
+    view.states = dict.fromkeys(site.machines, MachineState.STARTING)
+    for number in range(40):
+        view.say(number * 1_000_000, f"event {number}")
+    console = Console(width=width, height=height, file=io.StringIO())
+    with console.capture() as printed:
+        clock = Clock(datetime.fromtimestamp(EPOCH_US / 1e6, UTC))
+        console.print(draw(site, view, clock, "cars in 31", width, height, "http://127.0.0.1:41234/"))
+    lines = printed.get().splitlines()
+    assert len(lines) == height, "no line too many, and what is there is used"
+    assert lines[-3].endswith("event 39") and lines[-2] == "cars in 31"
+    assert lines[-1] == "picture at http://127.0.0.1:41234/"
+    shown = sum(" event " in line for line in lines)
+    assert shown >= (3 if height >= 24 else 1)
 
 
 def test_p54_what_is_not_on_the_bus_is_not_in_the_picture(run: tuple[Simulation, list[str], Path]) -> None:

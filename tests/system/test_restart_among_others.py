@@ -2,10 +2,13 @@
 
 from pathlib import Path
 
+import pytest
+
 from bus_sim import sites
 from bus_sim.campaign.report import Verdict
 from bus_sim.cli import main as bus_sim
 from bus_sim.faults.scenario import Arrivals
+from bus_sim.systems.car_park.plant.customer import TABLE, Event, State
 from onboard.cli import main as onboard
 from onboard.core.messages import Progress
 from onboard.trace.candump_reader import CandumpReader
@@ -64,4 +67,44 @@ def test_who_has_won_a_car_before_its_keeper_has_it_may_fetch_it() -> None:
     """
     crash = "crash:target=MR1,at_s=0,restart_s=5,write=204,durable=yes,journal=cut,entries=39"
     report = played("small", 1, Arrivals(3, 30, 10, 60), crash)
+    assert report.verdict is Verdict.SERVED, report.why()
+
+
+def test_a_car_that_nobody_came_to_park_is_its_drivers_who_comes_back_with_the_ticket() -> None:
+    """It was told to be outside while it stood in the only bay, and nobody was served any more.
+
+    Two crashes a seed on `small`, seed 414.
+    """
+    crash = "crash:at_s=610.960052,target=MR1,restart_s=18.542,write=6,durable=yes"
+    report = played("small", 414, Arrivals(6, 20, 10, 200), crash, limit_s=3_600)
+    assert report.verdict is Verdict.SERVED, report.why()
+
+
+def test_a_car_that_nobody_came_to_park_is_called_for_again_where_its_driver_has_gone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The only robot is off for two minutes, and whoever has a ticket does not look at the desk any more."""
+    monkeypatch.delitem(TABLE, (State.PARKED, Event.FULL))
+    report = played("level1", 1, Arrivals(2, 20, 10, 300), "crash:target=MR1,at_s=8,restart_s=120")
+    assert report.verdict is Verdict.SERVED, report.why()
+
+
+def test_who_was_off_while_its_task_was_called_anew_does_not_begin_it() -> None:
+    """Nobody had it at that moment, so it was not told that it had lost it, and went for the car.
+
+    Two crashes a seed on `small`, seed 2169.
+    """
+    first = "crash:at_s=333.410943,target=MR1,restart_s=15.574,write=1,durable=yes"
+    second = "crash:at_s=375.432383,target=MR2,restart_s=13.868,write=1,durable=no"
+    report = played("small", 2169, Arrivals(6, 20, 10, 200), first, second, limit_s=3_600)
+    assert report.verdict is Verdict.SERVED, report.why()
+
+
+def test_who_works_where_another_was_to_come_first_does_not_plan_to_work_there_until_that_one_has_been() -> None:
+    """The other then planned to wait for it, for 154 s, aboard a lift, and nobody moved although it left after six.
+
+    Two crashes a seed on `small`, seed 135.
+    """
+    crash = "crash:at_s=117.016517,target=MR1,restart_s=17.716,write=1,durable=no"
+    report = played("small", 135, Arrivals(6, 20, 10, 200), crash, limit_s=3_600)
     assert report.verdict is Verdict.SERVED, report.why()

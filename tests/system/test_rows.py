@@ -294,7 +294,7 @@ def test_a_restarted_compartment_never_names_two_cars_alike() -> None:
     entries: list[dict[str, str | int]] = [{"record": "boot", "boot": 3}, {"record": "number", "number": 7}]
     behaviour = Holon(site, site.machines[1], CompartmentFactory(), entries=entries).behaviour
     assert isinstance(behaviour, Compartment)
-    assert behaviour._number == 7
+    assert behaviour.memory.number == 7
 
 
 # --- row P22: a machine kind that the project does not know, with no line of protocol code ---------------------------

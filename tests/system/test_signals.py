@@ -149,6 +149,18 @@ def test_a_campaign_leaves_no_worker(tmp_path: Path) -> None:
         os.close(end)
 
 
+def test_ctrl_c_in_the_warm_up_tells_what_the_warm_up_came_to(tmp_path: Path) -> None:
+    with bus_sim("run", "--no-web", "--trace", "t.log", folder=tmp_path) as running:
+        said_until(running, "^15:00:00 |^14:4.:.. ")
+        running.send_signal(signal.SIGINT)
+        assert running.stdout is not None
+        figures = running.stdout.read()
+        assert running.wait() == 0
+    told = re.search(r"(\d+) min (\d+) s \(warm-up, 2019-07-24 14:4\d to (\d+:\d+)\) shown", figures)
+    assert told or "ended in its first second; no figures" in figures, figures
+    assert "now 2019-07-24" not in figures, "the hour itself did not begin"
+
+
 def test_a_look_at_a_log_ends_by_its_own_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
     closed = []
 

@@ -12,13 +12,14 @@ from onboard.core.messages import CallForProposals, Reference
 from onboard.systems.terminal.generation import VehicleGeneration
 from onboard.systems.terminal.messages import Action, MissionKey, Verb
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.missions import Orders
+from onboard.systems.terminal.missions import Orders, types_of
 from onboard.systems.terminal.plan import Plan, PlanReader, Step, to_frames
 from onboard.systems.terminal.search import Job, Search
 from onboard.systems.terminal.site import StationKind
 from onboard.systems.terminal.traffic import Traffic
 from onboard.systems.terminal.vehicle import terminal
 from onboard.ways.cars import CarMirror
+from onboard.work.order_life import OrderEvent
 from tests.terminal.fig3 import A1, PRINTED, S1, S2, fig3, plan_of
 
 SITE = terminal(find_site("terminal"))
@@ -127,6 +128,55 @@ def test_m23_only_a_box_with_nothing_above_it_is_called_for() -> None:
     assert second is not None and second.box == box("B3"), "B4 is in a plan"
 
 
+def stack_list(picture: TerminalMirror, name: str) -> list[int]:
+    return [visit.owner for visit in picture.traffic.lists[BY_NAME[name]]]
+
+
+def test_a_plan_does_not_fetch_what_it_buries_itself() -> None:
+    """B4 is put on B7, which this vehicle was to fetch next and waited for for ever (stranger, seed 1)."""
+    picture = mirror(14)
+    plan(picture, 14, "B4", "S3")
+    generation = VehicleGeneration(SITE, SITE.machines[14], picture)
+    assert generation.plan(Job(box("B7"), Reference(1, 9), BY_NAME["S3"], BY_NAME["S1"]), 0, version=2) is None
+
+
+@pytest.mark.parametrize("first", ["fetches", "puts"])
+def test_a_box_is_put_on_a_stack_after_all_that_are_fetched_from_it(first: str) -> None:
+    """Whoever plans first: who fetches is far away, and who puts comes from next door."""
+    picture = mirror()
+    wanted = [(11, "B7", "S1"), (14, "B4", "S3")]
+    for owner, name, target in wanted if first == "fetches" else reversed(wanted):
+        plan(picture, owner, name, target)
+    assert stack_list(picture, "S3") == [11, 14]
+
+
+def test_nobody_bids_for_a_box_that_is_in_a_plan() -> None:
+    """Two desks called for one box at once; one vehicle won both, and one mission got a box too few (liar, seed 5)."""
+    picture = mirror(14)
+    generation = VehicleGeneration(SITE, SITE.machines[14], picture)
+    assert generation.lower_bound(call("B4", "S1"), 0) is not None
+    plan(picture, 13, "B4", "S10")
+    assert generation.lower_bound(call("B4", "S1"), 0) is None
+    assert generation.lower_bound(call("B14", "S1"), 0) is not None
+
+
+def test_a_box_that_was_wanted_by_its_type_is_so_again_when_it_is_given_back() -> None:
+    """It was wanted by name then, and another desk's mission took it where a stack grew on it (stranger, seed 4)."""
+    picture, orders = mirror(1), Orders(SITE, 1)
+    area, kind = SITE.entities[BY_NAME["S3"]].area, types_of(SITE).index(SITE.boxes[box("B7") - 1].type)
+    taken = {box(name) for name in ("B1", "B2", "B3", "B4")}
+    assert orders.key(MissionKey(1, 1, Verb.LOAD, kind, 1, area, BY_NAME["S10"], 0, urgent=False))
+    first = orders.next(picture, taken)
+    assert first is not None and first.box == box("B7")
+    restarted = Orders(SITE, 1)
+    restarted.replay([orders.record().entry])
+    plan(picture, 14, "B7", "S1")
+    for one in (orders, restarted):
+        one.give_back(first.task, OrderEvent.NOT_WON)
+        again = one.next(picture, taken)
+        assert again is not None and again.box == box("B6")
+
+
 def _typed(verb: Verb, what: int, count: int = 0, to: str = "S1", source: str = "") -> MissionKey:
     return MissionKey(1, 7, verb, what, count, BY_NAME[source] if source else 0, BY_NAME[to], 0, urgent=False)
 
@@ -139,7 +189,7 @@ def test_a_mission_that_comes_in_part_or_twice_is_carried_out_once_and_whole() -
     assert [orders.key(key) is None for key in (one, other, end)] == [True, True, False]
     assert orders.answer(end) is True
     again = Orders(SITE, 1)
-    again.replay([orders.record()])
+    again.replay([orders.record().entry])
     for known in (orders, again):
         assert [known.key(key) for key in (one, other, end)] == [None] * 3
         assert known.answer(end) is True

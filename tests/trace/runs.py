@@ -27,7 +27,7 @@ def run_log(*words: str, stay_s: int = 60) -> Path:
 def fleet_of(path: Path) -> list[Said]:
     """All messages of the fleet bus."""
     with Log(str(path)) as log:
-        return [said for said in Listener(codecs("", ())).messages(log) if said.is_fleet]
+        return [said for said in Listener(codecs()).messages(log) if said.is_fleet]
 
 
 def first(said: list[Said], kind: type[Message]) -> Said:

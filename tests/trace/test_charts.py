@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from onboard.core.messages import Progress, Reference
+from onboard.systems.car_park.diagram import Picture, watch
 from onboard.trace.chart.sequence import Chart, chart
-from onboard.trace.chart.time_space import Picture, watch
 from onboard.trace.cli import main
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
@@ -22,7 +22,7 @@ _SVG = "{http://www.w3.org/2000/svg}"
 
 def _chart(number: int = 1) -> Chart:
     with Log(str(run_log())) as log:
-        found = chart(SITE, Listener(codecs("", ())).messages(log), Reference(1, number))
+        found = chart(SITE, Listener(codecs()).messages(log), Reference(1, number))
     assert found is not None
     return found
 

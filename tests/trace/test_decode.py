@@ -36,7 +36,7 @@ from onboard.trace.candump import format_line
 from onboard.trace.cli import main
 from onboard.wire.codec import codecs
 
-CONTRACTS = codecs("", ())
+CONTRACTS = codecs()
 SITE = Path(__file__).parents[2] / "bus_sim" / "sites" / "small.toml"
 START_US = 946_684_800_000_000
 

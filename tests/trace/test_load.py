@@ -37,7 +37,7 @@ def test_a_busy_stretch_bounds_the_response_of_its_frames() -> None:
     length_us = frame_bits(classic) * 2
     # Three frames back to back after a silence, then one alone.
     times = [10_000, 10_000 + length_us, 10_000 + 2 * length_us, 50_000]
-    found = loads([frame._replace(time_us=time) for time in times], codecs("", ()), 500_000)["can0"]
+    found = loads([frame._replace(time_us=time) for time in times], codecs(), 500_000)["can0"]
     assert found.longest_us == {"ItineraryHead": 3 * length_us}
     assert found.counts == {"ItineraryHead": 4}
     assert found.mean == pytest.approx(4 * length_us / 40_000)
@@ -45,7 +45,7 @@ def test_a_busy_stretch_bounds_the_response_of_its_frames() -> None:
 
 def test_the_load_of_a_run_is_what_the_run_said_and_within_the_bounds(capsys: pytest.CaptureFixture[str]) -> None:
     with Log(str(run_log())) as log:
-        fleet = loads(log, codecs("", ()), SITE.bitrate)["fleet"]
+        fleet = loads(log, codecs(), SITE.bitrate)["fleet"]
     # As the run's own summary says: 0.15 % in the mean, 1.92 % in the worst second, that of power-up.
     assert (fleet.mean, fleet.worst_second) == (pytest.approx(0.0015, abs=0.0001), pytest.approx(0.0192, abs=0.0002))
     bounds = bounds_of(SITE)

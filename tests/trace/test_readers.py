@@ -137,6 +137,41 @@ def test_what_is_wrong_with_a_log_is_counted_and_the_rest_is_read(tmp_path: Path
     ]
 
 
+@pytest.mark.parametrize(
+    ("text", "guess"),
+    [
+        (b"\x7fELF\x02\x01\n\0\0", "it looks like a program; name a log"),
+        (b"LOGG\x90\0\0\0\n\0", "it looks like a Vector BLF log; write it anew as ASC: can_logconvert LOG LOG.asc"),
+        (b";$FILEVERSION=1.1\n;\n 1) 2 Rx 0300 8 00\n", "it looks like a PEAK TRC log; write it anew as ASC"),
+        (b"timestamp,arbitration_id\n1,2\n", "it looks like python-can's CSV; write it anew as ASC"),
+        (b"\xd4\xc3\xb2\xa1\x02\0\x04\0", "it looks like a pcap capture; write it anew as pcapng: editcap"),
+        (b"\x1f\x8b\x08\0\n", "it looks like packed by gzip; unpack it first"),
+        (b"  can0  123   [2]  11 22\n", "it looks like what candump shows on a screen; record with candump -L"),
+        (b"[site]\nname = 'a'\n", "it looks like TOML, perhaps a site file"),
+        (b"\xff\0\xfe", "it is binary, of no format that we know"),
+        (b"hello", 'it is text that begins with "hello"'),
+        (b"", "is empty; name a log that something was written to"),
+    ],
+)
+@pytest.mark.parametrize("command", [["dump"], ["check", "--site", "small"], ["calls", "--site", "small"]])
+def test_a_file_that_is_no_log_is_status_2_and_a_guess_at_what_it_is(
+    text: bytes, guess: str, command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "any.bin"
+    file.write_bytes(text)
+    assert main([command[0], str(file), *command[1:]]) == 2
+    told = capsys.readouterr()
+    assert told.err.count("\n") == 1 and guess in told.err and str(file) in told.err, told.err
+    assert told.out == ""
+
+
+def test_a_log_with_one_frame_among_other_text_is_a_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "any.log"
+    file.write_bytes(b"hello\n(1.000000) can0 123#11\n")
+    assert main(["dump", str(file)]) == 0
+    assert "not a frame of this format: 1 time, first at 1" in capsys.readouterr().err
+
+
 def test_a_pipe_is_read_as_it_comes(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"(1.000000) can0 123#01\n(1.000000) can0 123#0")))
     assert main(["dump", "-", "-L"]) == 0

@@ -107,7 +107,7 @@ def test_a_task_that_is_not_there_is_one_clear_line(task: str, said: str, capsys
     assert said in told and told.count("\n") == 1
 
 
-def test_a_site_without_tracks_is_told_by_phases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_site_without_tracks_is_told_by_its_machines(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "graph.log"
     bus_sim(["run", "graph", "--for", "300", "--speed", "max", "--trace", str(log)])
     site = str(SITE_FILE.with_name("graph.toml"))
@@ -116,5 +116,5 @@ def test_a_site_without_tracks_is_told_by_phases(tmp_path: Path, capsys: pytest.
     task = capsys.readouterr().out.split()[0]
     assert main(["why", str(log), task, "--site", site]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert any("has the task, " in line for line in lines)
+    assert any("drives from N" in line for line in lines)
     assert lines[-1].split()[-2:] == lines[0].rpartition("waited ")[2].split()

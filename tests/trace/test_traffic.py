@@ -5,8 +5,8 @@ import pytest
 from bus_sim.response import Measured, measure
 from bus_sim.sites import find_site
 from onboard.core.codes import KindCode
+from onboard.systems.car_park.traffic import excess, operation, power_up, reasons
 from onboard.trace.response import ANYBODY, Stream, fifo_bounds
-from onboard.trace.traffic import excess, operation, power_up, reasons
 from onboard.wire.dbc_file import fleet_layouts
 
 #: Sent by gateways, to those who ask for everything again, or while rights are disputed, regenerated or stood still.

@@ -135,7 +135,7 @@ def test_calls_and_machines_can_be_chosen_by_keys(browser: Page, errors: list[st
         call = browser.locator("#calls .call").last
         call.focus()
         browser.keyboard.press("Enter")
-        expect(browser.locator("#details")).to_contain_text("IOC1: park car 1.1, from IOC1 to any place")
+        expect(browser.locator("#details")).to_contain_text("IOC1: park car IOC1/1, from IOC1 to anywhere")
         expect(call).to_be_focused()
         browser.keyboard.press("Escape")
         expect(browser.locator("#details")).to_be_hidden()

@@ -81,18 +81,22 @@ def _compare(page: Page, told: Told) -> None:
         at = told.places.get(node)
         assert shown[name][2] == (f"p({at.track},{at.index})" if at is not None else str(SITE.machines[node].home))
         aboard = [one.car for one in told.cars.values() if one.station == ANY_STATION and one.sender == node]
-        assert shown[name][3] == "".join(f"{car.origin}.{car.number}" for car in aboard)
+        assert shown[name][3] == "".join(_name(car) for car in aboard)
     standing = {one.station: one.car for one in told.cars.values() if one.station not in (ANY_STATION, OUTSIDE)}
     bays = {station.number: node for node, station in SITE.compartments.items()}
     boxes = {int(number): box for number, box in drawn(page, "place").items()}
     drawn_cars = {number: box["car"] for number, box in boxes.items() if box.get("car")}
-    assert drawn_cars == {n: f"{car.origin}.{car.number}" for n, car in standing.items() if n not in bays}
-    waiting = {f"{task.origin}.{task.number}" for task, phase in told.phases.items() if phase is not TaskPhase.DONE}
+    assert drawn_cars == {n: _name(car) for n, car in standing.items() if n not in bays}
+    waiting = {_name(task) for task, phase in told.phases.items() if phase is not TaskPhase.DONE}
     assert {row[0] for row in rows(page, "tasks")} == waiting
     assert page.locator("#calls .call").count() == len(told.calls)
     assert page.locator("#calls .call:not(.won):not(.over)").count() == len(told.calls.keys() - told.won)
     assert page.locator("#calls .bid").count() == told.bids
     _robots_stand_where_they_say(page, told)
+
+
+def _name(reference: Reference) -> str:
+    return f"{SITE.machines[reference.origin].name}/{reference.number}"
 
 
 def _robots_stand_where_they_say(page: Page, told: Told) -> None:

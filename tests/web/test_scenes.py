@@ -189,9 +189,10 @@ def test_tasks_shown_as_done_are_those_that_were_reported(name: str) -> None:
         if is_fleet and isinstance(one, TaskReport) and one.phase is TaskPhase.DONE
     }
     with film_of(name) as film:
-        snapshot = json.loads(json.dumps(film.show(film.last_us).snapshot()))
+        picture = film.show(film.last_us)
+        snapshot = json.loads(json.dumps(picture.snapshot()))
     assert snapshot["figures"]["done"] == len(done)
-    assert not {one["task"] for one in snapshot["tasks"]} & {f"{task.origin}.{task.number}" for task in done}
+    assert not {one["task"] for one in snapshot["tasks"]} & {picture.view.words.reference(task) for task in done}
 
 
 def test_a_network_is_arranged_by_its_lengths_and_always_the_same() -> None:

@@ -1,14 +1,35 @@
-"""Messages at random within the contract, for every class that travels."""
+"""Messages at random within the contract, for every frame of every DBC file."""
 
-import dataclasses
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from enum import IntEnum
+from typing import Any
 
 import cantools
 from cantools.database.can import Database
 
-from onboard.core.messages import Message
+from onboard.contract.base import FrameCode, Message, Reference, Stamp
+from onboard.contract.packing import calls, device, plans, presence, rights
+from onboard.systems.registry import part, system_names
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts
+
+#: Frames that every system has.
+SHARED: tuple[FrameCode, ...] = (
+    *presence.FRAMES, *rights.FRAMES, *calls.FRAMES, *plans.FRAMES, *device.FRAMES,
+)  # fmt: skip
+
+
+def frames_of(system: str) -> tuple[FrameCode, ...]:
+    """What a system adds."""
+    module = part(system, "frames")
+    return module.FRAMES if module is not None else ()
+
+
+#: Every frame of the tree by name; no two files have one of the same name.
+CODES: dict[str, FrameCode] = {
+    code.name: code for code in (*SHARED, *(code for name in system_names() for code in frames_of(name)))
+}
 
 
 def layouts() -> tuple[MessageLayout, ...]:
@@ -39,14 +60,26 @@ def random_frames(count: int, seed: int) -> Iterator[tuple[MessageLayout, int, d
             yield layout, chance.randint(1, 250), {s.name: random_value(s, chance) for s in layout.signals}
 
 
+def message_of(name: str, sender: int, values: Mapping[str, int]) -> Message:
+    """The message object of a frame with these values of its signals."""
+    cls = CODES[name].frame
+    return cls(sender, **{one.name: _value(one.name, one.type, values) for one in fields(cls)[1:]})
+
+
+def _value(name: str, kind: Any, values: Mapping[str, int]) -> Any:
+    if kind in (Reference, Stamp):
+        return kind(*(values[f"{name}_{inner}"] for inner in kind._fields))
+    value = values[name]
+    return kind(value) if kind is bool or issubclass(kind, IntEnum) else value
+
+
 def signal_values(message: Message) -> dict[str, int]:
     """Signals of a message of one frame. An inner field has its outer's name before its own."""
     found: dict[str, int] = {}
-    for field in dataclasses.fields(message):
+    for field in fields(message):
         value = getattr(message, field.name)
-        if isinstance(value, tuple):
-            inner: dict[str, int] = value._asdict()  # type: ignore[attr-defined]  # all of them are NamedTuples
-            found.update({f"{field.name}_{name}": int(item) for name, item in inner.items()})
+        if isinstance(value, Reference | Stamp):
+            found.update({f"{field.name}_{name}": int(item) for name, item in value._asdict().items()})
         elif field.name != "sender":
             found[field.name] = int(value)
     return found

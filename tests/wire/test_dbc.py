@@ -2,51 +2,27 @@
 
 import re
 import zlib
-from enum import IntEnum
 from pathlib import Path
-from typing import Any, get_type_hints
 
 import pytest
-from cantools.database.can import Message
 
 from dbc import device_dbc_text, fleet_dbc_text
 from onboard.config.site import parse_site
-from onboard.core import codes, messages, recovery_messages
+from onboard.core import codes, messages
 from onboard.wire import network_doc
 from onboard.wire.codec import fleet_codec
-from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts, read_layouts
+from onboard.wire.dbc_file import read_layouts
 from onboard.wire.network_doc import network_page
 from onboard.wire.site_dbc import site_dbc
 from tests.sites import ONE_FLOOR, one_floor
 from tests.wire.samples import judge_of, layouts
 
 TEXTS = {"fleet": fleet_dbc_text(), "device": device_dbc_text()}
-CLASSES = vars(messages) | vars(recovery_messages)
 #: One message of each class of priority, in the order of the design.
 ORDER = [
     "EmergencyStop", "TokenGrant", "BusTime", "Call", "Award", "Bid", "ItineraryHead", "Progress", "Heartbeat",
     "DriveOrder", "DriveState", "Diagnostic",
 ]  # fmt: skip
-
-
-@pytest.mark.parametrize("name", list(TEXTS))
-def test_every_signal_has_range_comment_receivers_and_every_message_senders(name: str) -> None:
-    database = judge_of(TEXTS[name])
-    for message in database.messages:
-        assert isinstance(message, Message)
-        assert message.is_extended_frame and message.length == 8 and message.comment and message.senders
-        for signal in message.signals:
-            where = f"{message.name}.{signal.name}"
-            assert signal.comment and signal.receivers, where
-            assert signal.minimum is not None and signal.maximum is not None, where
-            assert signal.byte_order == "little_endian", where
-            assert (signal.unit or "") == _unit_in(signal.name), where
-
-
-def _unit_in(name: str) -> str:
-    """Units come last in a name."""
-    endings = {"_mm_s": "mm/s", "_us": "us", "_ms": "ms", "_mm": "mm", "_kg": "kg"}
-    return next((unit for ending, unit in endings.items() if name.endswith(ending)), "")
 
 
 def test_identifiers_hold_priority_type_and_a_free_lowest_byte() -> None:
@@ -56,36 +32,6 @@ def test_identifiers_hold_priority_type_and_a_free_lowest_byte() -> None:
     assert len(set(types)) == len(types), "fleet and device bus may share one wire"
     ids = {layout.name: layout.frame_id for layout in found}
     assert [ids[name] for name in ORDER] == sorted(ids[name] for name in ORDER)
-
-
-def _kinds(layout: MessageLayout) -> dict[str, Any]:
-    """Type of each field that the signals of a message stand for."""
-    composed = {"Call": messages.CallForProposals, "Itinerary": messages.Itinerary}
-    if layout.name == "ItineraryLeg":
-        return get_type_hints(messages.Leg)
-    stem = next((one for one in composed if layout.name.startswith(one)), None)
-    return get_type_hints(
-        composed[stem] if stem else getattr(messages, layout.name, None) or getattr(recovery_messages, layout.name)
-    )
-
-
-def test_value_tables_are_the_codes_and_only_they_have_value_tables() -> None:
-    seen = set()
-    for layout in layouts():
-        kinds = _kinds(layout)
-        for signal in layout.signals:
-            kind, where = kinds.get(signal.name, int), f"{layout.name}.{signal.name}"
-            if kind is bool:
-                assert signal.choices == ((0, "NO"), (1, "YES")), where
-            elif isinstance(kind, type) and issubclass(kind, IntEnum):
-                seen.add(kind)
-                assert signal.choices == tuple((int(code), code.name) for code in kind), where
-            else:
-                assert not signal.choices, where
-                continue
-            assert (signal.minimum, signal.maximum) == (signal.choices[0][0], signal.choices[-1][0]), where
-    every = {kind for kind in vars(codes).values() if isinstance(kind, type) and issubclass(kind, IntEnum)}
-    assert seen == every - {IntEnum}
 
 
 def test_ranges_fit_into_the_bits() -> None:
@@ -108,13 +54,6 @@ def test_periods_and_version_are_those_of_a_site_that_sets_none() -> None:
         assert f'BA_ "ContractVersion" {codes.CONTRACT};' in text
     lines = [line for line in TEXTS["fleet"].splitlines() if line.startswith(("BO_ ", " SG_ "))]
     assert zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80 == codes.CONTRACT_VERSION, "as docs/contract-2.md says"
-
-
-def test_every_message_class_travels_and_nothing_else() -> None:
-    classes = {name for name, kind in CLASSES.items() if isinstance(kind, type) and issubclass(kind, messages.Message)}
-    parts = {"Call", "CallTerms", "CallLoad", "CallParent", "ItineraryHead", "ItineraryLeg"}
-    expected = (classes - {"Message", "CallForProposals", "Itinerary"}) | parts
-    assert {layout.name for layout in (*fleet_layouts(), *device_layouts())} == expected
 
 
 def test_the_sites_dbc_has_one_message_for_each_machine() -> None:

@@ -8,6 +8,7 @@ from onboard.core.recovery_messages import Go
 from onboard.systems.graph.messages import NodeAnswer, VisitList
 from onboard.systems.registry import find_system, system_names
 from onboard.wire.codec import codecs, fleet_codec
+from tests.wire.samples import frames_of
 
 _EVERYBODY = frozenset(KindCode) - {KindCode.ANY}
 _GATEWAY = KindCode.OBSERVER
@@ -24,8 +25,7 @@ def test_the_dbcs_senders_as_kinds() -> None:
 
 
 def test_what_a_system_adds() -> None:
-    graph = find_system("graph")
-    speakers = codecs(graph.name, graph.messages).fleet.speakers
+    speakers = codecs(frames_of("graph")).fleet.speakers
     assert speakers[NodeAnswer] == {KindCode.NODE}
     assert speakers[VisitList] == {KindCode.DESK, _GATEWAY}
 
@@ -33,6 +33,6 @@ def test_what_a_system_adds() -> None:
 @pytest.mark.parametrize("name", system_names())
 def test_every_message_of_a_fleet_bus_has_a_kind_of_its_system_or_a_gateway_that_says_it(name: str) -> None:
     system = find_system(name)
-    codec = codecs(name, system.messages).fleet
-    own = [cls for cls in system.messages if cls in codec.speakers]
-    assert all(codec.speakers[cls] & ({*system.factories, _GATEWAY}) for cls in own)
+    speakers = codecs(frames_of(name)).fleet.speakers
+    own = [frame.says for frame in frames_of(name) if frame.says is not None and not frame.is_device]
+    assert all(speakers[cls] & ({*system.factories, _GATEWAY}) for cls in own)

@@ -7,6 +7,7 @@ from contextlib import AbstractAsyncContextManager, AsyncExitStack, nullcontext
 from dataclasses import dataclass
 from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 
@@ -23,12 +24,15 @@ from bus_sim.run import RunOptions, Simulation, build, run_until
 from bus_sim.systems.car_park.show import Clock, TerminalShow
 from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
 from bus_sim.virtual_time import VirtualTimeLoop
-from bus_sim.window import BURST_US, Window, choose_window, densest
+from bus_sim.window import BURST_US, Window, choose_window, densest, with_short_eve
 from onboard.core.site import Site
 from onboard.io.signals import ended_by
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import Indicators
 from onboard.ways.site import way_site
+
+if TYPE_CHECKING:
+    from bus_sim.web.page import Page
 
 #: The run begins so long before the first customer, us: the machines find their places first.
 LEAD_US = 10_000_000
@@ -55,6 +59,8 @@ class DayOptions:
     random_s: tuple[float, float] | None = None
     cars: int = 50
     window: str | None = None
+    #: Of what was before the window only who is still inside is played, shortly before it.
+    short_eve: bool = False
     seed: int = 1
     speed: float | None = None
     limit_s: float | None = None
@@ -119,6 +125,8 @@ def run_day(site: Site, options: DayOptions) -> RunSummary:
     """
     demand = choose_demand(options, site)
     window = choose_window(demand, options.window) if options.window is not None else None
+    if window is not None and options.short_eve:
+        demand = with_short_eve(demand, window, len(way_site(site).compartments))
     unknown = options.without - set(names_of(site))
     if unknown:
         known = ", ".join(names_of(site))
@@ -163,6 +171,8 @@ class _Day:
         self._simulation = self._build(site)
         self._hand: ByHand | None = None
         self._is_interrupted = False
+        #: Whether the window has begun: figures are of it alone, and of the warm-up where it was ended in that.
+        self._is_warm = False
         plan = options.processes
         self._processes = (
             ProcessFleet(self._simulation, plan, options.without, self._console) if plan is not None else None
@@ -205,7 +215,7 @@ class _Day:
             stack.enter_context(ended_by(self._loop, self._interrupt))
             stack.callback(simulation.close)
             if options.web is not None:
-                await stack.enter_async_context(self._page(options.web))
+                show.address = (await stack.enter_async_context(self._page(options.web))).address
             if self._window is None:
                 await stack.enter_async_context(outside)
                 await stack.enter_async_context(self._publishing(outside))
@@ -224,13 +234,14 @@ class _Day:
                 simulation.start()
                 stack.enter_context(show)
                 await self._warm_up(self._window, show)
-                # Guests come for the window: they could not follow a warm-up that is hurried.
-                await stack.enter_async_context(outside)
-                await stack.enter_async_context(self._publishing(outside))
-                await self._through(self._window, show)
+                if self._is_warm:
+                    # Guests come for the window: they could not follow a warm-up that is hurried.
+                    await stack.enter_async_context(outside)
+                    await stack.enter_async_context(self._publishing(outside))
+                    await self._through(self._window, show)
         wall_s = time.monotonic() - self._begin_s
         summary = self._summarise(wall_s)
-        for line in summary.lines():
+        for line in summary.lines(console.width if console.is_terminal else None):
             console.print(line, highlight=False, soft_wrap=True)
         return summary
 
@@ -241,7 +252,7 @@ class _Day:
         assert outside.served is not None, "the options with a broker name an address"
         return Publishing(self._simulation.site, options.site_text, options.mqtt, outside.served, self._console)
 
-    def _page(self, where: str) -> AbstractAsyncContextManager[object]:
+    def _page(self, where: str) -> "Page":
         from bus_sim.systems.car_park.page import CarParkSource  # noqa: PLC0415  # its libraries are an extra
         from bus_sim.web.page import Page  # noqa: PLC0415  # as above
 
@@ -291,6 +302,9 @@ class _Day:
         )
         self._loop.set_pace(None)
         await self._until(begin_us, show)
+        if self._is_ended():
+            return
+        self._is_warm = True
         now_us = self._loop.now_us()
         self._indicators.begin(now_us)
         self._simulation.fleet.restart_statistics()
@@ -331,7 +345,7 @@ class _Day:
         return RunSummary(
             site=simulation.site.name,
             seed=self._options.seed,
-            window=self._window.told(self._demand) if self._window is not None else None,
+            window=self._shown(now_us),
             simulated_s=(now_us - self._begin_us) / 1e6,
             wall_s=wall_s,
             cars_in=street.parked,
@@ -355,8 +369,17 @@ class _Day:
             trace=str(trace) if trace is not None else None,
         )
 
+    def _shown(self, now_us: int) -> str | None:
+        """What of the window the figures are of, as far as it was played; None for a whole run."""
+        if self._window is None:
+            return None
+        begin_us = self._window.begin_us if self._is_warm else self._begin_us - self._origin_us
+        played = Window(begin_us, now_us - self._origin_us).told(self._demand)
+        return played if self._is_warm else f"warm-up, {played}"
+
     def _burst(self) -> BurstFigures | None:
-        burst = densest(self._demand, self._window)
+        played = Window(self._begin_us - self._origin_us, self._loop.now_us() - self._origin_us)
+        burst = densest(self._demand, played if self._window is not None else None)
         if burst is None:
             return None
         begin_us = burst.begin_us + self._origin_us

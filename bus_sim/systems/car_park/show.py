@@ -8,7 +8,6 @@ from typing import Self
 
 from rich.console import Console, Group
 from rich.live import Live
-from rich.panel import Panel
 from rich.text import Text
 
 from onboard.core.codes import KindCode, MachineState, Side
@@ -19,8 +18,12 @@ from onboard.ways.site import TrackKind, WaySite
 
 #: Pictures a second at most; more only costs the simulation time.
 PICTURES_S = 15
-#: Lines of events below the picture.
-EVENT_LINES = 10
+#: Lines of events below a picture of no given height; of a low one as many if the floors leave them.
+EVENT_LINES, FEWEST_EVENTS = 10, 3
+#: Lines of one floor: far places, alley, near places.
+FLOOR_LINES = 3
+#: Lines of a picture that nothing bounds.
+_ENOUGH = 1_000
 
 #: Columns before an alley: its floor and side.
 _LABEL = 5
@@ -53,7 +56,7 @@ class Clock:
 
 
 #: Columns that one position takes, widest first; the widest that fits is used.
-CELLS = (5, 3, 2)
+CELLS = (5, 3, 2, 1)
 
 
 def cell_width(site: WaySite, width: int) -> int:
@@ -163,20 +166,88 @@ def _shaft(site: WaySite, view: SiteView, track: int, index: int, cell: int) -> 
     return Text(f"[{aboard[0][-(width - 2) :] if aboard else '=':^{width - 2}}]", style="bold yellow")
 
 
-def draw(site: WaySite, view: SiteView, clock: Clock, line: str, width: int = 120) -> Group:
-    """The picture in ``width`` columns: floors from the top, machines' states, the last events, a line of figures."""
-    floors: list[Text] = []
+def _alley_line(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
+    """A floor in one line, where there is no room for three: where nobody is, its cars as marks above and below."""
+    row = _alley(site, view, track, cell)
+    taken, desks = view.places_taken(), set(site.compartments.values())
+    plain = list(row.plain)
+    first = _LABEL + _shaft_width(site, cell)
+    for index in range(1, site.tracks[track].length + 1):
+        far, near = Station(track, index, Side.FAR), Station(track, index, Side.NEAR)
+        at = first + (index - 1) * cell + (cell - 1) // 2
+        if plain[at] == ".":
+            has = (far.number in taken, near.number in taken)
+            plain[at] = "C" if {far, near} & desks else _MARKS[has]
+    label = f"{track:>2}".ljust(_LABEL)
+    line = Text(label + "".join(plain[_LABEL:]), no_wrap=True, overflow="crop")
+    line.spans = list(row.spans)
+    return line
+
+
+#: Cars at the far and at the near place of a position, in one column.
+_MARKS = {(False, False): ".", (True, False): "'", (False, True): ",", (True, True): ":"}
+
+
+def _states(view: SiteView, width: int) -> list[Text]:
+    """What each machine does, in columns."""
+    words = [f"{view.name(node)} {_STATE_WORDS[state]}" for node, state in sorted(view.states.items())]
+    column = max((len(word) for word in words), default=0) + 2
+    a_line = max(1, width // column)
+    return [
+        _line("".join(word.ljust(column) for word in words[at : at + a_line]).rstrip())
+        for at in range(0, len(words), a_line)
+    ]
+
+
+def _line(text: str, style: str = "") -> Text:
+    return Text(text, style=style, no_wrap=True, overflow="ellipsis")
+
+
+def _headed(text: str, width: int) -> Text:
+    return _line(f"-- {text} ".ljust(width, "-"), "bold")
+
+
+def _floors(site: WaySite, view: SiteView, width: int, room: int, events: int) -> list[Text]:
+    """All floors, the highest first, so that ``events`` of ``room`` lines are left.
+
+    Each has three lines, or one where that is too much; what has no room even so are the highest.
+    """
     cell = cell_width(site, width)
-    for number in sorted((n for n, t in site.tracks.items() if t.kind is TrackKind.ALLEY), reverse=True):
-        floors += draw_floor(site, view, number, cell)
-    states = Text("   ".join(f"{view.name(n)} {_STATE_WORDS[state]}" for n, state in sorted(view.states.items())))
-    said = dict.fromkeys((clock.at(when), text) for when, text in view.events)
-    events = [Text(f"{when}  {text}", no_wrap=True, overflow="ellipsis") for when, text in list(said)[-EVENT_LINES:]]
-    events += [Text("")] * (EVENT_LINES - len(events))
-    title = f"{site.name}  {clock.at(view.now_us)}"
-    return Group(
-        Panel(Group(*floors, Text(""), states), title=title), Panel(Group(*events), title="on the bus"), Text(line)
-    )
+    tracks = sorted((n for n, t in site.tracks.items() if t.kind is TrackKind.ALLEY), reverse=True)
+    if FLOOR_LINES * len(tracks) + events <= room:
+        return [row for track in tracks for row in draw_floor(site, view, track, cell)]
+    return [_alley_line(site, view, track, cell) for track in tracks[-max(1, room - 1) :]]
+
+
+def draw(
+    site: WaySite,
+    view: SiteView,
+    clock: Clock,
+    line: str,
+    width: int = 120,
+    height: int | None = None,
+    address: str | None = None,
+) -> Group:
+    """The picture in ``width`` columns and ``height`` lines: floors from the top, machines' states, the last events.
+
+    The newest event, the ``line`` of figures and the page's ``address`` are always there, from seven lines on: floors
+    shrink first. Where there is more room the events have it; without a height they are ten.
+    """
+    head, bus = _headed(f"{site.name}  {clock.at(view.now_us)}", width), _headed("on the bus", width)
+    foot = [_line(line, "reverse")] + ([_line(f"picture at {address}")] if address is not None else [])
+    states = _states(view, width)
+    if height is None:
+        floors, lines = _floors(site, view, width, _ENOUGH, EVENT_LINES), EVENT_LINES
+    else:
+        room = height - len(foot) - 2
+        if room - len(states) < FEWEST_EVENTS:
+            states = []
+        floors = _floors(site, view, width, room - len(states), FEWEST_EVENTS)
+        lines = room - len(states) - len(floors)
+    said = list(dict.fromkeys((clock.at(when), text) for when, text in view.events))
+    events = [_line(f"{when}  {text}") for when, text in said[-lines:]]
+    events += [Text("")] * (lines - len(events))
+    return Group(head, *floors, *states, bus, *events, *foot)
 
 
 class TerminalShow:
@@ -190,6 +261,8 @@ class TerminalShow:
         self._clock = clock
         self._figures = figures
         self._console = console
+        #: Of the page, if one is served: shown in every picture.
+        self.address: str | None = None
         self._next_line_us = 0
         self._every_us = 3_600_000_000
         self._last_s = 0.0
@@ -221,5 +294,6 @@ class TerminalShow:
         now_s = time.monotonic()
         if now_s - self._last_s >= 1 / PICTURES_S:
             self._last_s = now_s
-            width = self._console.width
-            self._live.update(draw(self._site, self._view, self._clock, self._figures(), width), refresh=True)
+            width, height = self._console.size
+            picture = draw(self._site, self._view, self._clock, self._figures(), width, height, self.address)
+            self._live.update(picture, refresh=True)

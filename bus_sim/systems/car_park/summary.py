@@ -1,11 +1,15 @@
 """What a run came to: customers, waiting, fleet indicators and bus, as a table and as JSON (row P55)."""
 
 from dataclasses import asdict, dataclass
+from textwrap import wrap
 
 from bus_sim.can.statistics import BusStatistics
 from bus_sim.systems.car_park.plant.street import Summary as StreetSummary
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import FleetIndicators
+
+#: Of less than this no figure means anything, s: machines have not all said where they are.
+SHORTEST_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -60,8 +64,16 @@ class RunSummary:
         """Nothing broke, nobody stopped, and at the end of a whole run everybody was served or told why."""
         return not self.violations and not self.halted and (self.window is not None or not self.unserved)
 
-    def lines(self) -> list[str]:
-        """The summary as a person reads it."""
+    def lines(self, width: int | None = None) -> list[str]:
+        """The summary as a person reads it, folded where a terminal's ``width`` is given."""
+        text = self._figures()
+        if width is None:
+            return text
+        return [part for line in text for part in (wrap(line, width, subsequent_indent=" " * 13) or [""])]
+
+    def _figures(self) -> list[str]:
+        if self.simulated_s < SHORTEST_S:
+            return [f"site {self.site}, seed {self.seed}: ended in its first second; no figures"]
         text = [self._head(), *self._customers(), *self._bus(), *self.fleet.lines()]
         if self.wire_drops:
             drops = ", ".join(f"{reason} {count}" for reason, count in sorted(self.wire_drops.items()))

@@ -22,6 +22,7 @@ from onboard.systems.terminal.missions import Transport
 from onboard.systems.terminal.search import Job, Search, remaining
 from onboard.systems.terminal.site import Terminal
 from onboard.ways.cars import car_fleet
+from onboard.work.order_life import OrderEvent
 
 #: An assignment that is in no plan yet is said again after this, us.
 AGAIN_US = 2_000_000
@@ -47,7 +48,7 @@ class CentralDesk(Desk):
             return []
         vehicle = self._best(transport, now_us)
         if vehicle is None:
-            self.orders.give_back(transport.task)
+            self.orders.give_back(transport.task, OrderEvent.NOT_WON)
             return []
         won = self.won(transport.task, vehicle, now_us)
         return [Record(self.orders.record()), *won, *self._assign(transport, vehicle, now_us)]

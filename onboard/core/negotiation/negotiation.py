@@ -102,6 +102,11 @@ class Negotiation:
         for initiator in self.initiators:
             initiator.begin_anew(now_us)
 
+    def was_held(self, now_us: int) -> None:
+        """I take part again: that somebody was silent while I was held, or asleep, says nothing of it."""
+        for initiator in self.initiators:
+            initiator.awarded_us = now_us
+
     def unheard(self, task: Reference, now_us: int) -> int:
         """Who was awarded a ``task`` of mine long ago and is not heard acting on it; 0 for nobody."""
         found = [one.unheard(now_us) for one in self.initiators if one.terms.task == task]

@@ -76,6 +76,7 @@ class Winners:
         """I was held, or asleep: what others did not do meanwhile is no sign that they are lost."""
         for known in self._tasks.values():
             known.since_us = now_us
+        self.negotiation.was_held(now_us)
 
     def over(self, task: Reference) -> None:
         """Done, given back, or nobody's any more."""

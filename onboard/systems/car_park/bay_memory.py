@@ -5,58 +5,60 @@ has had the bay, and the tickets that wait. Written before it is said (design, s
 """
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey
-from onboard.core.codes import Operation
+from onboard.core.codes import OUTSIDE, Operation
 from onboard.core.effects import Record
+from onboard.core.journal_records import Entry, JournalRecord, records_in
 from onboard.core.messages import CarAt, Reference
+from onboard.core.records import RetiredRecord, TokenGivenRecord
 from onboard.core.serial import successor
 from onboard.systems.car_park.bay_task import queue_ticket
+from onboard.systems.car_park.records import (
+    BayFreeRecord,
+    BayJobRecord,
+    CarAtRecord,
+    NumberRecord,
+    TicketRecord,
+    WinnerRecord,
+)
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
-
-Entry = Mapping[str, str | int]
 
 
 def car_record(statement: CarAt) -> Record:
     """Where a car in my custody stands, as it is told."""
-    entry: dict[str, str | int] = {"record": "car_at", "car_origin": statement.car.origin, "car": statement.car.number}
-    entry |= {"station": statement.station, "version": statement.version, "wheelbase_mm": statement.wheelbase_mm}
-    return Record(entry)
+    return Record(CarAtRecord(statement.car, statement.station, statement.version, statement.wheelbase_mm))
 
 
 def cars_at(node_id: int, entries: Iterable[Entry]) -> dict[Reference, CarAt]:
     """What node ``node_id`` has last journalled of each car, as it told it."""
-    return BayMemory(node_id).read(entry for entry in entries if entry.get("record") in ("car_at", "retired")).cars
+    return BayMemory(node_id).take_up(records_in(entries, CarAtRecord, RetiredRecord)).cars
 
 
 def winner_record(car: Reference, winner: int, task: Reference, version: int) -> Record:
     """Who may fetch a car, for which task and under which version of it; 0 for nobody any more."""
-    entry: dict[str, str | int] = {"record": "winner", "car_origin": car.origin, "car": car.number, "winner": winner}
-    return Record(entry | {"task_origin": task.origin, "task": task.number, "version": version})
+    return Record(WinnerRecord(car, winner, task, version))
 
 
 def ticket_record(car: Reference, *, urgent: bool) -> Record:
     """A ticket came; its car is to be fetched, an urgent one before those that wait."""
-    entry: dict[str, str | int] = {"record": "ticket", "car_origin": car.origin, "car": car.number}
-    return Record(entry | {"urgent": 1} if urgent else entry)
+    return Record(TicketRecord(car, urgent))
 
 
 def job_record(task: Reference, operation: Operation, car: Reference, wheelbase_mm: int) -> Record:
     """The bay's task begins."""
-    entry: dict[str, str | int] = {"record": "job", "task_origin": task.origin, "task": task.number}
-    entry |= {"operation": int(operation), "car_origin": car.origin, "car": car.number, "wheelbase_mm": wheelbase_mm}
-    return Record(entry)
+    return Record(BayJobRecord(task, operation, car, wheelbase_mm))
 
 
 def job_over_record() -> Record:
     """The bay is free again."""
-    return Record({"record": "job_over"})
+    return Record(BayFreeRecord())
 
 
-def next_reference(last: int, fleet: WayFleet) -> Reference:
+def _next_reference(last: int, fleet: WayFleet) -> Reference:
     """The next number of a car or task of this node; one under which a token was ever heard of is passed over.
 
     It goes to the journal before its token: whatever happens between the two writes, it is never used again.
@@ -66,6 +68,18 @@ def next_reference(last: int, fleet: WayFleet) -> Reference:
         if not fleet.tokens.is_known(car_token(fleet.node_id, last)):
             break
     return Reference(fleet.node_id, last)
+
+
+_READ = (
+    CarAtRecord,
+    WinnerRecord,
+    RetiredRecord,
+    TicketRecord,
+    BayJobRecord,
+    BayFreeRecord,
+    NumberRecord,
+    TokenGivenRecord,
+)
 
 
 @dataclass
@@ -79,6 +93,8 @@ class BayMemory:
     #: For which task, and under which version of it, somebody may fetch a car, or might.
     tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
     tickets: deque[Reference] = field(default_factory=deque)
+    #: The last number that was given to a car or a task; 0 before any.
+    number: int = 0
     #: Task, operation, car and wheelbase of the task in hand, or None.
     job: tuple[Reference, Operation, Reference, int] | None = None
     #: Whether the winner has had the bay since the task began.
@@ -86,32 +102,48 @@ class BayMemory:
 
     def read(self, entries: Iterable[Entry]) -> "BayMemory":
         """Take up all entries; those of other kinds are passed over."""
-        for entry in entries:
-            self._take(entry)
+        return self.take_up(records_in(entries, *_READ))
+
+    def take_up(self, records: Iterable[JournalRecord]) -> "BayMemory":
+        """Take up records of this memory."""
+        for record in records:
+            self._take(record)
         return self
 
-    def _take(self, entry: Entry) -> None:
-        match entry.get("record"):
-            case "car_at":
-                numbers = int(entry["station"]), int(entry["version"]), int(entry["wheelbase_mm"])
-                self.cars[_car(entry)] = CarAt(self.node_id, _car(entry), *numbers)
-                self.winners.pop(_car(entry), None)
-            case "winner":
-                self._take_winner(entry)
-            case "retired":
-                self._forget(_car(entry))
-            case "ticket":
-                queue_ticket(self.tickets, _car(entry), urgent="urgent" in entry)
-            case "job":
-                operation = Operation(int(entry["operation"]))
-                task = Reference(int(entry["task_origin"]), int(entry["task"]))
-                self.job, self.was_granted = (task, operation, _car(entry), int(entry["wheelbase_mm"])), False
-                if operation is Operation.RETRIEVE and _car(entry) in self.tickets:
-                    self.tickets.remove(_car(entry))
-            case "job_over":
+    def _take(self, record: JournalRecord) -> None:
+        match record:
+            case CarAtRecord(car=car):
+                self.cars[car] = CarAt(self.node_id, car, record.station, record.version, record.wheelbase_mm)
+                self.winners.pop(car, None)
+                if record.station == OUTSIDE and car in self.tickets:
+                    self.tickets.remove(car)
+            case WinnerRecord():
+                self._take_winner(record)
+            case RetiredRecord():
+                self._forget(record.load)
+            case TicketRecord():
+                queue_ticket(self.tickets, record.car, urgent=record.urgent)
+            case _:
+                self._take_task(record)
+
+    def _take_task(self, record: JournalRecord) -> None:
+        match record:
+            case BayJobRecord(operation=operation, car=car):
+                self.job, self.was_granted = (record.task, operation, car, record.wheelbase_mm), False
+                if operation is Operation.RETRIEVE and car in self.tickets:
+                    self.tickets.remove(car)
+            case NumberRecord():
+                self.number = record.number
+            case BayFreeRecord():
                 self.job = None
-            case "token_given" if self.bay == (int(entry["kind"]), int(entry["number"])):
+            case TokenGivenRecord() if self.bay == (record.kind, record.number):
                 self.was_granted = True
+
+    def next_reference(self, fleet: WayFleet) -> tuple[Reference, Record]:
+        """The name of the next car or task of this node, and what is to be written before it is used."""
+        name = _next_reference(self.number, fleet)
+        self.number = name.number
+        return name, Record(NumberRecord(name.number))
 
     def _forget(self, car: Reference) -> None:
         """It left long ago."""
@@ -120,16 +152,10 @@ class BayMemory:
         if car in self.tickets:
             self.tickets.remove(car)
 
-    def _take_winner(self, entry: Entry) -> None:
-        car, winner = _car(entry), int(entry["winner"])
-        if winner:
-            self.winners[car] = winner
+    def _take_winner(self, record: WinnerRecord) -> None:
+        if record.winner:
+            self.winners[record.car] = record.winner
         else:
-            self.winners.pop(car, None)
-        if "version" in entry:
-            task = Reference(int(entry["task_origin"]), int(entry["task"]))
-            self.tasks[car] = task, int(entry["version"])
-
-
-def _car(entry: Entry) -> Reference:
-    return Reference(int(entry["car_origin"]), int(entry["car"]))
+            self.winners.pop(record.car, None)
+        if record.version is not None and record.task is not None:
+            self.tasks[record.car] = record.task, record.version

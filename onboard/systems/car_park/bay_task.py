@@ -7,6 +7,7 @@ from enum import Enum
 
 from onboard.core.authority import TokenKey
 from onboard.core.codes import (
+    OUTSIDE,
     CallResult,
     Criterion,
     DeskInput,
@@ -24,8 +25,10 @@ from onboard.systems.car_park.site import CarLimits
 from onboard.ways.mirror import WayMirror
 from onboard.ways.tokens import car_token
 
-#: A call that nobody could serve is made again after this, us. Ours.
+#: A call that nobody could serve is made again after this, us, and each further time after twice as long, up to the
+#: second: a fleet that is off costs five calls a minute, and one that is back is asked within the minute promised.
 RETRY_US = 30_000_000
+LONGEST_RETRY_US = 60_000_000
 #: After a restart the machines say again what they have in hand; a task that nobody names is called anew so much later.
 #: Ours.
 SETTLING_US = 2_000_000
@@ -68,6 +71,23 @@ class BayTask:
     was_granted: bool = False
     retry_at_us: int | None = None
     reminders: int = 0
+    #: How often nobody could, one after the other, and why the last time; its driver may leave before anybody is asked.
+    refusals: int = 0
+    reason: Reason = Reason.CANCELLED
+
+    @property
+    def is_given_back(self) -> bool:
+        """Whether it is a car that nobody came to park: its driver may have it, and while he does not it is a task."""
+        return self.operation is Operation.PARK and self.refusals > 0
+
+    def refused(self, reason: Reason, now_us: int) -> None:
+        """Nobody could; it is called for again later, and ever less often."""
+        self.refusals, self.reason = self.refusals + 1, reason
+        self.wait(now_us)
+
+    def wait(self, now_us: int) -> None:
+        """Its next call is made a whole pause from now, us."""
+        self.retry_at_us = now_us + min(LONGEST_RETRY_US, RETRY_US << min(self.refusals - 1, 10))
 
     def terms(self, source: int, sink: int, floor: Callable[[CallForProposals, int], int]) -> CallTerms:
         """The call for it, between two stations by number; no robot can be better than ``floor``."""
@@ -95,6 +115,18 @@ class BayTask:
         """The newest award, to be said again."""
         return Award(sender, self.call, self.winner, self.task, self.version, CallResult.AWARDED, Reason.NONE)
 
+    def remind(self, sender: int, node: int) -> list[Effect]:
+        """Who was lost and comes back believing that the task is its own hears whose it is, or that nobody has it.
+
+        While it is called for, or awarded, what is said of that tells it by its version.
+        """
+        if self.winner == node or not self.call or self.version == 1:
+            return []
+        if self.winner:
+            return [Send(self.award(sender))]
+        lost = Award(sender, self.call, 0, self.task, self.version, CallResult.REJECTED, Reason.NODE_SILENT)
+        return [] if self.retry_at_us is None else [Send(lost)]
+
 
 def queue_ticket(tickets: deque[Reference], car: Reference, *, urgent: bool) -> bool:
     """Put a ticket behind those that wait, or an urgent one, new or not, before them; whether that changed anything."""
@@ -120,6 +152,19 @@ def fits(bay: BayState, limits: CarLimits) -> bool:
     small = bay.length_mm <= limits.max_length_mm and bay.height_mm <= limits.max_height_mm
     grips = limits.min_wheelbase_mm <= bay.wheelbase_mm <= limits.max_wheelbase_mm
     return small and grips and bay.load_kg <= limits.max_load_kg
+
+
+def forget_tickets(tickets: deque[Reference], mirror: WayMirror) -> None:
+    """Drop those of cars that have left, here or elsewhere: nobody can fetch them, and others wait behind them."""
+    for car in [car for car in tickets if car in mirror.cars and mirror.cars[car].station == OUTSIDE]:
+        tickets.remove(car)
+
+
+def turned_away(bay: BayState, limits: CarLimits, mirror: WayMirror) -> DeskText | None:
+    """What the driver of a car is told that the park does not take; None for one that it takes."""
+    if not fits(bay, limits):
+        return DeskText.CAR_TOO_LARGE
+    return None if mirror.free_places() else DeskText.FULL
 
 
 def refusal_text(mirror: WayMirror) -> DeskText:

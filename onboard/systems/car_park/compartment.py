@@ -29,7 +29,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import (
     BayState,
     CarAt,
@@ -47,7 +47,12 @@ from onboard.core.serial import successor
 from onboard.core.site import Station
 from onboard.systems.car_park import bay_task, custody
 from onboard.systems.car_park.bay_generation import BayGeneration
-from onboard.systems.car_park.bay_memory import BayMemory, job_over_record, job_record, next_reference, ticket_record
+from onboard.systems.car_park.bay_memory import (
+    BayMemory,
+    job_over_record,
+    job_record,
+    ticket_record,
+)
 from onboard.systems.car_park.bay_task import DESK_INPUT, REMINDERS, RETRY_US, SETTLING_US, BayPhase, BayTask
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.outputs import BayOutputs
@@ -73,7 +78,6 @@ class Compartment:
     stewardship: Stewardship = field(init=False)
     memory: BayMemory = field(init=False)
     outputs: BayOutputs = field(init=False)
-    _number: int = 0
     _desk_sequence: int | None = None
     _key_pressed: bool = False
     _robot_waits: bool = False
@@ -86,9 +90,6 @@ class Compartment:
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)
         self.tickets.extend(self.memory.tickets)
-        for entry in self.fleet.entries:
-            if entry.get("record") == "number":
-                self._number = int(entry["number"])
         self._table: dict[BayPhase, Callable[[int], list[Effect]]] = {
             BayPhase.STARTING: self._when_starting,
             BayPhase.FREE: self._when_free,
@@ -148,7 +149,7 @@ class Compartment:
         job = self.job
         if isinstance(message, TokenRequest) and job is not None:
             wanted = TokenKey(message.token_kind, message.token)
-            return self._remind(job, message.sender) if wanted == car_token(*job.car) else []
+            return job.remind(self.fleet.node_id, message.sender) if wanted == car_token(*job.car) else []
         if isinstance(message, TokenRefusal) and job is not None and job.is_unknown_to(message, self.fleet.mirror):
             job.reminders += 1
             # Whoever has not heard the call does not know by the award which car it is about.
@@ -164,10 +165,10 @@ class Compartment:
             return []
         if job is None or report.task != job.task:
             return bay_task.withdrawal(self.fleet.node_id, report)
-        if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None:
+        if report.phase is TaskPhase.AWARDED and not job.winner and job.retry_at_us is not None and not job.call:
             # I was restarted and asked all: its winner says that the task is in hand.
             return self._won_by(report.sender, job.call)
-        return self._remind(job, report.sender)
+        return job.remind(self.fleet.node_id, report.sender)
 
     def _on_forfeit(self, job: BayTask, sender: int, now_us: int) -> list[Effect]:
         """The winner gives the task back, or the custodian of the car has taken the right to it back."""
@@ -184,11 +185,6 @@ class Compartment:
             job.reminders += 1
             return [Send(job.award(self.fleet.node_id))]
         return self._call_again(job, now_us)
-
-    def _remind(self, job: BayTask, node: int) -> list[Effect]:
-        """Who was lost and comes back believing that the task is its own still hears whose it is."""
-        is_clear = job.winner in (0, node) or not job.call or job.version == 1
-        return [] if is_clear else [Send(job.award(self.fleet.node_id))]
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """An own call closed: note the winner, or tell why not. Awarded a RECEIVE: the car is fetched to this bay."""
@@ -212,7 +208,9 @@ class Compartment:
     def _won_by(self, winner: int, call: int) -> list[Effect]:
         job = self.job
         assert job is not None
-        job.winner, job.call, job.retry_at_us, job.reminders = winner, call, None, 0
+        job.winner, job.call, job.retry_at_us, job.reminders, job.refusals = winner, call, None, 0, 0
+        if self.phase is BayPhase.HANDOVER:
+            self._go(BayPhase.LOCKING)
         return self.stewardship.won(job.car, winner, job.task, job.version)
 
     def _call_again(self, job: BayTask, now_us: int) -> list[Effect]:
@@ -225,10 +223,15 @@ class Compartment:
         return effects + self._call_for(job, now_us)
 
     def _call_for(self, job: BayTask, now_us: int) -> list[Effect]:
-        if job.operation is Operation.PARK:
-            job.retry_at_us = None
-            return self._call(job, self.station.number, ANY_STATION, now_us)
-        return self._fetch(job, now_us)
+        source, sink = self.station.number, ANY_STATION
+        if job.operation is Operation.RETRIEVE:
+            where = custody.place_of(self.fleet, job.car)
+            if where is None:
+                job.retry_at_us = now_us + RETRY_US
+                return [Report(f"car {job.car.number} is nowhere to be fetched from")]
+            source, sink = where.number, source
+        job.retry_at_us = None
+        return list(self.fleet.negotiation.open(job.terms(source, sink, self._robots.floor), now_us))
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """Bay and the car in it: to the winner while the output door is open. All else by the steward's rules."""
@@ -269,7 +272,8 @@ class Compartment:
 
     def next_wake(self) -> int | None:
         """When a refused call is made again, or a winner counts as lost."""
-        retry_us = self.job.retry_at_us if self.job is not None and self.phase is BayPhase.AWAITING else None
+        waits = self.job is not None and self.phase in (BayPhase.AWAITING, BayPhase.HANDOVER)
+        retry_us = self.job.retry_at_us if self.job is not None and waits else None
         due = [time for time in (retry_us, self.stewardship.next_wake()) if time is not None]
         return min(due, default=None)
 
@@ -294,9 +298,13 @@ class Compartment:
         record = self.fleet.mirror.cars.get(car)
         if record is None or record.station == OUTSIDE:
             return [self.outputs.show(DeskText.UNKNOWN_TICKET, car)]
-        in_hand = self.job is not None and self.job.car == car and self.job.operation is Operation.RETRIEVE
+        job = self.job if self.job is not None and self.job.car == car else None
+        in_hand = job is not None and job.operation is Operation.RETRIEVE
         new = not in_hand and bay_task.queue_ticket(self.tickets, car, urgent=urgent)
-        return [*([ticket_record(car, urgent=urgent)] if new else []), self.outputs.show(DeskText.PLEASE_WAIT, car)]
+        noted: list[Effect] = [ticket_record(car, urgent=urgent)] if new else []
+        if job is not None and job.is_given_back and job.retry_at_us is not None:
+            return noted + self._give_back(job)
+        return [*noted, self.outputs.show(DeskText.PLEASE_WAIT, car)]
 
     # --- the phases --------------------------------------------------------------------------------------------
 
@@ -347,20 +355,14 @@ class Compartment:
         if self._key_pressed:
             self._key_pressed = False
             return self._admit(now_us)
-        if self.tickets and not self.bay.load_kg and not self.bay.person_inside and self._is_stored(self.tickets[0]):
+        bay_task.forget_tickets(self.tickets, self.fleet.mirror)
+        is_empty = not self.bay.load_kg and not self.bay.person_inside
+        if self.tickets and is_empty and custody.place_of(self.fleet, self.tickets[0]) is not None:
             self._go(BayPhase.RESERVING)
             return [self.outputs.light_up(LightColour.RED), *self.outputs.door(DoorName.INPUT, DoorAction.CLOSE)]
         if self.outputs.light is not LightColour.GREEN and not self.bay.load_kg:
             return [self.outputs.light_up(LightColour.GREEN)]
         return []
-
-    def _is_stored(self, car: Reference) -> bool:
-        return self._place_of(car) is not None
-
-    def _place_of(self, car: Reference) -> Station | None:
-        """The place that a car stands in; None while it is in a bay or aboard: its entry is still under way."""
-        station = self.fleet.mirror.car_station(car)
-        return station if station not in self.fleet.site.compartments.values() else None
 
     def _admit(self, now_us: int) -> list[Effect]:
         """Steps 2 to 5: check the car, print the ticket, call, turn the light red and close the input door."""
@@ -368,20 +370,18 @@ class Compartment:
         bay, limits = self.bay, car_park(self.fleet.site).cars
         if not bay.load_kg:
             return []
-        if not bay_task.fits(bay, limits):
-            return [self.outputs.show(DeskText.CAR_TOO_LARGE, Reference(0, 0))]
-        if not self.fleet.mirror.free_places():
-            return [self.outputs.show(DeskText.FULL, Reference(0, 0))]
-        car = next_reference(self._number, self.fleet)
-        self._number = car.number
+        turned_away = bay_task.turned_away(bay, limits, self.fleet.mirror)
+        if turned_away is not None:
+            return [self.outputs.show(turned_away, Reference(0, 0))]
+        car, number = self.memory.next_reference(self.fleet)
         self.job = BayTask(car, Operation.PARK, car, bay.wheelbase_mm)
         # The number first: one that is not used is no harm, one used twice would be.
-        effects: list[Effect] = [Record({"record": "number", "number": self._number})]
+        effects: list[Effect] = [number]
         effects += self.fleet.tokens.create(car_token(*car))
         effects.append(job_record(car, Operation.PARK, car, bay.wheelbase_mm))
         effects += custody.state(self.fleet, car, self.station.number, bay.wheelbase_mm)
         effects.append(self.outputs.show(DeskText.TAKE_TICKET, car))
-        effects += self._call(self.job, self.station.number, ANY_STATION, now_us)
+        effects += self._call_for(self.job, now_us)
         self._go(BayPhase.LOCKING)
         return [*effects, self.outputs.light_up(LightColour.RED)]
 
@@ -406,25 +406,17 @@ class Compartment:
         if not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         car = self.tickets.popleft()
-        task = next_reference(self._number, self.fleet)
-        self._number = task.number
+        task, number = self.memory.next_reference(self.fleet)
         self.job = BayTask(task, Operation.RETRIEVE, car, self.fleet.mirror.cars[car].wheelbase_mm)
         self._go(BayPhase.AWAITING)
         job = job_record(task, Operation.RETRIEVE, car, self.job.wheelbase_mm)
-        return [Record({"record": "number", "number": self._number}), job, *self._fetch(self.job, now_us)]
-
-    def _fetch(self, job: BayTask, now_us: int) -> list[Effect]:
-        where = self._place_of(job.car)
-        if where is None:
-            job.retry_at_us = now_us + RETRY_US
-            return [Report(f"car {job.car.number} is nowhere to be fetched from")]
-        job.retry_at_us = None
-        return self._call(job, where.number, self.station.number, now_us)
+        return [number, job, *self._call_for(self.job, now_us)]
 
     def _when_awaiting(self, now_us: int) -> list[Effect]:
-        assert self.job is not None
+        assert self.bay is not None and self.job is not None
         if self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
-            return self._call_for(self.job, now_us)
+            has_left = self.job.operation is Operation.PARK and not self.bay.load_kg
+            return self._left(self.job) if has_left else self._call_for(self.job, now_us)
         if not self._robot_waits or not self.job.winner or not self._is(DoorName.INPUT, DoorPosition.LOCKED):
             return []
         self._go(BayPhase.OPENING)
@@ -444,43 +436,55 @@ class Compartment:
         return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
 
     def _when_closing(self, now_us: int) -> list[Effect]:
-        assert self.job is not None
+        job = self.job
+        assert job is not None
         if not self._is(DoorName.OUTPUT, DoorPosition.LOCKED):
             return []
-        if self.job.operation is Operation.PARK:
+        if job.operation is Operation.PARK and not job.is_given_back:
             return self._to_free()
         self._go(BayPhase.HANDOVER)
-        return [
-            *self.outputs.door(DoorName.INPUT, DoorAction.OPEN),
-            self.outputs.show(DeskText.CAR_READY, self.job.car),
-        ]
+        text = DeskText.CAR_READY
+        if job.is_given_back:
+            job.wait(now_us)
+            text = text if job.car in self.tickets else bay_task.refusal_text(self.fleet.mirror)
+        return [*self.outputs.door(DoorName.INPUT, DoorAction.OPEN), self.outputs.show(text, job.car)]
 
     def _when_handover(self, now_us: int) -> list[Effect]:
+        """A car is its driver's to take: it was fetched for him, or nobody came to park it, which is tried again."""
         assert self.bay is not None and self.job is not None
         is_open = self._is(DoorName.INPUT, DoorPosition.OPEN)
-        if not is_open or self.bay.load_kg or self.bay.person_inside:
+        if is_open and not self.bay.load_kg and not self.bay.person_inside:
+            return self._left(self.job)
+        if not self.job.is_given_back:
             return []
-        car = self.job.car
-        effects = custody.state(self.fleet, car, OUTSIDE, self.job.wheelbase_mm)
+        if not is_open or self.bay.person_inside:
+            self.job.wait(now_us)
+        elif self.job.retry_at_us is not None and self.job.retry_at_us <= now_us:
+            self._go(BayPhase.LOCKING)
+            return self._when_locking(now_us)
+        return []
+
+    def _left(self, job: BayTask) -> list[Effect]:
+        """The car has gone out with its driver, fetched or never parked."""
+        refused = TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, job.reason)
+        effects: list[Effect] = [Send(refused)] if job.operation is Operation.PARK else []
+        effects += custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm)
         effects.append(self.outputs.show(DeskText.WELCOME, Reference(0, 0)))
         return effects + self._to_free()
 
     # --- inner works -------------------------------------------------------------------------------------------
 
     def _refused(self, job: BayTask, reason: Reason, now_us: int) -> list[Effect]:
-        """Nobody could: a car to be parked is given back with a word, a car to be fetched is called for again."""
-        if job.operation is Operation.RETRIEVE:
-            job.retry_at_us = now_us + RETRY_US
-            return [Report(f"nobody can fetch car {job.car.number}: {reason.name}; called again in 30 s")]
-        effects: list[Effect] = [
-            Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.REFUSED, self.station.number, reason)),
-            *custody.state(self.fleet, job.car, OUTSIDE, job.wheelbase_mm),
-            self.outputs.show(bay_task.refusal_text(self.fleet.mirror), job.car),
-        ]
-        return effects + self._to_free()
+        """Nobody could: it is called for again; meanwhile a car to be parked is its driver's to take, who is told."""
+        job.refused(reason, now_us)
+        said = f"nobody can {job.operation.name.lower()} car {job.car.number}: {reason.name}; called again later"
+        return [Report(said), *(self._give_back(job) if job.operation is Operation.PARK else [])]
 
-    def _call(self, job: BayTask, source: int, sink: int, now_us: int) -> list[Effect]:
-        return list(self.fleet.negotiation.open(job.terms(source, sink, self._robots.floor), now_us))
+    def _give_back(self, job: BayTask) -> list[Effect]:
+        if self.phase is not BayPhase.HANDOVER:
+            self._go(BayPhase.CLOSING)
+            return self.outputs.door(DoorName.OUTPUT, DoorAction.CLOSE)
+        return [self.outputs.show(DeskText.CAR_READY, job.car)]
 
     def _is(self, door: DoorName, position: DoorPosition) -> bool:
         assert self.doors is not None

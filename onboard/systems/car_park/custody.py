@@ -43,6 +43,12 @@ def state(fleet: WayFleet, car: Reference, station: int, wheelbase_mm: int) -> l
     return [car_record(said), Send(said)]
 
 
+def place_of(fleet: WayFleet, car: Reference) -> Station | None:
+    """The place that a car stands in; None while it is in a bay or aboard: its entry is still under way."""
+    station = fleet.mirror.car_station(car)
+    return station if station not in fleet.site.compartments.values() else None
+
+
 def others_in(mirror: WayMirror, station: Station, car: Reference | None = None) -> list[Reference]:
     """Cars that stand in a station by their custodians' word, other than ``car``."""
     return [one for one, record in mirror.cars.items() if record.station == station.number and one != car]

@@ -14,6 +14,7 @@ from enum import Enum
 
 from onboard.core.authority import segment_token
 from onboard.core.codes import LegAction
+from onboard.core.serial import ranks_before
 from onboard.systems.car_park.program import Program, Step
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayFleet
@@ -64,10 +65,10 @@ class GivingWay:
             # A right in hand outranks stamps: whoever has it is about to be there.
             return holder == sender
         plans = self.fleet.mirror.itineraries
-        return plans[sender].stamp.ranks_before(plans[self.fleet.node_id].stamp)
+        return ranks_before(plans[sender].stamp, plans[self.fleet.node_id].stamp)
 
     def _come_behind(self, meetings: list[Meeting]) -> Answer:
-        """Move each of my steps so far that it begins when the others' turns are over."""
+        """Move each of my steps so far that it begins when the others' turns are over; work in hand stays as it is."""
         ends_us: dict[int, list[Meeting]] = {}
         for meeting in meetings:
             if meeting.theirs.to_us < FOREVER:
@@ -83,6 +84,9 @@ class GivingWay:
             )
             now = self.program.remaining[number]
             lacking_us = max(meeting.theirs.to_us - meeting.mine.from_us for meeting in ends_us[to_come])
+            if number == 0 and now.action is LegAction.WORK:
+                # I am there: to stay for longer than the work takes helps nobody, and all would plan around that.
+                continue
             if number == 0:
                 by_us = lacking_us - _slack_us(self.fleet.site, now)
             else:

@@ -15,9 +15,9 @@ from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, R
 from onboard.core.site import Segment
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.handling import Phase, ShuttleWork
+from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.places import Places
-from onboard.systems.car_park.program import Handling, Program, Step, Work, to_itinerary
+from onboard.systems.car_park.program import Handling, Phase, Program, Step, Work, to_itinerary
 from onboard.systems.car_park.recovery import forfeited_record, sink_record
 from onboard.systems.car_park.standoff import Standoff
 from onboard.systems.car_park.travel import Carriage

@@ -6,7 +6,6 @@ to the actuator.
 """
 
 from dataclasses import dataclass, field
-from enum import Enum
 
 from onboard.core.authority import TokenKey, station_token
 from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
@@ -14,23 +13,13 @@ from onboard.core.effects import Actuate, Effect, Record
 from onboard.core.messages import ShuttleOrder, ShuttleState
 from onboard.core.serial import successor
 from onboard.systems.car_park import custody
-from onboard.systems.car_park.program import Handling, Work
+from onboard.systems.car_park.program import Handling, Phase, Work
+from onboard.systems.car_park.records import StepRecord
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.travel import Carriage
 from onboard.systems.car_park.unheard import Unheard
 from onboard.ways.mirror import WayFleet
 from onboard.ways.tokens import car_token
-
-
-class Phase(Enum):
-    """Where one handling stands."""
-
-    ACQUIRE = "acquire"
-    REACH = "reach"
-    CLAMP = "clamp"
-    RETRACT = "retract"
-    DONE = "done"
-
 
 #: (phase, handling) -> (shuttle's order on leaving the phase, or None, and the next phase).
 #: CLAMP grips when a car is taken and releases when it is left.
@@ -164,15 +153,12 @@ class ShuttleWork:
         if order is None:
             return self._finish(self.work, now_us)
         self.sequence = successor(self.sequence, 8)
-        entry = {"record": "step", "phase": self.phase.value, "handling": self.work.handling.value}
         side, wheelbase_mm = self.work.station.side, self.work.wheelbase_mm
         self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
         self._unheard.ordered("shuttle")
         self.stall.ordered(now_us)
-        return [
-            Record({**entry, "station": self.work.station.number, "car": self.work.car.number}),
-            Actuate(self._ordered),
-        ]
+        begun = StepRecord(self.phase, self.work.handling, self.work.station.number, self.work.car.number)
+        return [Record(begun), Actuate(self._ordered)]
 
     def _finish(self, work: Work, now_us: int) -> list[Effect]:
         """The shuttle is home: state where the car is, pass custody on after leaving it, give the station back."""

@@ -11,7 +11,8 @@ from onboard.core.codes import DriveMode, LegAction, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import ManualOrder, Message, Reference, TaskReport
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.handling import Phase, ShuttleWork
+from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.program import Phase
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import TrackKind

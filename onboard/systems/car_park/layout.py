@@ -100,6 +100,8 @@ def _read_alleys(layout: Layout, floors: Table) -> None:
     positions = floors.integer("positions", 2, _MOST_POSITIONS)
     sides = _read_sides(floors, frozenset(Side))
     layout.known = not floors.wrong & {"count", "positions"}
+    if "count" in floors.wrong:
+        floors.pass_over(str.isdecimal)
     for number in range(FIRST_ALLEY, FIRST_ALLEY + count):
         length, own_sides = positions, sides
         if floors.has(str(number)):
@@ -188,8 +190,14 @@ def _read_served(layout: Layout, table: Table) -> list[int]:
             table.bad("floors", floor, what, f"floors here: 1 to {len(here)}", item=number)
     if "floors" in table.wrong:
         return here
-    if not written or written != list(range(written[0], written[0] + len(written))):
-        table.bad("floors", written, "not a rising row of floors", "write each floor from the lowest to the highest")
+    whole = list(range(min(written), max(written) + 1)) if written else []
+    if not written or sorted(written) != whole:
+        left_out = ", ".join(str(floor) for floor in whole if floor not in written)
+        what = f"leaves out floor {left_out}" if left_out else "has a floor twice" if written else "no floor at all"
+        table.bad("floors", written, f"{what}; a lift stops at every floor of its shaft", f"write {whole or here}")
+        return here
+    if written != whole:
+        table.bad("floors", written, "not from the lowest to the highest", f"write {whole}")
         return here
     return list(written)
 

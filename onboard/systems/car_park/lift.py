@@ -12,6 +12,7 @@ from enum import Enum
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.journal_records import records_in
 from onboard.core.messages import (
     Award,
     DriveOrder,
@@ -28,6 +29,7 @@ from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, Pr
 from onboard.core.serial import from_bus_ms, successor
 from onboard.systems.car_park.bay_memory import BayMemory
 from onboard.systems.car_park.lift_generation import LiftGeneration
+from onboard.systems.car_park.records import RideOverRecord, RideRecord
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
@@ -324,11 +326,10 @@ class Lift:
     def _ride_in_journal(self) -> Ride | None:
         """The ride that was begun and not ended when the controller stopped."""
         found: Ride | None = None
-        for entry in self.fleet.entries:
-            if entry.get("record") == "ride":
-                found = Ride(int(entry["robot"]), int(entry["board"]), int(entry["leave"]), 0)
-            elif entry.get("record") == "ride_over":
-                found = None
+        for record in records_in(self.fleet.entries, RideRecord, RideOverRecord):
+            found = None
+            if isinstance(record, RideRecord):
+                found = Ride(record.robot, record.board, record.leave, 0)
         return found
 
     def _when_free(self, now_us: int) -> list[Effect]:
@@ -363,8 +364,7 @@ class Lift:
 
     def _set_off(self, ride: Ride, now_us: int) -> list[Effect]:
         self.ride, self.phase = ride, LiftPhase.RIDING
-        entry: dict[str, str | int] = {"record": "ride", "robot": ride.robot, "board": ride.board, "leave": ride.leave}
-        return [Record(entry), *self._go(ride.leave, now_us)]
+        return [Record(RideRecord(ride.robot, ride.board, ride.leave)), *self._go(ride.leave, now_us)]
 
     def _rides_onward(self, now_us: int) -> Ride | None:
         """Where whoever is aboard says that it rides on from this floor, without having given the platform back.
@@ -392,7 +392,7 @@ class Lift:
         assert self.ride is not None
         # The robot need not tell its plan anew after a ride: it is remembered as made.
         self._made[self.ride.robot] = self._begin_as_told(self.ride, now_us)
-        over = Record({"record": "ride_over", "robot": self.ride.robot})
+        over = Record(RideOverRecord(self.ride.robot))
         self.ride = None
         self.phase = LiftPhase.FREE
         return [over, *self._when_free(now_us)]

@@ -51,6 +51,8 @@ def read_stewards(table: Table, layout: Layout, fleet: Fleet) -> dict[int, int]:
     """
     fixed = fleet.fixed()
     stewards = {}
+    if not layout.known:
+        table.pass_over(str.isdecimal)
     for number, track in layout.tracks.items():
         if not table.has(str(number)):
             if fixed:

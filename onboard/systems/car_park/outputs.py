@@ -11,6 +11,7 @@ from onboard.core.codes import DeskText, DoorAction, DoorName, DoorPosition, Lig
 from onboard.core.effects import Actuate, Effect, Record
 from onboard.core.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Message, Reference
 from onboard.core.serial import successor
+from onboard.systems.car_park.records import DoorRecord
 from onboard.systems.car_park.unheard import Unheard
 
 #: A desk tells nobody what it shows: its last order is said again with so many states of the bay (ours).
@@ -43,7 +44,7 @@ class BayOutputs:
             return []
         order = self._doors[door] = DoorOrder(self.node_id, self._next(), door, action)
         self._unheard.ordered(door)
-        return [Record({"record": "door", "door": int(door), "action": int(action)}), Actuate(order)]
+        return [Record(DoorRecord(door, action)), Actuate(order)]
 
     def show(self, text: DeskText, car: Reference) -> Effect:
         """What the desk is to show; with TAKE_TICKET it prints."""

@@ -13,8 +13,8 @@ from onboard.core.messages import Itinerary
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
-from onboard.systems.car_park.handling import Phase, ShuttleWork
-from onboard.systems.car_park.program import Handling, Work
+from onboard.systems.car_park.handling import ShuttleWork
+from onboard.systems.car_park.program import Handling, Phase, Work
 from onboard.ways.mirror import WayFleet
 
 

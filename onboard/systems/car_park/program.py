@@ -6,7 +6,7 @@ happened, and sent as an itinerary, all from one value.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from enum import Enum
+from enum import StrEnum
 from typing import NamedTuple
 
 from onboard.core.codes import Grade, LegAction, Side
@@ -25,11 +25,21 @@ MAX_LEG_US = ((1 << 24) - 1) * 1000
 STAMP_AHEAD_US = 60_000_000
 
 
-class Handling(Enum):
+class Handling(StrEnum):
     """What the shuttle does with a car at a station."""
 
     TAKE = "take"
     LEAVE = "leave"
+
+
+class Phase(StrEnum):
+    """Where one handling stands."""
+
+    ACQUIRE = "acquire"
+    REACH = "reach"
+    CLAMP = "clamp"
+    RETRACT = "retract"
+    DONE = "done"
 
 
 class Work(NamedTuple):

@@ -1,39 +1,247 @@
-"""What of a car park's records outlives compaction; who reads each is named beside it."""
+"""What a car park's machines write into their journals; who reads each is named beside it. Lengths in mm."""
 
-from onboard.core.codes import Operation
-from onboard.systems.car_park.program import Handling
-from onboard.work.compaction import End, Keep, Rules, Which
+from dataclasses import dataclass, field
 
-_CAR = ("car_origin", "car")
-_TASK = ("task_origin", "task")
+from onboard.core.codes import DoorAction, DoorName, Operation
+from onboard.core.journal_records import UNSAID, End, JournalRecord, Keep, RecordTypes, Which
+from onboard.core.messages import Reference
+from onboard.systems.car_park.program import Handling, Phase
 
-RECORDS: Rules = {
-    # recovery.py: a task is in hand from its award until its car is left, or it is another's.
-    "award": (Keep("award", _TASK),),
-    "sink": (Keep("sink", _TASK),),
-    "forfeited": (End(("award", "handled", "sink"), _TASK),),
-    # The last handling also ends the shuttle's step; the last car that was left is told to whoever asks.
-    "handled": (
+_CAR = ("car",)
+_TASK = ("task",)
+
+
+# --- a robot's: recovery.py ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class AwardRecord(JournalRecord):
+    """A task taken on under ``version``; stations by number, ``source`` 0 where none was written down.
+
+    It is in hand until its car is left, or it is another's.
+    """
+
+    NAME = "award"
+    RULES = (Keep("award", _TASK),)
+
+    initiator: int
+    call: int
+    task: Reference
+    operation: Operation
+    car: Reference
+    wheelbase_mm: int
+    from_station: int
+    to_station: int
+    deadline_ms: int
+    source: int = 0
+    sink: int = 0
+    version: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class SinkRecord(JournalRecord):
+    """The car of a task is to be left at another station than the award says."""
+
+    NAME = "sink"
+    RULES = (Keep("sink", _TASK),)
+
+    task: Reference
+    station: int
+
+
+@dataclass(frozen=True, slots=True)
+class ForfeitedRecord(JournalRecord):
+    """A task was given back, or is another's."""
+
+    NAME = "forfeited"
+    RULES = (End(("award", "handled", "sink"), _TASK),)
+
+    task: Reference
+
+
+@dataclass(frozen=True, slots=True)
+class HandledRecord(JournalRecord):
+    """A handling is over, and with it the shuttle's step; the last car that was left is told to whoever asks."""
+
+    NAME = "handled"
+    RULES = (
         Keep("handled", _TASK),
         Keep("last_handled"),
-        End(("award", "handled", "sink"), _TASK, ("handling", (Handling.LEAVE.value,))),
+        End(("award", "handled", "sink"), _TASK, ("handling", (Handling.LEAVE,))),
         Keep("left", ("handling",)),
-    ),
-    "step": (Keep("step"),),
-    "riding": (Keep("riding"),),
-    "floor": (Keep("floor"), End(("riding",))),
-    # bay_memory.py: custody of cars, and the bay's own task. ``retired`` of the core ends what is about a car.
-    # In the order in which cars first came.
-    "car_at": (Keep("car_at", _CAR, Which.FIRST_AND_NEWEST),),
-    "winner": (Keep("winner", _CAR),),
-    "ticket": (Keep("ticket", _CAR, Which.ALL),),
-    "job": (Keep("job"), End(("ticket",), _CAR, ("operation", (int(Operation.RETRIEVE),)))),
-    "job_over": (End(("job",)),),
-    # compartment.py
-    "number": (Keep("number"),),
-    # outputs.py: for people; nobody reads it.
-    "door": (Keep("door", ("door",)),),
-    # lift.py
-    "ride": (Keep("ride"),),
-    "ride_over": (End(("ride",)),),
-}
+    )
+
+    task: Reference
+    handling: Handling
+    station: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class StepRecord(JournalRecord):
+    """The shuttle's step that is about to be ordered; ``car`` is its number."""
+
+    NAME = "step"
+    RULES = (Keep("step"),)
+
+    phase: Phase
+    handling: Handling
+    station: int
+    car: int
+
+
+@dataclass(frozen=True, slots=True)
+class RidingRecord(JournalRecord):
+    """A ride begins: from now on the floor is the lift's business."""
+
+    NAME = "riding"
+    RULES = (Keep("riding"),)
+
+    lift: int
+    board: int
+    leave: int
+
+
+@dataclass(frozen=True, slots=True)
+class FloorRecord(JournalRecord):
+    """The track on which the carrier is: after a ride, or about to turn into a spur."""
+
+    NAME = "floor"
+    RULES = (Keep("floor"), End(("riding",)))
+
+    track: int
+
+
+# --- custody of cars, and the bay's own task: bay_memory.py. The core's ``retired`` ends what is about a car ---
+
+
+@dataclass(frozen=True, slots=True)
+class CarRecord(JournalRecord):
+    """What is about a car."""
+
+    car: Reference
+
+    def load_number(self) -> int | None:
+        """The car's number in its token."""
+        return self.car.origin << 16 | self.car.number
+
+
+@dataclass(frozen=True, slots=True)
+class CarAtRecord(CarRecord):
+    """Where a car in this node's custody stands, as it is told. In the order in which cars first came."""
+
+    NAME = "car_at"
+    RULES = (Keep("stands", _CAR, Which.FIRST_AND_NEWEST),)
+
+    station: int
+    version: int
+    wheelbase_mm: int
+
+
+@dataclass(frozen=True, slots=True)
+class WinnerRecord(CarRecord):
+    """Who may fetch a car, for which task and under which version of it; 0 for nobody any more."""
+
+    NAME = "winner"
+    RULES = (Keep("winner", _CAR),)
+
+    winner: int
+    task: Reference | None = None
+    version: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TicketRecord(JournalRecord):
+    """A ticket came; an urgent one goes before those that wait."""
+
+    NAME = "ticket"
+    RULES = (Keep("ticket", _CAR, Which.ALL),)
+
+    car: Reference
+    urgent: bool = field(default=False, metadata=UNSAID)
+
+
+@dataclass(frozen=True, slots=True)
+class BayJobRecord(JournalRecord):
+    """The bay's task begins."""
+
+    NAME = "job"
+    RULES = (Keep("job"), End(("ticket",), _CAR, ("operation", (Operation.RETRIEVE,))))
+
+    task: Reference
+    operation: Operation
+    car: Reference
+    wheelbase_mm: int
+
+
+@dataclass(frozen=True, slots=True)
+class BayFreeRecord(JournalRecord):
+    """The bay is free again."""
+
+    NAME = "job_over"
+    RULES = (End(("job",)),)
+
+
+@dataclass(frozen=True, slots=True)
+class NumberRecord(JournalRecord):
+    """The last number that a compartment gave to a car or a task; bay_memory.py reads it."""
+
+    NAME = "number"
+    RULES = (Keep("number"),)
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class DoorRecord(JournalRecord):
+    """A door was ordered (outputs.py): for people, nobody reads it."""
+
+    NAME = "door"
+    RULES = (Keep("door", ("door",)),)
+
+    door: DoorName
+    action: DoorAction
+
+
+# --- a lift's: lift.py -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class RideRecord(JournalRecord):
+    """A ride with ``robot`` aboard begins; ``board`` and ``leave`` are floors of the shaft."""
+
+    NAME = "ride"
+    RULES = (Keep("ride"),)
+
+    robot: int
+    board: int
+    leave: int
+
+
+@dataclass(frozen=True, slots=True)
+class RideOverRecord(JournalRecord):
+    """It is over."""
+
+    NAME = "ride_over"
+    RULES = (End(("ride",)),)
+
+    robot: int
+
+
+RECORDS: RecordTypes = (
+    AwardRecord,
+    SinkRecord,
+    ForfeitedRecord,
+    HandledRecord,
+    StepRecord,
+    RidingRecord,
+    FloorRecord,
+    CarAtRecord,
+    WinnerRecord,
+    TicketRecord,
+    BayJobRecord,
+    BayFreeRecord,
+    NumberRecord,
+    DoorRecord,
+    RideRecord,
+    RideOverRecord,
+)

@@ -5,7 +5,7 @@ ride begun and ended. The mirror, bids and plans are not in the journal; the way
 say that the carrier stands (design, section 5).
 """
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
 from onboard.core.codes import (
@@ -14,58 +14,84 @@ from onboard.core.codes import (
     Criterion,
     KindCode,
     LegAction,
-    Operation,
-    Reason,
     ShuttleMode,
-    TaskPhase,
 )
-from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import Award, CallForProposals, CarAt, Reference, ShuttleState, TaskReport
+from onboard.core.effects import Effect, Record
+from onboard.core.journal_records import Entry, JournalRecord, records_in
+from onboard.core.messages import Award, CallForProposals, CarAt, Reference, ShuttleState
+from onboard.core.records import BootRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_memory import cars_at
-from onboard.systems.car_park.handling import Phase
-from onboard.systems.car_park.program import Handling, Step, Work
+from onboard.systems.car_park.program import Handling, Phase, Step, Work
+from onboard.systems.car_park.records import (
+    AwardRecord,
+    FloorRecord,
+    ForfeitedRecord,
+    HandledRecord,
+    RidingRecord,
+    SinkRecord,
+    StepRecord,
+)
 from onboard.ways.mirror import WayFleet
-
-Entry = Mapping[str, str | int]
+from onboard.work.undertaking import gives_back
 
 
 def award_record(call: CallForProposals, source: Station, sink: Station, version: int) -> Record:
     """A task taken on under ``version``: what is needed to go on with it, and where its car is taken and left."""
-    entry: dict[str, str | int] = {"record": "award", "initiator": call.sender, "call": call.call}
-    entry |= {"task_origin": call.task.origin, "task": call.task.number, "operation": int(call.operation)}
-    entry |= {"car_origin": call.car.origin, "car": call.car.number, "wheelbase_mm": call.wheelbase_mm}
-    entry |= {"from_station": call.from_station, "to_station": call.to_station, "deadline_ms": call.deadline_ms}
-    return Record(entry | {"source": source.number, "sink": sink.number, "version": version})
+    return Record(
+        AwardRecord(
+            call.sender,
+            call.call,
+            call.task,
+            call.operation,
+            call.car,
+            call.wheelbase_mm,
+            call.from_station,
+            call.to_station,
+            call.deadline_ms,
+            source.number,
+            sink.number,
+            version,
+        )
+    )
 
 
 def handled_record(work: Work) -> Record:
     """A handling is over."""
-    task = work.call.task
-    entry: dict[str, str | int] = {"record": "handled", "task_origin": task.origin, "task": task.number}
-    return Record(entry | {"handling": work.handling.value, "station": work.station.number})
+    return Record(HandledRecord(work.call.task, work.handling, work.station.number))
 
 
 def forfeited_record(task: Reference) -> Record:
     """A task was given back, or is another's."""
-    return Record({"record": "forfeited", "task_origin": task.origin, "task": task.number})
+    return Record(ForfeitedRecord(task))
 
 
 def sink_record(task: Reference, station: Station) -> Record:
     """The car of a task is to be left at another station than the award says."""
-    entry: dict[str, str | int] = {"record": "sink", "task_origin": task.origin, "task": task.number}
-    return Record(entry | {"station": station.number})
+    return Record(SinkRecord(task, station.number))
 
 
 def ride_record(step: Step) -> Record:
     """A ride begins: from now on the floor is the lift's business."""
-    return Record({"record": "riding", "lift": step.track, "board": step.from_index, "leave": step.to_index})
+    return Record(RidingRecord(step.track, step.from_index, step.to_index))
 
 
 def floor_record(track: int) -> Record:
     """A ride is over: the carrier is on this alley. Or it is about to turn into this spur from its mouth."""
-    return Record({"record": "floor", "track": track})
+    return Record(FloorRecord(track))
+
+
+_READ = (
+    BootRecord,
+    AwardRecord,
+    SinkRecord,
+    ForfeitedRecord,
+    StepRecord,
+    HandledRecord,
+    RidingRecord,
+    FloorRecord,
+)
 
 
 @dataclass
@@ -92,39 +118,38 @@ class Recovery:
     def read(cls, node_id: int, entries: Sequence[Entry]) -> "Recovery":
         """From the journal of node ``node_id``; entries of other kinds are passed over."""
         found = cls(cars=cars_at(node_id, entries))
-        for entry in entries:
-            found._take(entry)
+        for record in records_in(entries, *_READ):
+            found._take(record)
         return found
 
-    def _take(self, entry: Entry) -> None:
-        match entry.get("record"):
-            case "boot":
+    def _take(self, record: JournalRecord) -> None:
+        match record:
+            case BootRecord():
                 self.is_restart = True
-            case "award" if "source" in entry:
-                self.forget(_task(entry))
-                self.works += _works(entry)
-                self.versions[_task(entry)] = int(entry.get("version", 1))
-            case "sink":
-                place = Station.from_number(int(entry["station"]))
-                leave = Handling.LEAVE
+            case AwardRecord() if record.source:
+                self.forget(record.task)
+                self.works += _works(record)
+                self.versions[record.task] = record.version
+            case SinkRecord():
+                place, last = Station.from_number(record.station), (record.task, Handling.LEAVE)
                 self.works = [
-                    one._replace(station=place) if (one.call.task, one.handling) == (_task(entry), leave) else one
-                    for one in self.works
+                    one._replace(station=place) if (one.call.task, one.handling) == last else one for one in self.works
                 ]
-            case "forfeited":
-                self.forget(_task(entry))
-            case "step":
-                self.phase, self.is_news = Phase(str(entry["phase"])), False
-            case "handled":
-                self.works = [work for work in self.works if not _is(work, entry)]
+            case ForfeitedRecord():
+                self.forget(record.task)
+            case StepRecord():
+                self.phase, self.is_news = record.phase, False
+            case HandledRecord():
+                ended = (record.task, record.handling)
+                self.works = [one for one in self.works if (one.call.task, one.handling) != ended]
                 self.phase = None
-                if entry["handling"] == Handling.LEAVE.value:
-                    self.versions.pop(_task(entry), None)
-                    self.last_done, self.is_news = (_task(entry), int(entry.get("station", 0))), True
-            case "riding":
-                self.riding = (int(entry["lift"]), int(entry["board"]), int(entry["leave"]))
-            case "floor":
-                self.floor, self.riding = int(entry["track"]), None
+                if record.handling is Handling.LEAVE:
+                    self.versions.pop(record.task, None)
+                    self.last_done, self.is_news = (record.task, record.station), True
+            case RidingRecord():
+                self.riding = (record.lift, record.board, record.leave)
+            case FloorRecord():
+                self.floor, self.riding = record.track, None
 
     @property
     def ride(self) -> Step | None:
@@ -179,11 +204,11 @@ class Recovery:
     ) -> list[Effect]:
         """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
         mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED
-        if not mine or not self.is_restart or fleet.negotiation.knows(award.sender, award.call):
+        if not mine or not self.is_restart:
             return []
         if any(work.call.task == award.task for work in known) or award.task in done:
             return []
-        return [Send(TaskReport(fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
+        return gives_back(fleet, award)
 
     def is_newer(self, award: Award) -> bool:
         """Whether an award for a task of mine is of a later version than that under which I took it on."""
@@ -195,31 +220,21 @@ class Recovery:
         self.versions.pop(task, None)
 
 
-def _task(entry: Entry) -> Reference:
-    return Reference(int(entry["task_origin"]), int(entry["task"]))
-
-
-def _is(work: Work, entry: Entry) -> bool:
-    return work.call.task == _task(entry) and work.handling.value == entry["handling"]
-
-
-def _works(entry: Entry) -> list[Work]:
-    number = {name: int(value) for name, value in entry.items() if name != "record"}
-    car = Reference(number["car_origin"], number["car"])
+def _works(record: AwardRecord) -> list[Work]:
     call = CallForProposals(
-        sender=number["initiator"],
-        call=number["call"],
-        task=Reference(number["task_origin"], number["task"]),
-        operation=Operation(number["operation"]),
+        sender=record.initiator,
+        call=record.call,
+        task=record.task,
+        operation=record.operation,
         kind=KindCode.ROBOT,
         criterion=Criterion.FINISH_TIME,
         attempt=1,
         depth=0,
-        deadline_ms=number["deadline_ms"],
-        from_station=number["from_station"],
-        to_station=number["to_station"],
-        car=car,
-        wheelbase_mm=number["wheelbase_mm"],
+        deadline_ms=record.deadline_ms,
+        from_station=record.from_station,
+        to_station=record.to_station,
+        car=record.car,
+        wheelbase_mm=record.wheelbase_mm,
     )
-    ends = ((Handling.TAKE, "source"), (Handling.LEAVE, "sink"))
-    return [Work(handling, Station.from_number(number[end]), car, call.wheelbase_mm, call) for handling, end in ends]
+    ends = ((Handling.TAKE, record.source), (Handling.LEAVE, record.sink))
+    return [Work(handling, Station.from_number(end), record.car, record.wheelbase_mm, call) for handling, end in ends]

@@ -38,9 +38,9 @@ from onboard.systems.car_park.asking import AskingGeneration
 from onboard.systems.car_park.generation import CarParkGeneration, Solution, weighed
 from onboard.systems.car_park.giving_way import Answer, GivingWay
 from onboard.systems.car_park.going_around import GoingAround
-from onboard.systems.car_park.handling import Phase, ShuttleWork, handle
+from onboard.systems.car_park.handling import ShuttleWork, handle
 from onboard.systems.car_park.holding import Holding
-from onboard.systems.car_park.program import MAX_STEPS, Handling, Program, Step, Work
+from onboard.systems.car_park.program import MAX_STEPS, Handling, Phase, Program, Step, Work
 from onboard.systems.car_park.recovery import Recovery, award_record, floor_record, handled_record, ride_record
 from onboard.systems.car_park.ride_calls import call_lifts
 from onboard.systems.car_park.riding import Riding
@@ -178,15 +178,18 @@ class Robot:
         return self._publish(now_us) if answer is Answer.LATER else []
 
     def _yield_task(self, award: Award, now_us: int) -> list[Effect]:
-        """A task of mine is another's by a newer version, or its call is void: I was lost for its initiator."""
+        """A task of mine is not mine by a newer version, or its call is void: I was lost for its initiator.
+
+        A newer version is called for only once its initiator has taken the task from whom it had before, whatever
+        comes of that call. A custodian's FORFEITED names no version: its initiator answers it, not I.
+        """
         for call in [work.call for work in self._works()]:
             if (call.task, call.sender) != (award.task, award.sender):
                 continue
-            newer = self.recovery.is_newer(award)
             is_void = award.result is CallResult.WITHDRAWN or (
                 award.result is CallResult.REJECTED and award.call == call.call
             )
-            others = award.result is CallResult.AWARDED and award.winner != self.fleet.node_id and newer
+            others = award.winner != self.fleet.node_id and self.recovery.is_newer(award)
             if (others or is_void) and call.task in self._untouched():
                 return self._lose(call.task, now_us)
         return []

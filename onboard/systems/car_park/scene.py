@@ -2,20 +2,19 @@
 
 from typing import Any
 
-from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, LegAction, TokenKind
+from onboard.core.codes import KindCode, LegAction, TokenKind
 from onboard.core.messages import (
     BayState,
     BusTime,
     DoorState,
     Message,
     Progress,
-    Reference,
     ShuttleState,
     TokenGrant,
     TokenHeld,
 )
 from onboard.core.serial import is_newer
-from onboard.core.site import Segment, Station
+from onboard.core.site import Segment
 from onboard.trace.scene.scene import BusClock, Json
 from onboard.trace.view import SiteView
 from onboard.ways.site import TrackKind, WaySite
@@ -24,11 +23,10 @@ from onboard.ways.site import TrackKind, WaySite
 class CarParkScene:
     """Fed beside ``view``, which knows where machines and cars are."""
 
-    noun = "car"
-
     def __init__(self, site: WaySite, view: SiteView) -> None:
         self.site = site
         self.view = view
+        self.words = view.words
         self._clock = BusClock()
         self._doors: dict[int, dict[str, str]] = {}
         self._bays: dict[int, dict[str, Any]] = {}
@@ -94,7 +92,7 @@ class CarParkScene:
     def marks(self, now_us: int) -> Json:
         """Cars by the station where they stand, and segments that somebody says nobody can pass."""
         return {
-            "cars": {station: f"{car.origin}.{car.number}" for station, car in self.view.places_taken().items()},
+            "cars": {station: self.words.load(car) for station, car in self.view.places_taken().items()},
             "blocked": [[*segment] for segment in sorted(self.view.blocked)],
         }
 
@@ -111,7 +109,7 @@ class CarParkScene:
             "speed_mm_s": speed_mm_s,
             "since_us": since_us,
             "where": self._where(segment),
-            "car": f"{aboard.origin}.{aboard.number}" if aboard is not None else None,
+            "car": self.words.load(aboard) if aboard is not None else None,
             "plan": self._plan(node, now_us),
             "holds": self._held(node),
         }
@@ -146,25 +144,6 @@ class CarParkScene:
         if self.site.machines[node].kind is not KindCode.ROBOT:
             return []
         return sorted([number >> 8, number & 0xFF] for number, (_, holder) in self._tokens.items() if holder == node)
-
-    def thing(self, reference: Reference) -> str:
-        """A car as its ticket names it: who named it, and the number there."""
-        return f"car {reference.origin}.{reference.number}"
-
-    def place(self, number: int) -> str:
-        """As in the port."""
-        if number == ANY_STATION:
-            return "any place"
-        if number == OUTSIDE:
-            return "outside"
-        for node, station in self.site.compartments.items():
-            if station.number == number:
-                return self.view.name(node)
-        return str(Station.from_number(number))
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """The view tells it: parked or fetched."""
-        return ""
 
 
 SCENE = CarParkScene

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from onboard.core.authority import segment_token
 from onboard.core.codes import NOBODY, KindCode
+from onboard.core.serial import ranks_before
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
 
@@ -53,4 +54,4 @@ class Standoff:
     def _ranks_before(self, other: int) -> bool:
         plans = self.fleet.mirror.itineraries
         mine, theirs = plans.get(self.fleet.node_id), plans.get(other)
-        return mine is not None and theirs is not None and mine.stamp.ranks_before(theirs.stamp)
+        return mine is not None and theirs is not None and ranks_before(mine.stamp, theirs.stamp)

@@ -11,6 +11,7 @@ from onboard.core.authority import TokenKey, station_token
 from onboard.core.codes import NOBODY, OUTSIDE, TASK_VERSION_BITS, CallResult, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
+from onboard.core.mirror import Obstacle
 from onboard.core.negotiation.winners import patience_us
 from onboard.core.petitions import UNORDERED
 from onboard.core.serial import is_newer
@@ -45,6 +46,9 @@ class Stewardship:
     _say_at_us: dict[Reference, int] = field(default_factory=dict)
     #: Since when the winner of each car has said nothing that shows that it knows of its award.
     _unheard_us: dict[Reference, int] = field(default_factory=dict)
+    #: How often I was admitted, and since when I take part: what others did not do before is no sign of theirs.
+    _admissions: int = 0
+    _since_us: int = 0
 
     def __post_init__(self) -> None:
         self.fleet.tokens.before_taking = self._before_taking
@@ -109,6 +113,9 @@ class Stewardship:
     def review(self, now_us: int) -> list[Effect]:
         """Take the right to fetch a car from winners that are lost, and say so until it is awarded anew."""
         effects: list[Effect] = []
+        if self.fleet.admissions != self._admissions:
+            self._admissions, self._since_us = self.fleet.admissions, now_us
+            self._unheard_us = dict.fromkeys(self._unheard_us, now_us)
         obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
         if not (obstacles or forgetful or self._unheard_us or self.fleet.mirror.told or self._say_at_us):
             return effects
@@ -152,12 +159,15 @@ class Stewardship:
         times += [self._unheard_us[car] + UNHEARD_AFTER_US for car in waited]
         for car, winner in self.winners.items() if obstacles else ():
             if winner in obstacles and car in self.tasks and self._is_untouched(car):
-                times.append(obstacles[winner].since_us + patience_us(obstacles[winner]))
+                times.append(self._lost_at_us(obstacles[winner]))
         return min(times, default=None)
 
     def _is_lost(self, winner: int, now_us: int) -> bool:
         obstacle = self.fleet.mirror.obstacles.machines.get(winner)
-        return obstacle is not None and now_us - obstacle.since_us >= patience_us(obstacle)
+        return obstacle is not None and now_us >= self._lost_at_us(obstacle)
+
+    def _lost_at_us(self, obstacle: Obstacle) -> int:
+        return max(obstacle.since_us, self._since_us) + patience_us(obstacle)
 
     def _is_untouched(self, car: Reference) -> bool:
         """Whether I hold the car and its station, and nobody has a right to the front as its winner."""

@@ -4,15 +4,16 @@ Rows C03, C05 and C18. It names the parts and is their first custodian: a part's
 its goal and to nobody else, and comes back when the part lies where it was wanted.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
-from onboard.core.codes import Reason, TaskPhase, TokenKind
-from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import CallForProposals, Message, Reference, TaskReport
+from onboard.core.codes import KindCode, Reason, TokenKind
+from onboard.core.effects import Effect, Send
+from onboard.core.journal_records import records_in
+from onboard.core.messages import CallForProposals, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.serial import to_bus_ms
@@ -22,11 +23,13 @@ from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import Hearsay
 from onboard.systems.cell.messages import ArmProgress, OrderAnswer, OrderFrom, OrderResult, OrderTo, PartAt
-from onboard.work.counter import Counter, CounterOrder, OrderState
+from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
+from onboard.work.order_desk import OrderDesk
+from onboard.work.order_life import OrderState, WorkOrder
 
 
 @dataclass
-class Order(CounterOrder):
+class Order(WorkOrder):
     """An order and its goal; the winner is its main contractor."""
 
     goal: Goal
@@ -47,13 +50,14 @@ class DeskFactory(BehaviourFactory):
 
 
 @dataclass
-class GoalManager(Counter[Order]):
+class GoalManager(OrderDesk[Order]):
     """One desk of a cell."""
 
     #: A main contractor is asked how it stands this often, us. Ours.
     ask_us: ClassVar[int] = 20_000_000
     #: A goal that nobody can achieve is refused after so many calls of several attempts each. Ours.
     max_calls: ClassVar[int] = 3
+    takers = KindCode.ARM
 
     hearsay: Hearsay = field(default_factory=Hearsay)
     _half_told: dict[int, OrderFrom] = field(default_factory=dict)
@@ -102,20 +106,18 @@ class GoalManager(Counter[Order]):
     def _on_order(self, wanted: OrderTo, now_us: int) -> list[Effect]:
         task = Reference(self.fleet.node_id, wanted.order)
         if task in self.orders:
-            return self.say(self.orders[task], now_us)
+            self.orders[task].answer_at_us = now_us
+            return []
         begin = self._half_told.pop(wanted.order, None)
         if begin is None:
             # The counter says both again until it is answered.
             return []
         limit_ms = to_bus_ms(now_us + wanted.within_ms * 1000) if wanted.within_ms else 0
         start, end = Point(begin.x_mm, begin.y_mm), Point(wanted.x_mm, wanted.y_mm)
-        order = self.orders[task] = Order(task, Goal(task, task, start, end, (), limit_ms))
-        entry: dict[str, str | int] = {"record": "order", "number": task.number, "limit": limit_ms}
-        entry |= {"from_x": start.x_mm, "from_y": start.y_mm, "to_x": end.x_mm, "to_y": end.y_mm}
-        said = Send(PartAt(self.fleet.node_id, task, *start, False))
-        return [Record(entry), *self.say(order, now_us), said]
+        order = Order(task, Goal(task, task, start, end, (), limit_ms))
+        return [*self.come_in(order, now_us), Send(PartAt(self.fleet.node_id, task, *start, False))]
 
-    # --- the Counter -------------------------------------------------------------------------------------------
+    # --- the OrderDesk -----------------------------------------------------------------------------------------
 
     def terms(self, order: Order) -> CallTerms:
         """A call to robots."""
@@ -126,40 +128,40 @@ class GoalManager(Counter[Order]):
         key = part_token(order.goal.part)
         return self.fleet.tokens.holds(key) and key not in self.fleet.tokens.given
 
-    def in_turn(self, waiting: Iterable[Order]) -> Iterable[Order]:
+    def may_be_given_back(self, order: Order) -> bool:
+        """As it may be taken back: what is between the main contractor and its sub-contractors is theirs (C18)."""
+        return self.may_take_back(order)
+
+    def in_turn(self) -> Iterable[Order]:
         """In the order of their deadlines (row C15)."""
-        return sorted(waiting, key=lambda one: one.goal.urgency)
+        return sorted(self.orders.values(), key=lambda one: one.goal.urgency)
 
-    def on_report(self, order: Order, report: TaskReport, now_us: int) -> list[Effect]:
-        """The main contractor tells that the goal is achieved; all else is between it and its sub-contractors (C18)."""
-        if report.phase is TaskPhase.FORFEITED:
-            return []
-        effects: list[Effect] = []
-        if order.state is not OrderState.IN_HAND and report.phase is not TaskPhase.REFUSED:
-            effects += self.won_unheard(order, report.sender, now_us)
-        if report.phase is TaskPhase.DONE and report.sender == order.winner:
-            effects += self.put(order, OrderState.DONE, now_us)
-        return effects
-
-    def price(self, order: Order) -> None:
+    def note_price(self, order: Order) -> None:
         """As the main contractor offered."""
         offer = self.hearsay.offer(order.winner, order.goal.task)
         order.cost = offer.cost if offer is not None else 0.0
 
-    def price_entry(self, order: Order) -> Mapping[str, str | int]:
-        """To the last bit."""
-        return {"cost": order.cost.hex()}
+    def state_record(self, order: Order) -> GoalStateRecord:
+        """With the contract's cost."""
+        return GoalStateRecord(order.task.number, order.state, order.winner, order.cost)
 
-    def noted_price(self, order: Order, entry: Mapping[str, str | int]) -> None:
-        """To the last bit."""
-        order.cost = float.fromhex(str(entry["cost"]))
+    def order_record(self, order: Order) -> GoalOrderRecord:
+        """Where a part is wanted."""
+        goal = order.goal
+        return GoalOrderRecord(order.task.number, goal.time_limit_ms, *goal.start, *goal.end)
 
-    def noted_order(self, entry: Mapping[str, str | int]) -> Order:
-        """As it was noted when it came."""
-        task = Reference(self.fleet.node_id, int(entry["number"]))
-        start = Point(int(entry["from_x"]), int(entry["from_y"]))
-        end = Point(int(entry["to_x"]), int(entry["to_y"]))
-        return Order(task, Goal(task, task, start, end, (), int(entry["limit"])))
+    def replay(self) -> None:
+        """Orders as they came, and how each stands."""
+        for record in records_in(self.fleet.entries, GoalOrderRecord, GoalStateRecord):
+            match record:
+                case GoalOrderRecord():
+                    task = Reference(self.fleet.node_id, record.number)
+                    start, end = Point(record.from_x, record.from_y), Point(record.to_x, record.to_y)
+                    self.orders[task] = Order(task, Goal(task, task, start, end, (), record.limit))
+                case GoalStateRecord():
+                    order = self.orders[Reference(self.fleet.node_id, record.number)]
+                    order.winner, order.cost = record.winner, record.cost
+                    self.take_up(order, record.state)
 
     def answer(self, order: Order) -> Message:
         """With the cost."""

@@ -1,13 +1,13 @@
 """How a robot of the cell goes along a way, and where it may go at all."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.core.codes import Reason
-from onboard.core.effects import Actuate, Effect
-from onboard.core.serial import successor
+from onboard.core.effects import Effect
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point, crosses, shortest_way
 from onboard.systems.cell.messages import ArmMode, ArmOrder, ArmState
+from onboard.work.device_link import DeviceLink
 
 #: The position sensor tells whole millimetres: a robot on an obstacle's border may seem so far inside.
 ROUNDING_MM = 1
@@ -34,9 +34,11 @@ class Driver:
     obstacles: tuple[Area, ...]
     refresh_us: int
     state: ArmState | None = None
-    refresh_at_us: int | None = None
-    _sequence: int = 0
-    _target: Point | None = None
+    link: DeviceLink[Point] = field(init=False)
+
+    def __post_init__(self) -> None:
+        node = self.arm.node_id
+        self.link = DeviceLink(lambda sequence, target: ArmOrder(node, sequence, *target), self.refresh_us)
 
     @property
     def position(self) -> Point | None:
@@ -46,7 +48,7 @@ class Driver:
     def sense(self, state: ArmState) -> None:
         """What the drive says."""
         if self.state is None:
-            self._sequence = state.sequence
+            self.link.go_on_from(state.sequence)
         self.state = state
 
     def stands_at(self, place: Point) -> bool:
@@ -58,7 +60,7 @@ class Driver:
         here = self.position
         if here is None or self.stands_at(end):
             return self.rest()
-        target = self._target
+        target = self.link.wanted
         if target is None or self.stands_at(target):
             way = shortest_way(here, end, self.arm.area, self._obstacles_around(here))
             if way is None or len(way) < 2:
@@ -67,13 +69,7 @@ class Driver:
         allowed, _ = may_go(here, target, self.arm, self._obstacles_around(here))
         if not allowed:
             return self.rest()
-        if target != self._target:
-            self._target = target
-            self._sequence = successor(self._sequence, 8)
-        elif self.refresh_at_us is not None and self.refresh_at_us > now_us:
-            return []
-        self.refresh_at_us = now_us + self.refresh_us
-        return [Actuate(ArmOrder(self.arm.node_id, self._sequence, *target))]
+        return self.link.order(target, now_us)
 
     def _obstacles_around(self, here: Point) -> tuple[Area, ...]:
         """The obstacles; one on whose border the robot stopped and the sensor's millimetre says inside, a bit less."""
@@ -81,6 +77,5 @@ class Driver:
 
     def rest(self) -> list[Effect]:
         """No more orders: a drive that hears none stops."""
-        self.refresh_at_us = None
-        self._target = None
+        self.link.rest()
         return []

@@ -1,14 +1,85 @@
-"""What of a cell's records outlives compaction: its robots' contracts (memory.py), its desk's orders (counter.py)."""
+"""What a cell's machines write into their journals: robots their contracts (memory.py), the desk its orders."""
 
-from onboard.systems.cell.memory import Stage
-from onboard.work.compaction import MOST_OVER, End, Keep, Rules, Which
-from onboard.work.counter_records import RECORDS as COUNTER_RECORDS
+from dataclasses import dataclass, field
+from enum import Enum
 
-_TASK = ("origin", "number")
+from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes, Which, stored_as
+from onboard.core.messages import Reference
+from onboard.work.order_records import OrderRecord, OrderStateRecord
 
-RECORDS: Rules = {
-    **COUNTER_RECORDS,
-    "contract": (Keep("contract", _TASK, Which.FIRST_AND_NEWEST),),
-    "contract_lost": (End(("contract", "stage"), _TASK),),
-    "stage": (Keep("stage", _TASK), End(("contract", "stage"), _TASK, ("stage", (Stage.OVER.name,)), MOST_OVER)),
-}
+
+class Stage(Enum):
+    """How far a contract is, each a point from which a robot that starts again can go on."""
+
+    WON = "the part is not taken"
+    TAKEN = "the part is aboard, or being taken"
+    PUT = "the part is put down; a sub-contractor goes on"
+    OVER = "the goal is achieved"
+
+
+@dataclass(frozen=True, slots=True)
+class ContractRecord(JournalRecord):
+    """A contract that was won. Points are words ``X,Y`` in mm; ``limit`` is bus time in ms, ``sub`` a goal's number."""
+
+    NAME = "contract"
+    RULES = (Keep("contract", ("task",), Which.FIRST_AND_NEWEST),)
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+    part: Reference = field(metadata=stored_as("part_origin", "part_number"))
+    node: int
+    limit: int
+    start: str
+    end: str
+    carry: str
+    approach: str
+    path: tuple[int, ...]
+    own: float
+    cost: float
+    nodes: tuple[int, ...]
+    sub: int
+
+
+@dataclass(frozen=True, slots=True)
+class StageRecord(JournalRecord):
+    """How far a contract is; ``next`` is the node-ID of the sub-contractor that was heard, else 0."""
+
+    NAME = "stage"
+    RULES = (
+        Keep("stage", ("task",)),
+        End(("contract", "stage"), ("task",), ("stage", (Stage.OVER,)), MOST_OVER),
+    )
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+    stage: Stage
+    next: int
+
+
+@dataclass(frozen=True, slots=True)
+class ContractLostRecord(JournalRecord):
+    """It is another's now."""
+
+    NAME = "contract_lost"
+    RULES = (End(("contract", "stage"), ("task",)),)
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+
+
+@dataclass(frozen=True, slots=True)
+class GoalOrderRecord(OrderRecord):
+    """A part is wanted elsewhere: places in mm; ``limit`` is bus time in ms, 0 for none."""
+
+    limit: int
+    from_x: int
+    from_y: int
+    to_x: int
+    to_y: int
+
+
+@dataclass(frozen=True, slots=True)
+class GoalStateRecord(OrderStateRecord):
+    """With what its contract costs."""
+
+    cost: float
+
+
+RECORDS: RecordTypes = (ContractRecord, StageRecord, ContractLostRecord, GoalOrderRecord, GoalStateRecord)

@@ -11,17 +11,17 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
-from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import Award, CallForProposals, Message, Reference, SyncRequest, TaskReport
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import last_boot, successor
+from onboard.core.records import last_boot
 from onboard.core.site import Machine, Site
 from onboard.systems.cell.contracts import Contract, part_token
 from onboard.systems.cell.generation import ArmGeneration, call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import contract_messages
-from onboard.systems.cell.memory import Stage, Undertaking, lost_record, stage_record, undertakings, won_record
+from onboard.systems.cell.memory import Undertaking, lost_record, stage_record, undertakings, won_record
 from onboard.systems.cell.messages import (
     ArmMode,
     ArmPhase,
@@ -34,7 +34,10 @@ from onboard.systems.cell.messages import (
     PartAt,
 )
 from onboard.systems.cell.motion import Driver
+from onboard.systems.cell.records import Stage
 from onboard.systems.cell.site import Cell
+from onboard.work.device_link import DeviceLink
+from onboard.work.undertaking import TaskEvent, Undertakings
 
 #: Where a robot is, is told this often while it moves, us (dbc/cell.dbc).
 PROGRESS_US = 2_000_000
@@ -42,8 +45,8 @@ PROGRESS_US = 2_000_000
 CALL_AGAIN_US = 5_000_000
 #: A sub-contractor that has the part is asked this often how it stands, us; so a lost word costs time only. Ours.
 ASK_AGAIN_US = 20_000_000
-#: Contracts carried out that are remembered, to say again that they are over.
-MAX_OVER = 32
+#: An order to the gripper is said again after this while it is not obeyed, us (dbc/cell.dbc).
+GRIP_AGAIN_US = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -65,20 +68,17 @@ class ArmFactory(BehaviourFactory):
 
 @dataclass
 class ArmRobot:
-    """One robot. ``in_hand`` are its contracts by task, in the order in which it won them."""
+    """One robot. ``tasks`` are its contracts; at most one of them is ``active``."""
 
     fleet: Fleet
     generation: ArmGeneration
     kind: KindCode = KindCode.ARM
-    in_hand: dict[Reference, Undertaking] = field(default_factory=dict)
+    tasks: Undertakings[Undertaking] = field(init=False)
     active: Reference | None = None
     phase: ArmPhase = ArmPhase.IDLE
     grip: GripState | None = None
     driver: Driver = field(init=False)
-    over: dict[Reference, int] = field(default_factory=dict)
-    _grip_sequence: int = 0
-    _ordered: GripOrder | None = None
-    _order_again_us: int | None = None
+    gripper: DeviceLink[tuple[GripAction, Reference]] = field(init=False)
     _call_at_us: dict[Reference, int] = field(default_factory=dict)
     _ask_at_us: dict[Reference, int] = field(default_factory=dict)
     #: Rests of goals whose calls an earlier life made: somebody may have won one.
@@ -93,11 +93,20 @@ class ArmRobot:
         self.fleet.negotiation.is_sound = self.generation.hearsay.is_sound
         # Names of goals of an earlier life may still be about.
         self.generation.number = last_boot(self.fleet.entries) << 8
+        me = self.fleet.node_id
+        self.gripper = DeviceLink(lambda sequence, order: GripOrder(me, sequence, *order), GRIP_AGAIN_US)
+        self.tasks = Undertakings(
+            self.fleet,
+            is_begun=lambda one: one.stage is not Stage.WON or self.fleet.tokens.holds(_part_token(one)),
+            may_give=lambda one, node: node == one.manager,
+            lose=self._lose,
+            changed=self._engage,
+        )
         for one in undertakings(self.fleet.entries).values():
             if one.stage is Stage.OVER:
-                self.over[one.task] = one.manager
+                self.tasks.remember(one.task)
             else:
-                self.in_hand[one.task] = one
+                self.tasks.in_hand[one.task] = one
                 if one.sub_goal is not None and not one.successor:
                     self._call_at_us[one.task] = 0
                     self._unsure.add(one.task)
@@ -125,7 +134,7 @@ class ArmRobot:
 
     def start(self, now_us: int) -> list[Effect]:
         """Nothing moves before the position is sensed."""
-        for one in self.in_hand.values():
+        for one in self.tasks.in_hand.values():
             if one.sub_goal is not None and one.successor:
                 self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
         return []
@@ -139,7 +148,7 @@ class ArmRobot:
                     self.generation.position = self.driver.position
             case GripState():
                 if self.grip is None:
-                    self._grip_sequence = message.sequence
+                    self.gripper.go_on_from(message.sequence)
                 self.grip = message
         return self._progress(now_us)
 
@@ -149,15 +158,9 @@ class ArmRobot:
         match message:
             case TaskReport():
                 return self._on_report(message, now_us)
-            case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
-                return self._on_award(message)
-            case Award(result=CallResult.AWARDED | CallResult.REJECTED) if message.task in self.in_hand:
-                return self._yield(self.in_hand[message.task], message)
             case ArmProgress():
                 self.fleet.winners.works(message.sender, (message.x_mm, message.y_mm, message.arm_phase), now_us)
-            case CallForProposals() if message.task in self.in_hand or message.task in self.over:
-                return [self._report(message.task)]
-        return []
+        return self.tasks.hear(message)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Bids of my own are kept in mind; a contract that is won is journalled before it is told."""
@@ -190,7 +193,7 @@ class ArmRobot:
         if self.active is None:
             effects += self._choose(now_us)
         if self.active is not None:
-            effects += self._table[self.phase](self.in_hand[self.active], now_us)
+            effects += self._table[self.phase](self.tasks.in_hand[self.active], now_us)
         if self._progress_at_us is not None and self._progress_at_us <= now_us:
             self._told = None
             effects += self._progress(now_us)
@@ -200,13 +203,13 @@ class ArmRobot:
         """When an order, a call, a question or a word is due; nothing is before the devices have told how they are."""
         if self.driver.state is None or self.grip is None:
             return None
-        times = [self.driver.refresh_at_us, self._order_again_us, self._progress_at_us]
+        times = [self.driver.link.due_us, self.gripper.due_us, self._progress_at_us]
         times += [*self._call_at_us.values(), *self._ask_at_us.values()]
         return min((time for time in times if time is not None), default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
         """What is in hand and what is over, where I am, parts in my custody, and tokens."""
-        effects: list[Effect] = [self._report(task) for task in (*self.in_hand, *self.over)]
+        effects = self.tasks.reports()
         self._told = None
         return effects + self._progress(now_us) + self._parts() + self.fleet.tokens.statements()
 
@@ -216,50 +219,38 @@ class ArmRobot:
         goal, via = contract.goal, contract.move.via
         sub_goal = None if via == goal.end else self.generation.sub_goal(goal, via)
         one = Undertaking(contract, goal.task.origin, sub_goal, successor=successor_node)
-        self.in_hand[one.task] = one
-        self._engage()
+        self.tasks.meet(one.task, TaskEvent.WIN, one)
         if sub_goal is not None and not successor_node:
             # The option has lapsed: the rest of the goal is called for anew.
             self._call_at_us[one.task] = now_us
         said = [Send(message) for message in contract_messages(contract)]
-        return [won_record(one), self._report(one.task), *said]
+        return [won_record(one), self.tasks.report(one.task), *said]
 
     def _engage(self) -> None:
-        waiting = (one for one in self.in_hand.values() if one.stage in (Stage.WON, Stage.TAKEN))
+        waiting = (one for one in self.tasks.in_hand.values() if one.stage in (Stage.WON, Stage.TAKEN))
         self.generation.engaged = {one.task: one.contract for one in waiting}
-        self.generation.known = {*self.in_hand, *self.over}
+        self.generation.known = {*self.tasks.in_hand, *self.tasks.over}
 
-    def _on_award(self, award: Award) -> list[Effect]:
-        """Said again: my word was lost. For a bid that I have forgotten: it is given back."""
-        if award.task in self.in_hand or award.task in self.over:
-            return [self._report(award.task)]
-        if self.fleet.negotiation.knows(award.sender, award.call):
-            return []
-        return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
-
-    def _yield(self, one: Undertaking, award: Award) -> list[Effect]:
+    def _lose(self, one: Undertaking) -> list[Effect]:
         """Its manager gave to another, or to nobody, what I have not begun: whose part I have not got."""
-        is_mine = one.stage is not Stage.WON or self.fleet.tokens.holds(part_token(one.contract.goal.part))
-        if is_mine or award.sender != one.manager:
-            return []
-        self.fleet.tokens.forget(part_token(one.contract.goal.part))
+        self.fleet.tokens.forget(_part_token(one))
         effects: list[Effect] = [lost_record(one)]
         if one.sub_goal is not None and one.successor:
             effects += self.fleet.winners.let_go(one.sub_goal.task)
-        self._drop(one)
+        self._forget_rest(one)
         return effects
 
-    def _drop(self, one: Undertaking) -> None:
-        del self.in_hand[one.task]
+    def _forget_rest(self, one: Undertaking) -> None:
         for times in (self._ask_at_us, self._call_at_us):
             times.pop(one.task, None)
         if one.sub_goal is not None:
             self.fleet.winners.over(one.sub_goal.task)
-        self._engage()
 
     def _on_report(self, report: TaskReport, now_us: int) -> list[Effect]:
         """A sub-contractor has the goal in hand, or has achieved it: then mine is achieved too (row C18)."""
-        one = next((one for one in self.in_hand.values() if one.sub_goal and one.sub_goal.task == report.task), None)
+        one = next(
+            (one for one in self.tasks.in_hand.values() if one.sub_goal and one.sub_goal.task == report.task), None
+        )
         if one is None:
             return []
         assert one.sub_goal is not None
@@ -280,6 +271,10 @@ class ArmRobot:
             return [*effects, *self._achieve(one)]
         return effects
 
+    def _of_rest(self, task: Reference) -> Undertaking | None:
+        """The contract whose rest is another's goal by this name."""
+        return next((one for one in self.tasks.in_hand.values() if one.sub_goal and one.sub_goal.task == task), None)
+
     def _may_claim(self, one: Undertaking, report: TaskReport, now_us: int) -> bool:
         may_claim = one.task in self._unsure and report.phase is not TaskPhase.FORFEITED
         return may_claim and self.fleet.winners.may_claim(report.task, report.sender, now_us)
@@ -293,7 +288,7 @@ class ArmRobot:
     def _on_closed(self, event: Closed, now_us: int) -> list[Effect]:
         """A call of mine is over: for an option that rests on no contract nothing follows."""
         task = event.call.task
-        one = next((one for one in self.in_hand.values() if one.sub_goal and one.sub_goal.task == task), None)
+        one = self._of_rest(task)
         if one is None or one.stage is Stage.OVER:
             return []
         if event.winner:
@@ -309,16 +304,10 @@ class ArmRobot:
 
     def _achieve(self, one: Undertaking) -> list[Effect]:
         one.stage = Stage.OVER
-        self.over[one.task] = one.manager
-        if len(self.over) > MAX_OVER:
-            del self.over[next(iter(self.over))]
-        self._drop(one)
-        return [stage_record(one), self._report(one.task)]
-
-    def _report(self, task: Reference) -> Send:
+        self.tasks.meet(one.task, TaskEvent.END)
+        self._forget_rest(one)
         # The manager is told of completion and of nothing before (row C18).
-        phase = TaskPhase.AWARDED if task in self.in_hand else TaskPhase.DONE
-        return Send(TaskReport(self.fleet.node_id, task, phase, 0, Reason.NONE))
+        return [stage_record(one), self.tasks.report(one.task)]
 
     # --- manager of the rest -----------------------------------------------------------------------------------
 
@@ -326,13 +315,13 @@ class ArmRobot:
         """Call for rests that nobody has, and ask sub-contractors that have had the part for long (row C17)."""
         effects: list[Effect] = []
         for task, due_us in list(self._call_at_us.items()):
-            one = self.in_hand.get(task)
+            one = self.tasks.in_hand.get(task)
             if one is None or one.sub_goal is None:
                 del self._call_at_us[task]
             elif due_us <= now_us:
                 del self._call_at_us[task]
                 effects += self.fleet.negotiation.open(call_terms(one.sub_goal), now_us)
-        for task, one in list(self.in_hand.items()):
+        for task, one in list(self.tasks.in_hand.items()):
             effects += self._take_back(one, now_us)
             if one.stage is Stage.PUT and one.sub_goal is None:
                 # The controller stopped between putting the part down and saying so.
@@ -364,15 +353,15 @@ class ArmRobot:
 
     def _want_parts(self, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
-        for one in self.in_hand.values():
+        for one in self.tasks.in_hand.values():
             if one.stage is Stage.WON:
-                effects += self.fleet.tokens.want(part_token(one.contract.goal.part), now_us)
+                effects += self.fleet.tokens.want(_part_token(one), now_us)
         return effects
 
     def _give_back(self, now_us: int) -> list[Effect]:
         """A part that lies at its goal goes back into the custody of the goal manager that named it."""
         effects: list[Effect] = []
-        wanted = {one.contract.goal.part for one in self.in_hand.values()}
+        wanted = {one.contract.goal.part for one in self.tasks.in_hand.values()}
         for key in self.fleet.tokens.mine():
             part = Reference(key.number >> 16, key.number & 0xFFFF)
             if key.kind is TokenKind.CAR and part not in wanted:
@@ -380,12 +369,12 @@ class ArmRobot:
         return effects
 
     def _undertaking_of(self, part: Reference) -> Undertaking | None:
-        return next((one for one in self.in_hand.values() if one.contract.goal.part == part), None)
+        return next((one for one in self.tasks.in_hand.values() if one.contract.goal.part == part), None)
 
     def _parts(self) -> list[Effect]:
         """Where the parts in my custody are."""
         tokens = self.fleet.tokens
-        mine = (one for one in self.in_hand.values() if tokens.holds(part_token(one.contract.goal.part)))
+        mine = (one for one in self.tasks.in_hand.values() if tokens.holds(_part_token(one)))
         return [self._part_at(one) for one in mine if one.stage in (Stage.TAKEN, Stage.PUT)]
 
     def _part_at(self, one: Undertaking) -> Send:
@@ -399,11 +388,11 @@ class ArmRobot:
         """The part that is aboard, else the most urgent of those that I may take (row C15)."""
         ready = [
             one
-            for one in self.in_hand.values()
-            if one.stage in (Stage.WON, Stage.TAKEN) and self.fleet.tokens.holds(part_token(one.contract.goal.part))
+            for one in self.tasks.in_hand.values()
+            if one.stage in (Stage.WON, Stage.TAKEN) and self.fleet.tokens.holds(_part_token(one))
         ]
         if not ready:
-            return self._to(ArmPhase.WAITING if self.in_hand else ArmPhase.IDLE, now_us)
+            return self._to(ArmPhase.WAITING if self.tasks.in_hand else ArmPhase.IDLE, now_us)
         one = min(ready, key=lambda one: (one.stage is not Stage.TAKEN, one.contract.goal.urgency))
         self.active = one.task
         return self._to(ArmPhase.TO_PART if one.stage is Stage.WON else ArmPhase.TAKING, now_us)
@@ -420,9 +409,10 @@ class ArmRobot:
         assert self.grip is not None
         part = one.contract.goal.part
         if self.grip.grip_mode is GripMode.HOLDING and self.grip.part == part:
-            return [*self._grip_over(), self._part_at(one), *self._to(ArmPhase.CARRYING, now_us)]
+            self.gripper.rest()
+            return [self._part_at(one), *self._to(ArmPhase.CARRYING, now_us)]
         if self.grip.grip_mode is GripMode.BUSY:
-            self._order_again_us = None
+            self.gripper.pause()
             return []
         if self.driver.stands_at(one.contract.move.via) and self._lies_here():
             return self._put(one, now_us)
@@ -443,7 +433,7 @@ class ArmRobot:
 
     def _lies_here(self) -> bool:
         """After a restart before the put-down was journalled: the gripper is open where the part is to lie."""
-        return self.grip is not None and self.grip.grip_mode is GripMode.OPEN and self._ordered is None
+        return self.grip is not None and self.grip.grip_mode is GripMode.OPEN and self.gripper.wanted is None
 
     def _put(self, one: Undertaking, now_us: int) -> list[Effect]:
         one.stage = Stage.PUT
@@ -451,29 +441,17 @@ class ArmRobot:
         if one.sub_goal is not None and one.successor and one.was_heard:
             self.fleet.winners.takes(one.sub_goal.task, one.successor, now_us)
         self._engage()
-        effects: list[Effect] = [*self._grip_over(), stage_record(one), self._part_at(one)]
+        self.gripper.rest()
+        effects: list[Effect] = [stage_record(one), self._part_at(one)]
         if one.sub_goal is None:
             effects += self._achieve(one)
         return effects
 
     def _order(self, action: GripAction, part: Reference, now_us: int) -> list[Effect]:
-        """One order, said again every second while it is not obeyed; NOTHING_THERE is tried anew."""
+        """Said again while it is not obeyed; a grip at nothing is tried anew."""
         assert self.grip is not None
-        failed = self.grip.grip_mode is GripMode.NOTHING_THERE and self.grip.sequence == self._grip_sequence
-        if self._ordered is None or self._ordered.grip_action is not action:
-            self._grip_sequence = successor(self._grip_sequence, 8)
-        elif self._order_again_us is not None and self._order_again_us > now_us:
-            return []
-        elif failed:
-            self._grip_sequence = successor(self._grip_sequence, 8)
-        self._ordered = GripOrder(self.fleet.node_id, self._grip_sequence, action, part)
-        self._order_again_us = now_us + 1_000_000
-        return [Actuate(self._ordered)]
-
-    def _grip_over(self) -> list[Effect]:
-        self._ordered = None
-        self._order_again_us = None
-        return []
+        failed = self.grip.grip_mode is GripMode.NOTHING_THERE and self.gripper.is_obeyed(self.grip.sequence)
+        return self.gripper.order((action, part), now_us, anew=failed)
 
     # --- words -------------------------------------------------------------------------------------------------
 
@@ -496,3 +474,7 @@ class ArmRobot:
             self._progress_at_us = now_us + PROGRESS_US if moving else None
         goal = self.active.number if self.active is not None else 0
         return [Send(ArmProgress(self.fleet.node_id, *here, self.phase, goal))] if due else []
+
+
+def _part_token(one: Undertaking) -> TokenKey:
+    return part_token(one.contract.goal.part)

@@ -4,7 +4,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TypeVar
 
-from onboard.core.codes import ANY_STATION, TaskPhase
+from onboard.core.codes import TaskPhase
 from onboard.core.messages import Message, Reference, TaskReport
 from onboard.systems.cell.messages import ArmPhase, ArmProgress, GoalEnd, GoalStart, MoveFrom, MoveTo, PartAt
 from onboard.systems.cell.site import Area, Cell
@@ -34,11 +34,10 @@ class _Robot:
 class CellScene:
     """Fed beside ``view``, which knows the calls."""
 
-    noun = "part"
-
     def __init__(self, site: Cell, view: SiteView) -> None:
         self.site = site
         self.view = view
+        self.words = view.words
         areas = [arm.area for arm in site.arms.values()] + list(site.obstacles)
         self._x0, self._y1 = min(one.x0_mm for one in areas), max(one.y1_mm for one in areas)
         span_mm = max(one.x1_mm for one in areas) - self._x0
@@ -79,7 +78,7 @@ class CellScene:
                 known = self._parts.get(message.part)
                 if known is None or known[1] != carrier:
                     words = "has taken up" if carrier else "has put down" if known is not None else "has"
-                    self.view.say(time_us, f"{self.view.name(message.sender)} {words} {self.thing(message.part)}")
+                    self.view.say(time_us, f"{self.view.name(message.sender)} {words} {self.words.thing(message.part)}")
                 _keep(self._parts, message.part, ((message.x_mm, message.y_mm), carrier))
             case MoveFrom():
                 moves = self._moves.setdefault(message.sender, {})
@@ -151,18 +150,6 @@ class CellScene:
             ):
                 things.append({"kind": "goal", "name": str(goal), "at": list(self._whole(end))})
         return {"marks": {}, "things": things}
-
-    def thing(self, reference: Reference) -> str:
-        """As in the port."""
-        return f"part {reference.number}"
-
-    def place(self, number: int) -> str:
-        """Goals have points, which calls do not hold."""
-        return "anywhere" if number == ANY_STATION else "its goal"
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """As in the port."""
-        return f"has brought the part of goal {reference.number}"
 
 
 def _keep(kept: OrderedDict[_Key, _Value], key: _Key, value: _Value) -> None:

@@ -2,12 +2,9 @@
 
 from onboard.core.codes import KindCode
 from onboard.systems.cell.desk import DeskFactory
-from onboard.systems.cell.messages import MESSAGES
 from onboard.systems.cell.records import RECORDS
 from onboard.systems.cell.robot import ArmFactory
 from onboard.systems.cell.site import Cell
 from onboard.systems.system import System
 
-SYSTEM = System(
-    Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: DeskFactory()}, messages=MESSAGES, records=RECORDS
-)
+SYSTEM = System(Cell.system, {KindCode.ARM: ArmFactory(), KindCode.DESK: DeskFactory()}, records=RECORDS)

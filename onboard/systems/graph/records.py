@@ -1,21 +1,67 @@
-"""What of a factory graph's records outlives compaction: errands of robots (errands.py), orders of the desk (desk.py).
+"""What a factory graph's machines write into their journals: robots their errands, the desk its orders.
 
 Both are taken up in the order in which they first came.
 """
 
-from onboard.systems.graph.desk import Stage
-from onboard.work.compaction import MOST_OVER, End, Keep, Rules, Which
+from dataclasses import dataclass, field
 
-_TASK = ("origin", "number")
+from onboard.core.journal_records import (
+    MOST_OVER,
+    UNSAID,
+    End,
+    JournalRecord,
+    Keep,
+    RecordTypes,
+    Which,
+    stored_as,
+)
+from onboard.core.messages import Reference
+from onboard.work.order_life import OVER, OrderState
 
-RECORDS: Rules = {
-    "errand": (
+_TASK = ("task",)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrandRecord(JournalRecord):
+    """How far a task is: the nodes still to be visited, none once it is over; the newest record counts."""
+
+    NAME = "errand"
+    RULES = (
         Keep("errand", _TASK, Which.FIRST_AND_NEWEST),
-        End(("errand",), _TASK, ("stops", ("",)), MOST_OVER),
-    ),
-    "errand_lost": (End(("errand",), _TASK),),
-    "visit": (
-        Keep("visit", _TASK, Which.FIRST_AND_NEWEST),
-        End(("visit",), _TASK, ("stage", (Stage.DONE.name, Stage.REFUSED.name)), MOST_OVER),
-    ),
-}
+        End(("errand",), _TASK, ("stops", ((),)), MOST_OVER),
+    )
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+    stops: tuple[int, ...]
+    cancelled: bool = field(default=False, metadata=UNSAID)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrandLostRecord(JournalRecord):
+    """It is another's now."""
+
+    NAME = "errand_lost"
+    RULES = (End(("errand",), _TASK),)
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+
+
+@dataclass(frozen=True, slots=True)
+class VisitRecord(JournalRecord):
+    """A desk's order; ``origin`` is who named it, 0 for the desk itself. ``robot``: whom it is for, or who has it."""
+
+    NAME = "visit"
+    RULES = (
+        Keep("visit", ("origin", "number"), Which.FIRST_AND_NEWEST),
+        End(("visit",), ("origin", "number"), ("stage", OVER), MOST_OVER),
+    )
+
+    number: int
+    robot: int
+    named: bool
+    stops: tuple[int, ...]
+    stage: OrderState
+    origin: int = 0
+
+
+RECORDS: RecordTypes = (ErrandRecord, ErrandLostRecord, VisitRecord)

@@ -8,13 +8,12 @@ from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
-from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import Award, CallForProposals, Heartbeat, ManualOrder, Message, Reference, TaskReport
+from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.core.effects import Effect, Send
+from onboard.core.messages import Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import MotionState, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
 from onboard.systems.graph.errands import TRANSPORT_STOPS, Errand, errand_record, errands, lost_record
 from onboard.systems.graph.messages import (
@@ -37,7 +36,9 @@ from onboard.systems.graph.planning import Position, RobotPlanning, told_way
 from onboard.systems.graph.rights import edge_segment, edge_token, keeper, slot_token
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
+from onboard.work.device_link import DeviceLink
 from onboard.work.manual import Manual
+from onboard.work.undertaking import TaskEvent, TaskStanding, Undertakings
 
 #: A signal is said again after this while no answer is heard, and after that while the answer is STOP, us. Ours.
 SIGNAL_US, SIGNAL_AGAIN_US = 500_000, 2_000_000
@@ -76,16 +77,14 @@ class _Grant:
 
 @dataclass
 class GraphRobot:
-    """One robot. ``planning.errands`` are its tasks, in the order in which it took them on."""
+    """One robot; of ``tasks`` in hand, which are ``planning.errands``, the first is worked on."""
 
     fleet: Fleet
     planning: RobotPlanning
     kind: KindCode = KindCode.VEHICLE
     body: BodyState | None = None
     mode: RobotMode = RobotMode.FREE
-    over: set[Reference] = field(default_factory=set)
-    #: Of these, what was taken back by who gave it.
-    cancelled: set[Reference] = field(default_factory=set)
+    tasks: Undertakings[Errand] = field(init=False)
     #: Whether a host of node agents tells another site: then my map is wrong or old, and I stay where I am (row G27).
     has_other_map: bool = False
     #: Waits at nodes that ended in STOP, for the indicators.
@@ -100,21 +99,29 @@ class GraphRobot:
     _loaded_at_us: int | None = None
     _told_at_us: int | None = None
     _told: RobotAt | None = None
-    _order: tuple[RouteAction, int, int] | None = None
-    _order_at_us: int | None = None
-    _sequence: int = 0
+    drive: DeviceLink[tuple[RouteAction, int, int]] = field(init=False)
 
     def __post_init__(self) -> None:
         self.manual = Manual(self.fleet.node_id)
         self.manual.replay(self.fleet.entries)
         self.planning.is_held = not self.manual.is_automatic
+        me = self.fleet.node_id
+        refresh_us = self.site.timing.drive_refresh_us
+        self.drive = DeviceLink(lambda sequence, order: RouteOrder(me, sequence, *order), refresh_us)
+        self.tasks = Undertakings(
+            self.fleet,
+            is_begun=lambda errand: len(errand.stops) != TRANSPORT_STOPS or self._loaded_at_us is not None,
+            may_give=lambda _, node: self._is_desk(node),
+            lose=lambda errand: [lost_record(errand.task)],
+            in_hand=self.planning.errands,
+        )
         for task, errand in errands(self.fleet.entries).items():
             if errand.stops:
                 self.planning.errands[task] = errand
             else:
-                self.over.add(task)
+                self.tasks.remember(task)
             if errand.is_cancelled:
-                self.cancelled.add(task)
+                self.tasks.cancelled.add(task)
 
     @property
     def site(self) -> FactoryGraph:
@@ -150,7 +157,7 @@ class GraphRobot:
                 self.fleet.drops[Reason.VALUE_OUT_OF_RANGE] += 1
             case BodyState():
                 if self.body is None:
-                    self._sequence = message.sequence
+                    self.drive.go_on_from(message.sequence)
                 if self.body is None or self.body.node != message.node:
                     self._sensed = message.body_place is not BodyPlace.ON_EDGE
                     self._signal = self._answer = None
@@ -181,17 +188,11 @@ class GraphRobot:
             case VisitList() if message.robot == self.fleet.node_id:
                 task, stops = Reference(message.sender, message.order), stops_of(message)
                 return self._take_on(task, stops) if stops else self._take_back(task)
-            case Award() if message.winner == self.fleet.node_id and message.result is CallResult.AWARDED:
-                return self._on_award(message)
-            case Award(result=CallResult.AWARDED | CallResult.REJECTED) if message.task in self.planning.errands:
-                return self._yield(self.planning.errands[message.task], message)
             case ManualOrder() if message.machine == self.fleet.node_id:
                 effects = self.manual.ordered(message)
                 self.planning.is_held = not self.manual.is_automatic
                 return effects
-            case CallForProposals() if message.task in self.planning.errands or message.task in self.over:
-                return [self._report(message.task)]
-        return []
+        return self.tasks.hear(message)
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """Bids of my own are kept in mind; a task that is won is journalled before it is told."""
@@ -223,62 +224,42 @@ class GraphRobot:
 
     def next_wake(self) -> int | None:
         """When a signal, an order or a word is due, or loading over."""
-        times = [self._signal_at_us, self._order_at_us, self._told_at_us, self._loaded_at_us]
+        times = [self._signal_at_us, self.drive.due_us, self._told_at_us, self._loaded_at_us]
         times.append(self._grant.until_us if self._grant is not None else None)
         return min((time for time in times if time is not None), default=None) if self.body is not None else None
 
     def statements(self, now_us: int) -> list[Effect]:
         """Tasks in hand and done, where it is, and rights."""
         self._told = None
-        reports: list[Effect] = [self._report(task) for task in (*self.planning.errands, *sorted(self.over)[-8:])]
+        reports = self.tasks.reports()
         where = self._tell(now_us) if self.body is not None else []
         return reports + where + self.manual.statement() + self.fleet.tokens.statements()
 
     # --- tasks -------------------------------------------------------------------------------------------------
 
     def _take_on(self, task: Reference, stops: tuple[int, ...]) -> list[Effect]:
-        if task in self.planning.errands or task in self.over:
-            return [self._report(task)]
+        if self.tasks.knows(task):
+            return [self.tasks.report(task)]
         if self.has_other_map:
             return [Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.OTHER_SITE))]
         if not stops or any(stop not in self.site.graph.neighbours for stop in stops):
             return [Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.IMPOSSIBLE))]
         errand = Errand(task, stops)
-        self.planning.errands[task] = errand
-        return [errand_record(errand), self._report(task)]
+        self.tasks.meet(task, TaskEvent.WIN, errand)
+        return [errand_record(errand), self.tasks.report(task)]
 
-    def _yield(self, errand: Errand, award: Award) -> list[Effect]:
-        """A desk gave to another, or to nobody, what I have not begun."""
-        machine = self.site.machines.get(award.sender)
-        is_desks = machine is not None and machine.kind is KindCode.DESK
-        if not is_desks or len(errand.stops) != TRANSPORT_STOPS or self._loaded_at_us is not None:
-            return []
-        del self.planning.errands[errand.task]
-        return [lost_record(errand.task)]
+    def _is_desk(self, node: int) -> bool:
+        machine = self.site.machines.get(node)
+        return machine is not None and machine.kind is KindCode.DESK
 
     def _take_back(self, task: Reference) -> list[Effect]:
         """Who gave an order by name wants it no more: it ends its edge, and does nothing more for it."""
-        if task not in self.over:
-            self.planning.errands.pop(task, None)
-            self.over.add(task)
-            self.cancelled.add(task)
-            self._loaded_at_us = None
-            return [errand_record(Errand(task, (), is_cancelled=True)), self._report(task)]
-        return [self._report(task)]
-
-    def _on_award(self, award: Award) -> list[Effect]:
-        """Said again: my word was lost. For a bid that I have forgotten: it is given back."""
-        if award.task in self.planning.errands or award.task in self.over:
-            return [self._report(award.task)]
-        if self.fleet.negotiation.knows(award.sender, award.call):
-            return []
-        return [Send(TaskReport(self.fleet.node_id, award.task, TaskPhase.FORFEITED, 0, Reason.JOURNAL_LOST))]
-
-    def _report(self, task: Reference) -> Send:
-        phase = TaskPhase.AWARDED if task in self.planning.errands else TaskPhase.DONE
-        if task in self.cancelled:
-            return Send(TaskReport(self.fleet.node_id, task, TaskPhase.REFUSED, 0, Reason.CANCELLED))
-        return Send(TaskReport(self.fleet.node_id, task, phase, 0, Reason.NONE))
+        if self.tasks.standing(task) is TaskStanding.OVER:
+            return [self.tasks.report(task)]
+        self.tasks.meet(task, TaskEvent.END)
+        self.tasks.cancelled.add(task)
+        self._loaded_at_us = None
+        return [errand_record(Errand(task, (), is_cancelled=True)), self.tasks.report(task)]
 
     @property
     def _errand(self) -> Errand | None:
@@ -312,9 +293,8 @@ class GraphRobot:
         if left.stops:
             self.planning.errands[left.task] = left
         else:
-            del self.planning.errands[left.task]
-            self.over.add(left.task)
-            effects.append(self._report(left.task))
+            self.tasks.meet(left.task, TaskEvent.END)
+            effects.append(self.tasks.report(left.task))
         return effects
 
     # --- asking ------------------------------------------------------------------------------------------------
@@ -431,15 +411,9 @@ class GraphRobot:
         assert self.body is not None
         order = self._next_order(self.body)
         if order is None:
-            self._order = self._order_at_us = None
+            self.drive.rest()
             return []
-        if order == self._order and self._order_at_us is not None and now_us < self._order_at_us:
-            return []
-        if order != self._order:
-            self._order = order
-            self._sequence = successor(self._sequence, 8)
-        self._order_at_us = now_us + self.site.timing.drive_refresh_us
-        return [Actuate(RouteOrder(self.fleet.node_id, self._sequence, *order))]
+        return self.drive.order(order, now_us)
 
     def _next_order(self, body: BodyState) -> tuple[RouteAction, int, int] | None:
         grant = self._grant

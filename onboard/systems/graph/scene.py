@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from onboard.core.codes import ANY_STATION, Operation
+from onboard.core.codes import Operation
 from onboard.core.messages import Message, Reference
 from onboard.systems.graph.messages import NO_NODE, EdgeNotice, EdgeState, RobotAt, VisitList, stops_of
 from onboard.systems.graph.site import FactoryGraph
@@ -32,11 +32,10 @@ class _Robot:
 class GraphScene:
     """Fed beside ``view``, which knows the calls."""
 
-    noun = "order"
-
     def __init__(self, site: FactoryGraph, view: SiteView) -> None:
         self.site = site
         self.view = view
+        self.words = view.words
         lengths = {(one, other): float(length) for one, other, length in site.edges}
         nodes = arrange(lengths, sorted({node for ends in lengths for node in ends}), APART)
         self._spots = {node: (x + MARGIN, y + MARGIN) for node, (x, y) in nodes.items()}
@@ -132,18 +131,6 @@ class GraphScene:
                 words = f"{state.name.lower()} for {self.view.name(robot)}"
                 marks[_edge_id(*sorted(ends))] = {"state": "held", "lines": [words]}
         return {"marks": marks, "things": []}
-
-    def thing(self, reference: Reference) -> str:
-        """As in the port."""
-        return f"order {reference.number}"
-
-    def place(self, number: int) -> str:
-        """As in the port."""
-        return "any node" if number == ANY_STATION else f"N{number}"
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """As in the port."""
-        return f"has done order {reference.number}"
 
 
 def _edge_id(one: int, other: int) -> str:

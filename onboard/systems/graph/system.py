@@ -3,7 +3,6 @@
 from onboard.core.codes import KindCode
 from onboard.systems.graph.agents import HostFactory
 from onboard.systems.graph.desk import DeskFactory
-from onboard.systems.graph.messages import MESSAGES
 from onboard.systems.graph.records import RECORDS
 from onboard.systems.graph.robot import RobotFactory
 from onboard.systems.graph.site import FactoryGraph
@@ -12,6 +11,5 @@ from onboard.systems.system import System
 SYSTEM = System(
     FactoryGraph.system,
     {KindCode.VEHICLE: RobotFactory(), KindCode.NODE: HostFactory(), KindCode.DESK: DeskFactory()},
-    messages=MESSAGES,
     records=RECORDS,
 )

@@ -4,15 +4,17 @@ It decides nothing: of two bids for a task the lower one counts, and who bids wh
 told of a step it has written down before, so that a desk that starts again tells the same.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Plain
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.journal_records import Entry, records_in
 from onboard.core.messages import Message, SyncRequest
 from onboard.core.negotiation.winners import STANDS_AFTER_US
+from onboard.core.records import BootRecord
 from onboard.systems.mapd.auction import Task
 from onboard.systems.mapd.bidding import Tally
 from onboard.systems.mapd.knowledge import Knowledge
@@ -29,6 +31,7 @@ from onboard.systems.mapd.messages import (
     TransportKey,
     TransportResult,
 )
+from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
 from onboard.systems.mapd.rights import resource_of
 from onboard.systems.mapd.site import Mapd
 
@@ -148,8 +151,7 @@ class OrderDesk(Plain):
         release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
         task = Task(key.task, release, key.pickup, key.delivery)
         self.orders[key.task] = task
-        cells = {"pickup": task.pickup, "delivery": task.delivery, "release": task.release}
-        return [Record({"record": "transport", "task": key.task, **cells}), answer]
+        return [Record(TransportRecord(key.task, task.pickup, task.delivery, task.release)), answer]
 
     def _on_state(self, state: StepState) -> list[Effect]:
         before = self.knowledge.loads.get(state.sender)
@@ -163,7 +165,7 @@ class OrderDesk(Plain):
         self.orders.pop(task, None)
         self.served.add(task)
         answer = Actuate(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
-        return [Record({"record": "served", "task": task}), answer]
+        return [Record(ServedRecord(task)), answer]
 
     def _call(self, task: Task) -> Effect:
         return Send(TransportCall(self.fleet.node_id, task.number, task.pickup, task.delivery))
@@ -183,7 +185,7 @@ class OrderDesk(Plain):
         self.round = StepRound(me, step, count, self._attempt, bidding)
         self.awards = []
         self._due_us = now_us + self.site.step_us
-        record = Record({"record": "round", "step": step, "bidding": int(bidding), "open": count})
+        record = Record(RoundRecord(step, bidding, count))
         if bidding:
             self.tally = Tally(step, self._attempt)
             self._close_us = now_us + self.site.bid_window_us
@@ -216,32 +218,30 @@ class OrderDesk(Plain):
         self.tally = self._close_us = None
         self.step += 1
         told = " ".join(f"{robot}:{task}" for robot, task in order)
-        return [Record({"record": "awards", "step": step, "changes": told}), *(Send(award) for award in self.awards)]
+        return [Record(AwardsRecord(step, told)), *(Send(award) for award in self.awards)]
 
     # --- power-up ----------------------------------------------------------------------------------------------
 
-    def _replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+    def _replay(self, entries: Iterable[Entry]) -> None:
         """What was ordered, served and told, oldest entry first."""
         me, told = self.fleet.node_id, None
-        for entry in entries:
-            match entry.get("record"):
-                case "boot":
-                    self._attempt = int(entry["boot"])
-                case "transport":
-                    number = int(entry["task"])
-                    cells = int(entry["pickup"]), int(entry["delivery"])
-                    self.orders[number] = Task(number, int(entry["release"]), *cells)
-                case "served":
-                    self.orders.pop(int(entry["task"]), None)
-                    self.served.add(int(entry["task"]))
-                case "round":
-                    step, bidding = int(entry["step"]), bool(entry["bidding"])
-                    self.round, told = StepRound(me, step, int(entry["open"]), self._attempt, bidding), None
-                    self.step = step + (not bidding)
-                case "awards":
-                    told, self.step = entry, int(entry["step"]) + 1
+        for record in records_in(entries, BootRecord, TransportRecord, ServedRecord, RoundRecord, AwardsRecord):
+            match record:
+                case BootRecord():
+                    self._attempt = record.boot
+                case TransportRecord():
+                    task = Task(record.task, record.release, record.pickup, record.delivery)
+                    self.orders[record.task] = task
+                case ServedRecord():
+                    self.orders.pop(record.task, None)
+                    self.served.add(record.task)
+                case RoundRecord():
+                    self.round = StepRound(me, record.step, record.open, self._attempt, record.bidding)
+                    told, self.step = None, record.step + (not record.bidding)
+                case AwardsRecord():
+                    told, self.step = record, record.step + 1
         if self.round is not None and self.step > self.round.step and told is not None:
-            pairs = [tuple(map(int, one.split(":"))) for one in str(told["changes"]).split()]
+            pairs = [tuple(map(int, one.split(":"))) for one in told.changes.split()]
             self.awards = [
                 StepAward(me, self.round.step, index, len(pairs), robot, task)
                 for index, (robot, task) in enumerate(pairs)

@@ -1,11 +1,13 @@
 """What a robot writes down before it says or does it, and what it knows from there when it starts again."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from onboard.core.effects import Record
+from onboard.core.journal_records import Entry, records_in
 from onboard.systems.mapd.messages import NO_TASK
 from onboard.systems.mapd.paths import Path
+from onboard.systems.mapd.records import PathRecord, ServedRecord, SetOutRecord
 
 
 @dataclass(frozen=True)
@@ -24,29 +26,28 @@ class Past:
 
 def path_record(path: Path, version: int, task: int) -> Record:
     """A path, before it is told."""
-    cells = " ".join(map(str, path.cells))
-    return Record({"record": "path", "step": path.start, "version": version, "task": task, "cells": cells})
+    return Record(PathRecord(path.start, version, task, path.cells))
 
 
 def step_record(step: int) -> Record:
     """The step to which a robot is about to set out."""
-    return Record({"record": "step", "step": step})
+    return Record(SetOutRecord(step))
 
 
 def served_record(task: int, step: int) -> Record:
     """A task that is about to be unloaded, at ``step`` or on the way from it."""
-    return Record({"record": "served", "task": task, "step": step})
+    return Record(ServedRecord(task, step))
 
 
-def read_past(entries: Iterable[Mapping[str, str | int]]) -> Past:
+def read_past(entries: Iterable[Entry]) -> Past:
     """The journal's last words, oldest entry first; entries of other record types are passed over."""
     path, version, task, step, served = None, 0, NO_TASK, 0, (NO_TASK, -1)
-    for entry in entries:
-        if entry.get("record") == "path":
-            cells = tuple(int(cell) for cell in str(entry["cells"]).split())
-            path, version, task = Path(int(entry["step"]), cells), int(entry["version"]), int(entry["task"])
-        elif entry.get("record") == "step":
-            step = int(entry["step"])
-        elif entry.get("record") == "served":
-            served = int(entry["task"]), int(entry["step"])
+    for record in records_in(entries, PathRecord, SetOutRecord, ServedRecord):
+        match record:
+            case PathRecord():
+                path, version, task = Path(record.step, record.cells), record.version, record.task
+            case SetOutRecord():
+                step = record.step
+            case ServedRecord(task=one, step=int(at)):
+                served = one, at
     return Past(path, version, task, step, served)

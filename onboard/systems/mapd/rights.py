@@ -25,5 +25,9 @@ def cell_token(resource: int) -> TokenKey:
 
 def resource_of(key: TokenKey) -> int:
     """Inverse of ``cell_token``."""
-    station = Station.from_number(key.number)
+    return resource_number(Station.from_number(key.number))
+
+
+def resource_number(station: Station) -> int:
+    """Inverse of ``cell_station``."""
     return (station.track - 1) * _PER_TRACK + station.side * _PER_SIDE + station.index - 1

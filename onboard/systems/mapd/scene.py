@@ -50,11 +50,10 @@ class _Robot:
 class MapdScene:
     """Fed beside ``view``, which is told of tasks here."""
 
-    noun = "task"
-
     def __init__(self, site: Mapd, view: SiteView) -> None:
         self.site = site
         self.view = view
+        self.words = view.words
         self._spots = _spots(site)
         self._robots = {node: _Robot(cell, bound_for=cell) for node, cell in site.homes.items()}
         self._tasks: dict[int, TransportCall] = {}
@@ -110,7 +109,7 @@ class MapdScene:
             del self._tasks[next(iter(self._tasks))]
         self.view.calls_opened += 1
         if self.view.open_task(self._reference(call.task), Operation.TRANSPORT, time_us):
-            ways = f"from {self.place(call.pickup)} to {self.place(call.delivery)}"
+            ways = f"from {self.words.place(call.pickup)} to {self.words.place(call.delivery)}"
             self.view.say(time_us, f"{self.view.name(call.sender)} calls: {self._thing(call.task)}, {ways}")
 
     def _on_award(self, award: StepAward, time_us: int) -> None:
@@ -157,7 +156,7 @@ class MapdScene:
             return {"where": "", "car": None}
         told = [] if robot.task == NO_TASK else [[None, f"{self._thing(robot.task)}, {self._ways(robot.task)}"]]
         return {
-            "where": f"{self.place(robot.cell)}, step {robot.step}",
+            "where": f"{self.words.place(robot.cell)}, step {robot.step}",
             "car": str(robot.task) if robot.loaded else None,
             "path": robot.path,
             "ahead": [[round(x, 1), round(y, 1)] for x, y in (self._spots[cell] for cell in self._ahead(robot))],
@@ -195,24 +194,13 @@ class MapdScene:
         return Reference(self.site.desk, task)
 
     def _thing(self, task: int) -> str:
-        return f"task {task}"
+        return self.words.thing(self._reference(task))
 
     def _ways(self, task: int) -> str:
         call = self._tasks.get(task)
-        return f"from {self.place(call.pickup)} to {self.place(call.delivery)}" if call is not None else "long called"
-
-    def thing(self, reference: Reference) -> str:
-        """As in the port."""
-        return self._thing(reference.number)
-
-    def place(self, number: int) -> str:
-        """A cell by its name on the map."""
-        names = self.site.floor.names
-        return names[number] if number < len(names) else f"cell {number}"
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """As in the port."""
-        return f"has delivered {self.thing(reference)}"
+        if call is None:
+            return "long called"
+        return f"from {self.words.place(call.pickup)} to {self.words.place(call.delivery)}"
 
 
 def _spots(site: Mapd) -> dict[int, Spot]:

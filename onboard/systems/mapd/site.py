@@ -34,6 +34,7 @@ class Mapd(Site):
 
     system: ClassVar[str] = "mapd"
     demand: ClassVar[frozenset[str]] = frozenset({"tasks"})
+    no_hold: ClassVar[str] = "these robots move in step, and one that is held would hold all"
 
     rows: tuple[str, ...] = ()
     points: tuple[str, ...] = ()

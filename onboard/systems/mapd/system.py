@@ -2,7 +2,6 @@
 
 from onboard.core.codes import KindCode
 from onboard.systems.mapd.factories import OrderDeskFactory, UnitRobotFactory
-from onboard.systems.mapd.messages import MESSAGES
 from onboard.systems.mapd.records import RECORDS
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.system import System
@@ -10,6 +9,5 @@ from onboard.systems.system import System
 SYSTEM = System(
     Mapd.system,
     {KindCode.VEHICLE: UnitRobotFactory(), KindCode.DESK: OrderDeskFactory()},
-    messages=MESSAGES,
     records=RECORDS,
 )

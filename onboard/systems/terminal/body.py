@@ -1,9 +1,8 @@
 """A vehicle's drive and handler: orders out, states in; an order is said again until it is carried out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from onboard.core.effects import Actuate, Effect
-from onboard.core.serial import successor
+from onboard.core.effects import Effect
 from onboard.systems.terminal.messages import (
     Action,
     HandlerMode,
@@ -13,6 +12,7 @@ from onboard.systems.terminal.messages import (
     MoveOrder,
     MoveState,
 )
+from onboard.work.device_link import DeviceLink
 
 #: Orders are repeated so often, us (dbc/terminal.dbc).
 REPEAT_US = 500_000
@@ -25,10 +25,21 @@ class Body:
     node_id: int
     move: MoveState | None = None
     handler: HandlerState | None = None
-    move_order: MoveOrder | None = None
-    handler_order: HandlerOrder | None = None
-    due_us: int | None = None
+    #: The slot that was ordered: entity, slot, and the entity towards which it is crossed.
+    drive: DeviceLink[tuple[int, int, int]] = field(init=False)
+    #: The action that was ordered, and its box.
+    gear: DeviceLink[tuple[Action, int]] = field(init=False)
     crossing: tuple[int, int] = (0, 0)
+
+    def __post_init__(self) -> None:
+        me = self.node_id
+        self.drive = DeviceLink(lambda sequence, order: MoveOrder(me, sequence, *order), REPEAT_US)
+        self.gear = DeviceLink(lambda sequence, order: HandlerOrder(me, sequence, *order), REPEAT_US)
+
+    @property
+    def due_us(self) -> int | None:
+        """When an order is to be said again, bus time in us; None for never."""
+        return min((one.due_us for one in (self.drive, self.gear) if one.due_us is not None), default=None)
 
     @property
     def is_known(self) -> bool:
@@ -38,12 +49,12 @@ class Body:
     @property
     def is_moving(self) -> bool:
         """Whether a move was ordered that is not carried out yet."""
-        return self.move_order is not None
+        return self.drive.wanted is not None
 
     @property
     def is_handling(self) -> bool:
         """Whether an action of the handler was ordered that is not over yet."""
-        return self.handler_order is not None
+        return self.gear.wanted is not None
 
     @property
     def is_at_rest(self) -> bool:
@@ -60,26 +71,23 @@ class Body:
         """What a device says; the order that it carried out need not be repeated."""
         if isinstance(message, MoveState):
             self.move = message
-            order = self.move_order
-            arrived = order is not None and (message.entity, message.slot) == (order.entity, order.slot)
-            if order is not None and message.sequence == order.sequence and arrived:
-                self.move_order = None
+            order = self.drive.wanted
+            if order is None:
+                self.drive.go_on_from(message.sequence)
+            elif self.drive.is_obeyed(message.sequence) and (message.entity, message.slot) == order[:2]:
+                self.drive.rest()
         else:
             self.handler = message
-            pending = self.handler_order
-            over = message.gear is not HandlerMode.WORKING
-            if pending is not None and message.sequence == pending.sequence and over:
-                self.handler_order = None
-        if self.move_order is None and self.handler_order is None:
-            self.due_us = None
+            if self.gear.wanted is None:
+                self.gear.go_on_from(message.sequence)
+            elif self.gear.is_obeyed(message.sequence) and message.gear is not HandlerMode.WORKING:
+                self.gear.rest()
 
     def go(self, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
         """Order one slot."""
         assert self.move is not None
-        self.move_order = MoveOrder(self.node_id, successor(self.move.sequence, 8), entity, slot, towards)
-        self.due_us = now_us + REPEAT_US
         self.crossing = (entity, towards)
-        return [Actuate(self.move_order)]
+        return self.drive.order((entity, slot, towards), now_us)
 
     def towards(self) -> int:
         """For which entity the one in hand is being crossed, as ordered; 0 for none, or for not known."""
@@ -88,14 +96,8 @@ class Body:
     def handle(self, action: Action, box: int, now_us: int) -> list[Effect]:
         """Order one action at a station."""
         assert self.handler is not None
-        self.handler_order = HandlerOrder(self.node_id, successor(self.handler.sequence, 8), action, box)
-        self.due_us = now_us + REPEAT_US
-        return [Actuate(self.handler_order)]
+        return self.gear.order((action, box), now_us)
 
     def repeat(self, now_us: int) -> list[Effect]:
         """Say pending orders again where they are due."""
-        if self.due_us is None or now_us < self.due_us:
-            return []
-        self.due_us = now_us + REPEAT_US
-        orders = (self.move_order, self.handler_order)
-        return [Actuate(order) for order in orders if order is not None]
+        return self.drive.again(now_us) + self.gear.again(now_us)

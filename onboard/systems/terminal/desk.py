@@ -55,6 +55,7 @@ from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.vehicle import terminal
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
+from onboard.work.order_life import OrderEvent
 
 #: After a refusal, and while no robot is about to be free, the desk looks again after this, us. Ours.
 LOOK_US = 5_000_000
@@ -142,7 +143,7 @@ class Desk:
     def start(self, now_us: int) -> list[Effect]:
         """Tasks that were called for and not won are called for again; those that were won go on."""
         for task in [one for one in self.orders.open if one not in self.orders.won]:
-            self.orders.give_back(task)
+            self.orders.give_back(task, OrderEvent.NOT_WON)
         self._won_at_us = dict.fromkeys(self.orders.won, now_us)
         self._look_at_us = now_us + LOOK_US
         self.mirror.remember(read_boxes(self.fleet.node_id, self.fleet.node_id, self.fleet.entries))
@@ -193,7 +194,7 @@ class Desk:
         self.calls.pop(task, None)
         if event.result is CallResult.AWARDED:
             return self.won(task, event.winner, now_us, event.call.call)
-        self.orders.give_back(task)
+        self.orders.give_back(task, OrderEvent.NOT_WON)
         self._look_at_us = now_us + (LOOK_US if event.result is CallResult.REFUSED else 1)
         return [Record(self.orders.record())]
 
@@ -358,9 +359,8 @@ class Desk:
 
     def won(self, task: Reference, winner: int, now_us: int, call: int = 0) -> list[Effect]:
         """A robot has the task, by ``call`` where it is known."""
-        if task not in self.orders.open:
+        if not self.orders.goes_to(task, winner):
             return []
-        self.orders.won[task] = winner
         self.fleet.winners.takes(task, winner, now_us, call)
         self._won_at_us[task] = now_us
         self._look_at_us = now_us + 1
@@ -384,7 +384,7 @@ class Desk:
             return [Record(self.orders.record()), Report(f"task {report.task.number} is done")]
         if report.phase is TaskPhase.FORFEITED:
             self.fleet.winners.over(report.task)
-            self.orders.give_back(report.task)
+            self.orders.give_back(report.task, OrderEvent.GIVEN_BACK)
             self._look_at_us = now_us + LOOK_US
             return [Record(self.orders.record())]
         if report.phase is TaskPhase.AWARDED:
@@ -404,7 +404,7 @@ class Desk:
             return []
         self._won_at_us.pop(task, None)
         self.calls.pop(task, None)
-        self.orders.give_back(task)
+        self.orders.give_back(task, OrderEvent.TAKEN_BACK)
         return [*self.fleet.winners.take_back(task, reason, now_us), Record(self.orders.record())]
 
     def _look_after(self, now_us: int) -> list[Effect]:
@@ -413,10 +413,7 @@ class Desk:
         for task, one in list(self.orders.open.items()):
             effects += self._take_back(task, one, now_us)
         for task, winner in list(self.orders.won.items()):
-            transport = self.orders.open.get(task)
-            if transport is None:
-                del self.orders.won[task]
-                continue
+            transport = self.orders.open[task]
             if self.mirror.station_of(transport.box) == transport.target:
                 self.orders.finish(task)
                 self.fleet.winners.over(task)
@@ -425,7 +422,7 @@ class Desk:
                 self._won_at_us[task] = now_us
             elif now_us - self._won_at_us.get(task, now_us) >= LOST_US and self.mirror.station_of(transport.box):
                 self._won_at_us.pop(task, None)
-                self.orders.give_back(task)
+                self.orders.give_back(task, OrderEvent.TAKEN_BACK)
                 effects += self.fleet.winners.take_back(task, Reason.FALSE_STATEMENT, now_us)
                 effects += [Report(f"node {winner} has lost task {task.number}"), Record(self.orders.record())]
         return effects

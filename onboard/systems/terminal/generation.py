@@ -41,6 +41,9 @@ class VehicleGeneration:
         """Alone on all ways; None for a machine whose plan ends after T + delta T (M24), and for what nobody can do."""
         if call.operation is not Operation.TRANSPORT or not self.is_candidate(now_us):
             return None
+        if self.mirror.in_plans(call.car.number) is not None:
+            # Two desks called for one box at once, and one has it.
+            return None
         stations = (call.from_station, call.to_station)
         known = [self.site.entities.get(number) for number in stations]
         if any(one is None or one.kind is not EntityKind.STATION for one in known):

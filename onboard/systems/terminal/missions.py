@@ -1,17 +1,22 @@
 """Missions at a desk: orders become transports, one box each (rows M04 to M06, M23); kept in the journal."""
 
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.codes import TaskPhase
+from onboard.core.journal_records import Entry, records_in
 from onboard.core.messages import Reference
 from onboard.systems.terminal.messages import MissionKey, Verb
 from onboard.systems.terminal.mirror import TerminalMirror
+from onboard.systems.terminal.records import OrdersRecord
 from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.work.order_life import OrderEvent, OrderState, WorkOrder
 
 #: Tasks from outside that are remembered once they are over.
 MOST_OVER = 64
+#: Numbers at the beginning of a task's row in the journal.
+TASK_NUMBERS = 7
 #: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
 KNOWN = 127
 
@@ -37,16 +42,17 @@ class Order:
         return not self.urgent, self.before_us or 1 << 62, self.number
 
 
-@dataclass(frozen=True, slots=True)
-class Transport:
-    """One box of a mission under a task's name."""
+@dataclass
+class Transport(WorkOrder):
+    """One box of a mission under a task's name; ``type`` and ``source`` where any of that type from there will do."""
 
-    task: Reference
     mission: int
     box: int
     target: int
     before_us: int
     urgent: bool
+    type: str = ""
+    source: int = 0
 
 
 @dataclass
@@ -57,7 +63,6 @@ class Orders:
     node_id: int
     missions: dict[int, Order] = field(default_factory=dict)
     open: dict[Reference, Transport] = field(default_factory=dict)
-    won: dict[Reference, int] = field(default_factory=dict)
     done: int = 0
     last_task: int = 0
     #: Tasks from outside that are done, the newest so many: who asks for one again is told so.
@@ -122,8 +127,9 @@ class Orders:
             if task is None:
                 self.last_task += 1
                 task = Reference(self.node_id, self.last_task)
-            transport = Transport(task, order.number, box, order.target, order.before_us, order.urgent)
-            self.open[task] = transport
+            terms = order.target, order.before_us, order.urgent, order.type, order.source
+            transport = self.open[task] = Transport(task, order.number, box, *terms)
+            transport.meet(OrderEvent.CALL)
             return transport
         return None
 
@@ -161,15 +167,35 @@ class Orders:
                 found.append((box, above[-1]))
         return found
 
-    def give_back(self, task: Reference) -> None:
-        """Nobody does it: its box is a mission of its own again."""
-        transport = self.open.pop(task, None)
-        self.won.pop(task, None)
-        if transport is None:
+    @property
+    def won(self) -> dict[Reference, int]:
+        """Who has which task in hand."""
+        return {one.task: one.winner for one in self.open.values() if one.state is OrderState.IN_HAND}
+
+    def goes_to(self, task: Reference, winner: int) -> bool:
+        """Somebody has a task; False for one that was not called for."""
+        transport = self.open.get(task)
+        if transport is None or not transport.meet(OrderEvent.WON):
+            return False
+        transport.winner = winner
+        return True
+
+    def give_back(self, task: Reference, event: OrderEvent) -> None:
+        """Nobody does it: its box, or another of its type, is a mission of its own again."""
+        transport = self.open.get(task)
+        if transport is None or not transport.meet(event):
             return
+        del self.open[task]
         order = self.missions.setdefault(
             transport.mission,
-            Order(transport.mission, transport.target, before_us=transport.before_us, urgent=transport.urgent),
+            Order(
+                transport.mission,
+                transport.target,
+                type=transport.type,
+                source=transport.source,
+                before_us=transport.before_us,
+                urgent=transport.urgent,
+            ),
         )
         order.task = None if task.origin == self.node_id else task
         if order.type:
@@ -179,9 +205,10 @@ class Orders:
 
     def finish(self, task: Reference) -> bool:
         """A transport is over; True where it was open."""
-        self.won.pop(task, None)
-        if self.open.pop(task, None) is None:
+        transport = self.open.get(task)
+        if transport is None or not transport.meet(OrderEvent.CARRIED_OUT):
             return False
+        del self.open[task]
         self.done += 1
         if task.origin != self.node_id:
             self.over.append(task)
@@ -194,7 +221,7 @@ class Orders:
         if task in self.over:
             return TaskPhase.DONE
         if task in self.open:
-            return TaskPhase.AWARDED if task in self.won else TaskPhase.OPEN
+            return TaskPhase.AWARDED if self.open[task].state is OrderState.IN_HAND else TaskPhase.OPEN
         return TaskPhase.OPEN if any(one.task == task for one in self.missions.values()) else None
 
     def may_order(self, box: int, target: int) -> bool:
@@ -212,7 +239,7 @@ class Orders:
 
     # --- journal -----------------------------------------------------------------------------------------------
 
-    def record(self) -> dict[str, str | int]:
+    def record(self) -> OrdersRecord:
         """All that is not over, as one entry: the newest counts."""
         missions = ";".join(
             f"{one.number},{one.target},{one.left},{one.type},{one.source},{one.before_us},{int(one.urgent)},"
@@ -222,25 +249,24 @@ class Orders:
         )
         tasks = ";".join(
             f"{one.task.number},{one.mission},{one.box},{one.target},{one.before_us},{int(one.urgent)},"
-            f"{self.won.get(one.task, 0)},{one.task.origin}"
+            f"{one.winner},{one.task.origin},{one.type},{one.source}"
             for one in self.open.values()
         )
         over = ";".join(f"{one.origin},{one.number}" for one in self.over)
         taken = ";".join(str(number) for number in self.taken)
-        told: dict[str, str | int] = {"record": "orders", "missions": missions, "tasks": tasks, "over": over}
-        return told | {"taken": taken, "last": self.last_task, "done": self.done}
+        return OrdersRecord(missions, tasks, self.last_task, self.done, over, taken)
 
-    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+    def replay(self, entries: Iterable[Entry]) -> None:
         """What the newest entry says."""
-        newest = next((one for one in reversed(list(entries)) if one.get("record") == "orders"), None)
+        newest = next(iter([*records_in(entries, OrdersRecord)][-1:]), None)
         if newest is None:
             return
-        self.last_task, self.done = int(newest["last"]), int(newest["done"])
-        for row in str(newest.get("over", "")).split(";"):
+        self.last_task, self.done = newest.last, newest.done
+        for row in newest.over.split(";"):
             if row:
                 self.over.append(Reference(*(int(one) for one in row.split(","))))
-        self.taken.extend(int(number) for number in str(newest.get("taken", "")).split(";") if number)
-        for row in str(newest["missions"]).split(";"):
+        self.taken.extend(int(number) for number in newest.taken.split(";") if number)
+        for row in newest.missions.split(";"):
             if row:
                 number, target, left, kind, source, before, is_urgent, named, *name = row.split(",")
                 boxes = [int(box) for box in named.split("+") if box]
@@ -248,14 +274,19 @@ class Orders:
                     int(number), int(target), int(left), kind, int(source), boxes, int(before), is_urgent == "1"
                 )
                 self.missions[int(number)].task = Reference(int(name[0]), int(name[1])) if name else None
-        for row in str(newest["tasks"]).split(";"):
+        for row in newest.tasks.split(";"):
             if row:
-                numbers = [int(one) for one in row.split(",")]
-                _, mission, box, to, before_us, urgent, winner, *origin = numbers
-                task = Reference(origin[0] if origin else self.node_id, numbers[0])
-                self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent))
-                if winner:
-                    self.won[task] = winner
+                self._replay_task(row.split(","))
+
+    def _replay_task(self, row: list[str]) -> None:
+        """One that was called for. Version 0.1 wrote neither who named it, which was the desk, nor type and source."""
+        number, mission, box, to, before_us, urgent, winner = (int(one) for one in row[:TASK_NUMBERS])
+        origin, kind, source = (*row[TASK_NUMBERS:], *(str(self.node_id), "", "0")[len(row) - TASK_NUMBERS :])
+        task = Reference(int(origin), number)
+        one = self.open[task] = Transport(task, mission, box, to, before_us, bool(urgent), kind, int(source))
+        one.meet(OrderEvent.CALL)
+        if winner:
+            self.goes_to(task, winner)
 
 
 def types_of(site: Terminal) -> list[str]:

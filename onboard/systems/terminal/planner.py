@@ -96,8 +96,12 @@ class Planner:
         return []
 
     def called(self, call: CallForProposals) -> None:
-        """A box that is in my queue is called for: its desk took the task for lost, and whoever wins it now has it."""
-        self.queue = deque(job for job in self.queue if job.box != call.car.number)
+        """A box that is in my queue is called for: its desk took the task for lost, and whoever wins it now has it.
+
+        Another desk that calls for the same box knows nothing of that task.
+        """
+        lost = [job for job in self.queue if (job.box, job.task.origin) == (call.car.number, call.task.origin)]
+        self.queue = deque(job for job in self.queue if job not in lost)
         self.generation.has_queue = bool(self.queue)
 
     def speak(self, now_us: int) -> list[Effect]:
@@ -147,11 +151,11 @@ class Planner:
         self.generation.has_queue = True
 
     def _plan_next(self, now_us: int) -> list[Effect]:
-        """Put the oldest task won behind what is planned; forfeit one whose box is in another's plan."""
+        """Put the oldest task won behind what is planned; forfeit one whose box is in a plan: two desks wanted it."""
         if not self.queue or (self._queue_at_us is not None and now_us < self._queue_at_us):
             return []
         job = self.queue[0]
-        if self.mirror.in_plans(job.box) not in (None, self.fleet.node_id):
+        if self.mirror.in_plans(job.box) is not None:
             self._drop_first()
             return [Send(TaskReport(self.fleet.node_id, job.task, TaskPhase.FORFEITED, job.source, Reason.NONE))]
         if self.mirror.traffic.dates(now_us).circle:

@@ -1,11 +1,64 @@
-"""What of a terminal's records outlives compaction: plans and boxes (memory.py), the desk's orders (missions.py)."""
+"""What a terminal's machines write into their journals: plans and boxes (memory.py), the desk's orders (missions.py).
 
-from onboard.work.compaction import End, Keep, Rules, Which
+Rows of numbers stand as text: numbers with commas between, rows with semicolons.
+"""
 
-RECORDS: Rules = {
-    # A new plan ends the steps of the one before.
-    "plan": (Keep("plan"), End(("step",))),
-    "step": (Keep("step", which=Which.ALL),),
-    "box": (Keep("box", ("box",)),),
-    "orders": (Keep("orders"),),
-}
+from dataclasses import dataclass
+
+from onboard.core.journal_records import End, JournalRecord, Keep, RecordTypes, Which
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRecord(JournalRecord):
+    """A plan that begins at ``begin``, bus time in us; a new one ends the steps of the one before."""
+
+    NAME = "plan"
+    RULES = (Keep("plan"), End(("step",)))
+
+    version: int
+    begin: int
+    steps: str
+    loads: str
+
+
+@dataclass(frozen=True, slots=True)
+class StepOverRecord(JournalRecord):
+    """A step of the plan of this version was over at ``ended``, bus time in us."""
+
+    NAME = "step"
+    RULES = (Keep("step", which=Which.ALL),)
+
+    version: int
+    step: int
+    ended: int
+
+
+@dataclass(frozen=True, slots=True)
+class BoxRecord(JournalRecord):
+    """Where a box stands, as it was told under ``version`` of its right; its length as ``wheelbase``, mm."""
+
+    NAME = "box"
+    RULES = (Keep("box", ("box",)),)
+
+    box: int
+    station: int
+    version: int
+    wheelbase: int
+
+
+@dataclass(frozen=True, slots=True)
+class OrdersRecord(JournalRecord):
+    """All of a desk that is not over; the newest counts. ``last``: the last task's number; ``done``: how many were."""
+
+    NAME = "orders"
+    RULES = (Keep("orders"),)
+
+    missions: str
+    tasks: str
+    last: int
+    done: int
+    over: str = ""
+    taken: str = ""
+
+
+RECORDS: RecordTypes = (PlanRecord, StepOverRecord, BoxRecord, OrdersRecord)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 from onboard.core.codes import ANY_STATION, TokenKind
-from onboard.core.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
+from onboard.core.messages import BusTime, CarAt, Message, TokenGrant, TokenHeld
 from onboard.core.serial import is_newer
 from onboard.systems.terminal.chart import BAY, MARGIN, chart_of
 from onboard.systems.terminal.messages import (
@@ -47,11 +47,10 @@ class _Body:
 class TerminalScene:
     """Fed beside ``view``, which knows the calls."""
 
-    noun = "box"
-
     def __init__(self, site: Terminal, view: SiteView) -> None:
         self.site = site
         self.view = view
+        self.words = view.words
         self._clock = BusClock()
         self._bodies = {node: _Body(site.machines[node].home.track) for node in site.vehicles}
         self._tokens: dict[int, tuple[int, int]] = {}
@@ -104,7 +103,7 @@ class TerminalScene:
             case LaneState():
                 if self._blocked.get(message.lane, False) is not message.blocked:
                     words = "is blocked" if message.blocked else "is free again"
-                    self.view.say(time_us, f"{self.place(message.lane)} {words}")
+                    self.view.say(time_us, f"{self.words.place(message.lane)} {words}")
                 self._blocked[message.lane] = message.blocked
             case TokenGrant() if message.token_kind is TokenKind.SEGMENT:
                 self._on_token(message.token, message.version, message.holder)
@@ -208,10 +207,10 @@ class TerminalScene:
         for later in self._to_come(body):
             end_us = self._clock.log_us(body.begin_ms + later.end_ms, now_us)
             what = later.action.name.lower().replace("_", " ")
-            told.append([end_us, f"{what} {self.place(later.entity)}"])
+            told.append([end_us, f"{what} {self.words.place(later.entity)}"])
         return {
-            "where": f"{self.place(body.entity)}{f', {doing}' if doing else ''}",
-            "car": self.thing(aboard).partition(" ")[2] if aboard is not None else None,
+            "where": f"{self.words.place(body.entity)}{f', {doing}' if doing else ''}",
+            "car": self.words.load(aboard) if aboard is not None else None,
             "path": body.path,
             "ahead": self._ahead(node, body),
             "held": self._held(node),
@@ -260,21 +259,6 @@ class TerminalScene:
             if blocked:
                 marks[str(lane)] = {"state": "blocked", "lines": ["blocked"]}
         return {"marks": marks, "things": []}
-
-    def thing(self, reference: Reference) -> str:
-        """A box by its name in the site file."""
-        if 0 < reference.number <= len(self.site.boxes):
-            return f"box {self.site.boxes[reference.number - 1].name}"
-        return f"box {reference.number}"
-
-    def place(self, number: int) -> str:
-        """As in the port."""
-        entity = self.site.entities.get(number)
-        return entity.name if entity is not None else "anywhere" if number == ANY_STATION else f"place {number}"
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """As in the port."""
-        return f"has put the box down at {self.place(station)}"
 
     # --- spots -------------------------------------------------------------------------------------------------
 

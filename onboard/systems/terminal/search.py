@@ -21,7 +21,7 @@ from onboard.systems.terminal.plan import (
     handling_steps,
 )
 from onboard.systems.terminal.routes import routes
-from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 from onboard.systems.terminal.traffic import Node, Traffic, Visit, copy_of
 
 _EVER = 1 << 62
@@ -53,6 +53,11 @@ class _Stay(NamedTuple):
     entity: int
     steps: tuple[Step, ...]
     box: int
+
+    @property
+    def puts(self) -> bool:
+        """Whether a box is put down."""
+        return any(step.action is Action.PUT_DOWN for step in self.steps)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +92,8 @@ class Search:
         ``kept`` are the steps that come first, of the plan in hand. None where no way leads there.
         """
         found: list[Found] = []
+        if kept is not None and self._buries(kept, job.source):
+            return None
         for steps in self._ways(here, job):
             if len(steps) + (len(kept.steps) if kept is not None else 0) > MAX_STEPS:
                 continue
@@ -94,6 +101,13 @@ class Search:
             if one is not None:
                 found.append(one)
         return min(found, key=lambda one: (one.pushes, one.plan.end), default=None)
+
+    def _buries(self, kept: Plan, source: int) -> bool:
+        """Whether the plan in hand ends with a box on the stack from which the next one is to be fetched: above it."""
+        return self._is_stack(source) and any(kept.steps[load.put].entity == source for load in kept.loads)
+
+    def _is_stack(self, entity: int) -> bool:
+        return bool(entity) and self.site.entities[entity].station is StationKind.STACK
 
     # --- ways --------------------------------------------------------------------------------------------------
 
@@ -115,14 +129,14 @@ class Search:
 
     # --- gaps --------------------------------------------------------------------------------------------------
 
-    def rooms(self, entity: int, box: int = 0) -> list[Room]:
-        """All gaps of an entity's list that delay nobody, in order."""
+    def rooms(self, entity: int, box: int = 0, *, puts: bool = False) -> list[Room]:
+        """All gaps of an entity's list that delay nobody, in order, to fetch ``box`` there, or to put one down."""
         place, gap = self.site.entities[entity], self.site.gap_us
         row = [visit for visit in self.traffic.lists.get(entity, ()) if visit.owner != self.owner]
         if not place.capacity and place.kind is not EntityKind.LANE:
             return [Room(len(row), -_EVER, _EVER, -_EVER, _EVER)]
         times = [self.traffic.begin_and_end(visit, self.now) for visit in row]
-        low, high = self._stack_places(row, box)
+        low, high = self._stack_places(row, box, puts=puts)
         found = []
         for number in range(low, min(high, len(row)) + 1):
             room = self._room(number, times, place.capacity, gap, is_lane=place.kind is EntityKind.LANE)
@@ -151,17 +165,24 @@ class Search:
                     return None
         return Room(number, enter_low, enter_high, leave_low, leave_high)
 
-    def _stack_places(self, row: list[Visit], box: int) -> tuple[int, int]:
-        """Behind whoever takes a box from above this one, before whoever takes one from below."""
+    def _stack_places(self, row: list[Visit], box: int, *, puts: bool) -> tuple[int, int]:
+        """Behind whoever takes a box from above this one, before whoever takes one from below or puts one on it.
+
+        Who ``puts`` one on a stack comes behind all who fetch from it.
+        """
         low, high = 0, len(row)
         for number, visit in enumerate(row):
             owned = self.traffic.plans[visit.owner]
+            is_stack = self._is_stack(owned.plan.steps[visit.first].entity)
             for load in owned.plan.loads:
-                if not visit.first <= load.pick <= visit.last or not box:
-                    continue
-                if box in self.traffic.below.get(load.box, ()):
+                picks = visit.first <= load.pick <= visit.last
+                if picks and box and box in self.traffic.below.get(load.box, ()):
                     low = max(low, number + 1)
-                elif load.box in self.traffic.below.get(box, ()):
+                elif picks and box and load.box in self.traffic.below.get(box, ()):
+                    high = min(high, number)
+                elif picks and puts and is_stack:
+                    low = max(low, number + 1)
+                elif box and is_stack and visit.first <= load.put <= visit.last:
                     high = min(high, number)
         return low, high
 
@@ -181,7 +202,7 @@ class Search:
         for stay, after in zip(stays, [*stays[1:], None], strict=True):
             if after is None:
                 break
-            rooms = self.rooms(after.entity, after.box)
+            rooms = self.rooms(after.entity, after.box, puts=after.puts)
             following: dict[int, _Reached] = {}
             for one in reached:
                 leave = max(self._leave(stay, one.enter), one.room.leave_low, self.now)
@@ -277,9 +298,9 @@ class Search:
             at = began
             for stay in stays:
                 row = [visit for visit in self.traffic.lists.get(stay.entity, ()) if visit.owner != self.owner]
-                place = self._stack_places(row, stay.box)[1]
+                low, high = self._stack_places(row, stay.box, puts=stay.puts)
                 first = (n for n, one in enumerate(row) if one.owner in ahead_of and not self.traffic.is_inside(one))
-                place = min(place, next(first, len(row)))
+                place = min(high, max(next(first, len(row)), low if stay.puts else 0))
                 if stay is stays[0] and kept is None:
                     place = self._first_rooms(stay, is_kept=False)[0].place
                 after = row[place - 1].key if place else NOBODY_BEFORE

@@ -3,7 +3,6 @@
 from onboard.core.codes import KindCode
 from onboard.systems.system import System
 from onboard.systems.terminal.desk import DeskFactory
-from onboard.systems.terminal.messages import MESSAGES
 from onboard.systems.terminal.records import RECORDS
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.vehicle import VehicleFactory
@@ -11,6 +10,5 @@ from onboard.systems.terminal.vehicle import VehicleFactory
 SYSTEM = System(
     Terminal.system,
     {KindCode.VEHICLE: VehicleFactory(), KindCode.DESK: DeskFactory()},
-    messages=MESSAGES,
     records=RECORDS,
 )

@@ -19,7 +19,7 @@ from onboard.core.site import Machine, Segment, Site
 from onboard.systems.terminal.body import Body
 from onboard.systems.terminal.generation import VehicleGeneration
 from onboard.systems.terminal.manual import Manual
-from onboard.systems.terminal.memory import box_record, read_boxes, step_record
+from onboard.systems.terminal.memory import box_record, read_boxes
 from onboard.systems.terminal.messages import (
     Action,
     Assignment,
@@ -32,6 +32,7 @@ from onboard.systems.terminal.messages import (
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import Load
 from onboard.systems.terminal.planner import Planner
+from onboard.systems.terminal.records import StepOverRecord
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.traffic import Owned
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
@@ -204,7 +205,7 @@ class Vehicle:
         report = self.planner.report(owned, step, now_us)
         self.mirror.hear(report, now_us)
         self._told_blocked = False
-        effects: list[Effect] = [Record(step_record(owned.plan.version, step, now_us)), Send(report)]
+        effects: list[Effect] = [Record(StepOverRecord(owned.plan.version, step, now_us)), Send(report)]
         if self.owned is None:
             effects += self.planner.over(now_us)
         return effects

@@ -1,19 +1,107 @@
-"""What of a turning shop's records outlives compaction: jobs of its lathes (machine.py), orders of its desk."""
+"""What a turning shop's machines write into their journals: lathes their jobs (machine.py), the desk its orders."""
 
-from onboard.work.compaction import MOST_OVER, End, Keep, Rules
-from onboard.work.counter_records import RECORDS as COUNTER_RECORDS
+from dataclasses import dataclass, field
+from enum import Enum
 
-_TASK = ("origin", "number")
+from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes, stored_as
+from onboard.core.messages import Reference
+from onboard.systems.turning.lathe import Job
+from onboard.work.order_records import OrderRecord, OrderStateRecord
 
-RECORDS: Rules = {
-    **COUNTER_RECORDS,
-    "job": (Keep("job", _TASK),),
-    "job_stage": (Keep("job_stage", _TASK),),
-    "job_lost": (End(("job", "job_stage"), _TASK),),
-    # That a job is over is kept as long as MOST_OVER others; the job itself is not.
-    "job_over": (
+_TASK = ("task",)
+
+
+class Stage(Enum):
+    """How far an order is, each a point from which a lathe that starts again can go on."""
+
+    WON = "not begun"
+    SETTING = "program loaded; being set up, or about to be"
+    MAKING = "set up; parts are made"
+
+
+@dataclass(frozen=True, slots=True)
+class JobRecord(JournalRecord):
+    """A job that was won; the bar in whole mm, the allowance at its face in um."""
+
+    NAME = "job"
+    RULES = (Keep("job", _TASK),)
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+    drawing: int
+    material: int
+    bar_mm: int
+    batch: int
+    face_um: int
+
+    @property
+    def job(self) -> Job:
+        """As a lathe reckons with it."""
+        return Job(self.drawing, self.material, self.bar_mm, self.batch, self.face_um / 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class JobStageRecord(JournalRecord):
+    """How far it is."""
+
+    NAME = "job_stage"
+    RULES = (Keep("job_stage", _TASK),)
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+    stage: Stage
+
+
+@dataclass(frozen=True, slots=True)
+class JobLostRecord(JournalRecord):
+    """It is another's now."""
+
+    NAME = "job_lost"
+    RULES = (End(("job", "job_stage"), _TASK),)
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+
+
+@dataclass(frozen=True, slots=True)
+class JobOverRecord(JournalRecord):
+    """It is over: that is kept as long as ``MOST_OVER`` others, the job itself is not."""
+
+    NAME = "job_over"
+    RULES = (
         End(("job", "job_stage"), _TASK),
         Keep("job_over", _TASK),
         End(("job_over",), _TASK, most=MOST_OVER),
-    ),
-}
+    )
+
+    task: Reference = field(metadata=stored_as("origin", "number"))
+
+
+@dataclass(frozen=True, slots=True)
+class JobOrderRecord(OrderRecord):
+    """Parts are wanted; units as in ``JobRecord``."""
+
+    drawing: int
+    material: int
+    bar_mm: int
+    batch: int
+    face_um: int
+
+    @property
+    def job(self) -> Job:
+        """As a lathe reckons with it."""
+        return Job(self.drawing, self.material, self.bar_mm, self.batch, self.face_um / 1000)
+
+
+@dataclass(frozen=True, slots=True)
+class JobOrderStateRecord(OrderStateRecord):
+    """With what the winner asks for it, in cents."""
+
+    total_ct: int
+
+
+RECORDS: RecordTypes = (
+    JobRecord,
+    JobStageRecord,
+    JobLostRecord,
+    JobOverRecord,
+    JobOrderRecord,
+    JobOrderStateRecord,
+)

@@ -2,7 +2,6 @@
 
 from collections import OrderedDict
 
-from onboard.core.codes import ANY_STATION
 from onboard.core.messages import Message, Reference
 from onboard.systems.turning.messages import (
     BillBar,
@@ -11,7 +10,6 @@ from onboard.systems.turning.messages import (
     NcMode,
     NcState,
     ToolState,
-    TurningOrder,
 )
 from onboard.systems.turning.site import Turning
 from onboard.trace.scene.scene import Json, shape, still
@@ -21,19 +19,17 @@ from onboard.trace.view import SiteView
 WIDTH, HEIGHT, GAP = 300.0, 250.0, 24.0
 #: Lathes side by side.
 COLUMNS = 3
-#: Orders that are remembered: the newest.
+#: Prices that are remembered: the newest.
 MOST_KEPT = 256
 
 
 class TurningScene:
     """Fed beside ``view``, which knows the calls."""
 
-    noun = "order"
-
     def __init__(self, site: Turning, view: SiteView) -> None:
         self.site = site
         self.view = view
-        self._orders: OrderedDict[Reference, TurningOrder] = OrderedDict()
+        self.words = view.words
         self._progress: dict[int, OrderedDict[Reference, LatheProgress]] = {node: OrderedDict() for node in site.lathes}
         self._modes: dict[int, NcMode] = {}
         self._worn: dict[tuple[int, int], int] = {}
@@ -54,10 +50,6 @@ class TurningScene:
     def feed(self, message: Message, time_us: int) -> None:
         """As in the port."""
         match message:
-            case TurningOrder():
-                self._orders[Reference(message.sender, message.task)] = message
-                if len(self._orders) > MOST_KEPT:
-                    self._orders.popitem(last=False)
             case BillBar():
                 self._prices[message.sender, Reference(message.manager, message.task)] = message.total_ct
                 if len(self._prices) > MOST_KEPT:
@@ -70,7 +62,7 @@ class TurningScene:
         known = row.get(task)
         if known is None or known.lathe_phase is not message.lathe_phase:
             words = message.lathe_phase.name.lower().replace("_", " ")
-            self.view.say(time_us, f"{self.view.name(message.sender)}: {self.thing(task)}, {words}")
+            self.view.say(time_us, f"{self.view.name(message.sender)}: {self.words.thing(task)}, {words}")
         row[task] = message
         if message.lathe_phase is LathePhase.FINISHED:
             del row[task]
@@ -120,23 +112,7 @@ class TurningScene:
     def _line(self, node: int, task: Reference, one: LatheProgress) -> str:
         price = self._prices.get((node, task))
         cost = f", {price / 100:.2f} a part" if price is not None else ""
-        return f"{self.thing(task)}: {one.lathe_phase.name.lower().replace('_', ' ')}{cost}"
-
-    def thing(self, reference: Reference) -> str:
-        """An order with what is to be made."""
-        order = self._orders.get(reference)
-        drawing = self.site.drawings.get(order.drawing) if order is not None else None
-        if order is None or drawing is None:
-            return f"order {reference.number}"
-        return f"order {reference.number}, {order.batch} x {drawing.name}"
-
-    def place(self, number: int) -> str:
-        """Bars come and parts go by hand."""
-        return "anywhere" if number == ANY_STATION else f"place {number}"
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """As in the port."""
-        return f"has made {self.thing(reference)}"
+        return f"{self.words.thing(task)}: {one.lathe_phase.name.lower().replace('_', ' ')}{cost}"
 
 
 SCENE = TurningScene

@@ -4,10 +4,7 @@ from onboard.core.codes import KindCode
 from onboard.systems.system import System
 from onboard.systems.turning.desk import DeskFactory
 from onboard.systems.turning.machine import LatheFactory
-from onboard.systems.turning.messages import MESSAGES
 from onboard.systems.turning.records import RECORDS
 from onboard.systems.turning.site import Turning
 
-SYSTEM = System(
-    Turning.system, {KindCode.LATHE: LatheFactory(), KindCode.DESK: DeskFactory()}, messages=MESSAGES, records=RECORDS
-)
+SYSTEM = System(Turning.system, {KindCode.LATHE: LatheFactory(), KindCode.DESK: DeskFactory()}, records=RECORDS)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from onboard.core.codes import (
+    ANY_STATION,
     CallResult,
     DeskInput,
     DeskText,
@@ -114,8 +115,9 @@ class _Story:
             case TaskReport() if message.task == self.task:
                 yield from self._report(message)
             case CarAt() if message.car == self.car and self._changed("car", message.station):
-                where = "aboard" if message.station == 0xFFFF else f"at {self._words.station(message.station)}"
-                yield ALL, f"car {self._words.reference(message.car)} {where}", 0
+                names = self._words.system
+                where = "aboard" if message.station == ANY_STATION else f"at {names.place(message.station)}"
+                yield ALL, f"{names.thing(message.car)} {where}", 0
             case Progress():
                 yield from self._progress(message)
 
@@ -125,8 +127,8 @@ class _Story:
         self.calls[call.sender, call.call] = call
         if not call.depth:
             self.operation, self.car = call.operation, call.car
-        what = call.operation.name.lower()
-        way = f"{self._words.station(call.from_station)} to {self._words.station(call.to_station)}"
+        what = self._words.system.operation(call.operation)
+        way = self._words.system.way(call) or self._words.system.thing(call.car)
         yield ALL, f"call {call.call}: {what}, {way}", self._park(3 if not call.depth else 15)
 
     def _award(self, award: Award) -> Iterator[tuple[int, str, int]]:
@@ -147,7 +149,9 @@ class _Story:
         self.loaded |= report.phase is TaskPhase.LOADED
         self.over = report.phase in (TaskPhase.DONE, TaskPhase.REFUSED)
         step = {TaskPhase.LOADED: 13, TaskPhase.DONE: 21}.get(report.phase, 0)
-        yield ALL, f"task {report.phase.name.lower()}, {self._words.station(report.station)}", self._park(step)
+        names = self._words.system
+        where = "" if "station" in names.silent else f", {names.place(report.station)}"
+        yield ALL, f"task {report.phase.name.lower()}{where}", self._park(step)
 
     def _progress(self, progress: Progress) -> Iterator[tuple[int, str, int]]:
         if progress.sender == self.owner:
@@ -173,7 +177,7 @@ class _Story:
                 self.pressed |= bool(step)
                 yield message.sender, f"desk: {message.event.name.lower()}", self._once("key", step)
             case DeskOrder() if message.text is DeskText.TAKE_TICKET and self._changed("ticket", message.car):
-                yield message.sender, f"ticket of car {self._words.reference(message.car)}", 2
+                yield message.sender, f"ticket of {self._words.system.thing(message.car)}", 2
             case DoorState():
                 yield from self._doors(message)
             case ShuttleState() if message.sender == self.owner and self._changed("shuttle", message.mode):
@@ -222,6 +226,7 @@ def chart(site: Site, said: Iterable[Said], task: Reference) -> Chart | None:
     story = _Story(site, task, words)
     arrows: list[Arrow] = []
     for one in said:
+        words.hear(one.message)
         if not one.is_fleet and one.message.sender not in (task.origin, story.owner):
             continue
         arrows += story.arrows(one)

@@ -12,7 +12,6 @@ from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.trace.candump_reader import CandumpReader, Record
 from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.liveness import NobodyStarves
 from onboard.trace.check.picture import SETTLING_US, Picture
 from onboard.trace.check.rule import Rule
 from onboard.trace.check.systems import rules_for
@@ -204,7 +203,7 @@ class Checks:
         for rule in self._rules:
             rule.tick(self._last_us or 0)
             rule.finish(self._last_us or 0)
-            if isinstance(rule, NobodyStarves):
+            if rule.limit_us:
                 self.verdict.wait_limit_us = rule.limit_us
                 for node, waited_us in rule.longest_us.items():
                     self.verdict.waits_us[node] = max(self.verdict.waits_us.get(node, 0), waited_us)

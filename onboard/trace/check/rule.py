@@ -32,6 +32,9 @@ class Rule(ABC):
     def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
         self.picture = picture
         self._report = report
+        #: Of a rule that bounds waiting: the longest wait of each machine, and the bound; 0 for none.
+        self.longest_us: dict[int, int] = {}
+        self.limit_us = 0
 
     @abstractmethod
     def handlers(self) -> Handlers:

@@ -9,9 +9,10 @@ from pathlib import Path
 
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
+from onboard.systems.registry import part
+from onboard.trace.chart.over_time import Diagram
 from onboard.trace.chart.sequence import as_svg, as_text, chart
 from onboard.trace.chart.svg import Drawing
-from onboard.trace.chart.time_space import draw, watch
 from onboard.trace.commands.common import (
     Commands,
     TraceError,
@@ -57,7 +58,7 @@ def register_sequence(commands: Commands) -> None:
 
 def register_diagram(commands: Commands) -> None:
     """Add the command."""
-    parser = add_command(commands, "diagram", "time-space diagram, SVG or PNG", DIAGRAM_HELP, run_diagram)
+    parser = add_command(commands, "diagram", "what moves or lasts over time, SVG or PNG", DIAGRAM_HELP, run_diagram)
     add_log(parser)
     add_site(parser, required=True)
     parser.add_argument("--from", dest="from_s", type=float, metavar="S", help="seconds since the log's first frame")
@@ -108,6 +109,9 @@ def run_diagram(args: argparse.Namespace) -> int:
     """Draw the diagram."""
     site = site_of(args)
     assert site is not None, "argparse asks for it"
+    module = part(site.system, "diagram")
+    if module is None:
+        raise TraceError(f"diagram: {site.name} is a {site.system}, and nobody has said what to draw of one over time")
     with open_log(args) as log:
         heard = _Heard(log, site)
         messages = heard.first()
@@ -117,10 +121,13 @@ def run_diagram(args: argparse.Namespace) -> int:
         start_us = first.time_us
         from_us = None if args.from_s is None else start_us + round(args.from_s * 1e6)
         until_us = None if args.until_s is None else start_us + round(args.until_s * 1e6)
-        picture = watch(site, messages, from_us, until_us)
-    if picture.last_us <= picture.first_us:
+        diagram: Diagram = module.DIAGRAM(site, from_us, until_us)
+        for said in messages:
+            if said.is_fleet:
+                diagram.feed(said)
+    if diagram.last_us <= diagram.first_us:
         raise TraceError(f"--from {args.from_s} --until {args.until_s}: nothing of {args.log} lies between")
-    _write(args.out, draw(site, picture, start_us))
+    _write(args.out, diagram.draw(start_us))
     tell_faults(log, heard.listener)
     return 0
 

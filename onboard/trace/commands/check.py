@@ -19,8 +19,7 @@ from onboard.trace.commands.common import (
     write_text,
 )
 from onboard.trace.words import Words
-from onboard.wire.codec import Codec
-from onboard.wire.dbc_file import read_layouts
+from onboard.wire.dbc_file import fleet_layouts, read_layouts
 
 HELP = """\
 exit status:
@@ -40,7 +39,9 @@ def register(commands: Commands) -> None:
     check = add_command(commands, "check", "judge a log by every rule that a fleet must keep", HELP, run)
     add_log(check)
     add_site(check)
-    check.add_argument("--dbc", type=Path, metavar="FILE", help="DBC of the fleet bus instead of the built-in contract")
+    check.add_argument(
+        "--dbc", type=Path, metavar="FILE", help="DBC that the log was made by: must be the contract of this program"
+    )
     check.add_argument(
         "--faults", action="store_true", help="frames were lost on purpose: leave out rules that need every frame"
     )
@@ -51,8 +52,9 @@ def run(args: argparse.Namespace) -> int:
     """Judge; 0 where no rule was broken."""
     site = site_of(args)
     contracts = codecs_for(site)
-    fleet = _read_codec(args.dbc) if args.dbc is not None else contracts.fleet
-    checks = Checks(site, disturbed=args.faults, fleet=fleet, device=contracts.device)
+    if args.dbc is not None:
+        _check_contract(args.dbc)
+    checks = Checks(site, disturbed=args.faults, fleet=contracts.fleet, device=contracts.device)
     verdict = _check(args, checks)
     if args.json is not None:
         write_text(args.json, json.dumps(verdict.to_json(), indent=2) + "\n")
@@ -81,11 +83,23 @@ def _check(args: argparse.Namespace, checks: Checks) -> Verdict:
     return verdict
 
 
-def _read_codec(path: Path) -> Codec:
+def _check_contract(path: Path) -> None:
+    """Refuse a DBC that is not the contract that this program speaks: it could not judge by it. ``TraceError``."""
     try:
-        return Codec(read_layouts(path.read_text(encoding="utf-8-sig")))
+        said = {layout.name: layout for layout in read_layouts(path.read_text(encoding="utf-8-sig"))}
     except OSError as error:
         raise TraceError(f"{path}: cannot be read ({error.strerror}); name an existing DBC") from error
     except Exception as error:  # the DBC reader has a dozen errors of its own for a bad text
         why = " ".join(str(error).split())[:200]
         raise TraceError(f"{path}: not a DBC of this contract ({why}); a site's DBC is for other tools") from error
+    for ours in fleet_layouts():
+        theirs = said.get(ours.name)
+        if theirs is None or (theirs.frame_id, theirs.length, theirs.signals) != (
+            ours.frame_id,
+            ours.length,
+            ours.signals,
+        ):
+            what = "is missing" if theirs is None else "is another"
+            raise TraceError(
+                f"{path}: {ours.name} {what} than in the contract that this program speaks; leave out --dbc"
+            )

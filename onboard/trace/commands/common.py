@@ -50,7 +50,9 @@ def add_log(parser: argparse.ArgumentParser) -> None:
 
 def add_site(parser: argparse.ArgumentParser, *, required: bool = False) -> None:
     """The site whose words are used."""
-    parser.add_argument("--site", type=Path, metavar="SITE", required=required, help="site file")
+    parser.add_argument(
+        "--site", type=Path, metavar="SITE", required=required, help="site file, or shipped site's name"
+    )
 
 
 def site_of(args: argparse.Namespace) -> Site | None:

@@ -3,7 +3,6 @@
 import argparse
 import sys
 
-from onboard.systems.car_park.site import CarPark
 from onboard.systems.contract import codecs_for
 from onboard.trace.commands.common import (
     Commands,
@@ -45,8 +44,7 @@ def run(args: argparse.Namespace) -> int:
         raise TraceError(f"--bitrate {bit_rate}: give bit/s above 0, such as 500000")
     with open_log(args) as log:
         found = loads(log, codecs_for(site), bit_rate)
-    # What machines of other systems may put on the bus is not written down as traffic yet.
-    bounds = bounds_of(site) if isinstance(site, CarPark) else {}
+    bounds = bounds_of(site) if site is not None else {}
     start_us = min((load.first_us for load in found.values() if load.first_us is not None), default=0)
     print("\n".join(told(found.values(), bounds, start_us)))
     sys.stdout.flush()

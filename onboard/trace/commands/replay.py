@@ -34,7 +34,7 @@ def register(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(commands, "replay", "run one controller against a log: the first different frame", HELP, run)
     add_log(parser)
-    parser.add_argument("--site", type=Path, metavar="SITE", required=True, help="site file")
+    parser.add_argument("--site", type=Path, metavar="SITE", required=True, help="site file, or a shipped site's name")
     parser.add_argument("--machine", metavar="NAME", required=True, help="whose controller")
     parser.add_argument("--bus", default="fleet", metavar="NAME", help="the fleet bus in the log (default: fleet)")
     parser.add_argument(

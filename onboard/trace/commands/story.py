@@ -61,11 +61,13 @@ def run_calls(args: argparse.Namespace) -> int:
     site = site_of(args)
     task = task_of(args.task, site)
     listener, calls, words = Listener(codecs_for(site)), Calls(), Words(site)
+    _refuse_without_calls("calls", site, words)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):
             start_us = said.time_us if start_us is None else start_us
             if said.is_fleet:
+                words.hear(said.message)
                 calls.feed(said.message, said.time_us)
     shown = [call for call in calls.calls if task is None or call.terms.task == task]
     for call in shown:
@@ -81,7 +83,9 @@ def run_why(args: argparse.Namespace) -> int:
     site = site_of(args)
     assert site is not None, "argparse asks for it"
     task = task_of(args.task, site)
-    listener, why, words = Listener(codecs_for(site)), Why(site), Words(site)
+    words = Words(site)
+    _refuse_without_calls("why", site, words)
+    listener, why = Listener(codecs_for(site)), Why(site, words)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):
@@ -102,10 +106,17 @@ def run_why(args: argparse.Namespace) -> int:
     return 0
 
 
+def _refuse_without_calls(command: str, site: Site | None, words: Words) -> None:
+    """What follows calls has nothing to tell of a system that makes none. Raises ``TraceError``."""
+    if site is not None and words.system.no_calls:
+        raise TraceError(f"{command}: {site.name} is a {site.system}: {words.system.no_calls}")
+
+
 def _line(story: TaskStory, words: Words) -> str:
     worst = max(story.parts, key=lambda part: part.length_us, default=None)
     most = "" if worst is None else f"; longest part {worst.length_us / 1e6:.1f} s: {worst.cause.what}"
-    return f"{words.reference(story.task):>10} {story.operation.name.lower():>9} {story.waited_us / 1e6:8.1f} s{most}"
+    what = words.system.operation(story.operation)
+    return f"{words.reference(story.task):>10} {what:>9} {story.waited_us / 1e6:8.1f} s{most}"
 
 
 def task_of(text: str | None, site: Site | None) -> Reference | None:

@@ -37,6 +37,12 @@ class LogFaults:
             for fault, count in sorted(self.counts.items())
         ]
 
+    @property
+    def is_no_log(self) -> bool:
+        """Whether nothing was of the format: no frame, and no line that was meant for one."""
+        meant = self.counts[LogFault.IDENTIFIER] + self.counts[LogFault.DATA]
+        return not self.frames and not meant and self.counts.total() > 0
+
     def watch(self, frames: Iterable[tuple[int, RawFrame]]) -> Iterator[RawFrame]:
         """Passes frames on and counts times that go back on their own channel; ``frames`` come with their place.
 

@@ -13,6 +13,7 @@ from onboard.trace.raw import RawFrame
 from onboard.trace.readers.asc import read_asc
 from onboard.trace.readers.candump import read_candump
 from onboard.trace.readers.faults import LogFaults
+from onboard.trace.readers.guess import guess
 from onboard.trace.readers.pcapng import MAGIC, read_pcapng
 
 _ASC = re.compile(rb"\s*(date\s|base\s+(hex|dec)|//\s*version|begin\s+trigger)", re.IGNORECASE)
@@ -27,7 +28,10 @@ class LogOpenError(ValueError):
 
 
 class Log:
-    """Frames of a log, one after the other. A context manager; ``faults`` tells afterwards what was wrong with it."""
+    """Frames of a log, one after the other. A context manager; ``faults`` tells afterwards what was wrong with it.
+
+    Reading raises ``LogOpenError`` at the end of a file that holds nothing of any format that we read.
+    """
 
     def __init__(self, name: str, *, bar: TextIO | None = None) -> None:
         """``name`` is a path, or - for standard input. ``bar``: where to draw progress, if it is a terminal.
@@ -55,13 +59,21 @@ class Log:
         watched = _Watched(self._file, self._bar)
         head = watched.head()
         if head[: len(MAGIC)] == MAGIC:
-            found = read_pcapng(watched.read, self.faults)
+            yield from self.faults.watch(read_pcapng(watched.read, self.faults))
         elif _ASC.match(head):
-            found = read_asc(watched, self.faults)
+            yield from self.faults.watch(read_asc(watched, self.faults))
         else:
-            found = read_candump(watched, self.faults)
-        yield from self.faults.watch(found)
+            yield from self.faults.watch(read_candump(watched, self.faults))
+            self._check(head)
         watched.finish()
+
+    def _check(self, head: bytes) -> None:
+        """What says of itself no other format must have had a frame of candump's."""
+        if not head:
+            raise LogOpenError(f"{self.name}: is empty; name a log that something was written to")
+        if self.faults.is_no_log:
+            known = "candump -L, Vector ASC, pcapng"
+            raise LogOpenError(f"{self.name}: no frame of a log that we read ({known}); {guess(head)}")
 
 
 class _Watched:

@@ -9,7 +9,7 @@ import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from onboard.core.messages import BusTime, Message, Reference
+from onboard.core.messages import BusTime, Message
 from onboard.core.serial import from_bus_ms
 
 #: A value for JSON.
@@ -38,10 +38,7 @@ class BusClock:
 
 
 class Scene(Protocol):
-    """One system's part of the picture. ``thing`` and ``place`` give calls and tasks their words."""
-
-    #: What a machine carries or works on.
-    noun: str
+    """One system's part of the picture; its words are ``onboard.systems.words``'s."""
 
     def layout(self) -> Json:
         """What never changes; a key ``plan`` holds its ``width``, ``height`` and ``shapes``."""
@@ -57,15 +54,6 @@ class Scene(Protocol):
 
     def marks(self, now_us: int) -> Json:
         """What changes beside the machines: on a plan ``marks`` by shape and ``things``, each at a spot."""
-
-    def thing(self, reference: Reference) -> str:
-        """What is carried or ordered, as people name it."""
-
-    def place(self, number: int) -> str:
-        """A station's number in words."""
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """What became of a task that is done."""
 
 
 def shape(number: str, kind: str, name: str, points: Iterable[Spot], **more: object) -> Json:

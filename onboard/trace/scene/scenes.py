@@ -1,6 +1,6 @@
 """The scene that a site's system draws. A system without its own has its machines' table only."""
 
-from onboard.core.messages import Message, Reference
+from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.systems.registry import part
 from onboard.trace.scene.scene import Json, Scene
@@ -9,8 +9,6 @@ from onboard.trace.view import SiteView
 
 class PlainScene:
     """A system that nobody has drawn: its calls, bids and events are told all the same."""
-
-    noun = "task"
 
     def layout(self) -> Json:
         """An empty plan."""
@@ -29,18 +27,6 @@ class PlainScene:
     def marks(self, now_us: int) -> Json:
         """As in the port."""
         return {"marks": {}, "things": []}
-
-    def thing(self, reference: Reference) -> str:
-        """As in the port."""
-        return f"task {reference.number}"
-
-    def place(self, number: int) -> str:
-        """As in the port."""
-        return f"place {number}"
-
-    def task_end(self, reference: Reference, station: int) -> str:
-        """As in the port."""
-        return f"has done task {reference.number}"
 
 
 def scene_of(site: Site, view: SiteView) -> Scene:

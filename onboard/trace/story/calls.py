@@ -179,13 +179,14 @@ def _is_stamped(call: Call, itinerary: Itinerary) -> bool:
 def told(call: Call, words: Words, start_us: int) -> list[str]:
     """The lines of one call; times since the log's start, promises beside what came true."""
     terms = call.terms
-    what = terms.operation.name.lower().replace("_", " ")
+    names = words.system
+    way = names.way(terms)
     parent = "" if not terms.depth else f", part {terms.part} of call {words.reference(Reference(*terms.parent))}"
     again = f", attempt {terms.attempt}" if terms.attempt > 1 else ""
     lines = [
-        f"{_at(call.opened_us, start_us)} {words.machine(terms.sender)} call {terms.call}: {what} "
-        f"car {words.reference(terms.car)}, task {words.reference(terms.task)}, {words.station(terms.from_station)} to "
-        f"{words.station(terms.to_station)}{parent}{again}; {call.messages} messages"
+        f"{_at(call.opened_us, start_us)} {words.machine(terms.sender)} call {terms.call}: "
+        f"{names.operation(terms.operation)} {names.thing(terms.car)}, task {words.reference(terms.task)}"
+        f"{way and f', {way}'}{parent}{again}; {call.messages} messages"
     ]
     for time_us, node, cost in call.bids:
         lines.append(
@@ -200,7 +201,7 @@ def told(call: Call, words: Words, start_us: int) -> list[str]:
 def _ending(call: Call, words: Words, start_us: int) -> str:
     if call.result is None or call.closed_us is None:
         return "still open at the end of the log"
-    reason = f": {call.reason.name.lower().replace('_', ' ')}" if call.reason is not Reason.NONE else ""
+    reason = f": {words.system.reason(call.reason)}" if call.reason is not Reason.NONE else ""
     text = f"{_at(call.closed_us, start_us)} {call.result.name.lower()}{reason}"
     if not call.winner:
         return text

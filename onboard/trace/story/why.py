@@ -24,6 +24,7 @@ from onboard.core.messages import (
 )
 from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site, Station
+from onboard.systems.words import plain
 from onboard.trace.story.calls import is_task
 from onboard.trace.words import Words
 from onboard.ways.site import way_site
@@ -93,15 +94,17 @@ class _Body:
     is_fresh: bool = False
     #: A person holds it, and it has come to rest.
     is_held: bool = False
+    #: What it does by its own last word, in a system whose machines tell that.
+    deed: str = ""
 
 
 class Why:
     """A fold over the fleet bus: feed every message in the order of the log, then ``finish``."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: Site, words: Words | None = None) -> None:
         self.tasks: dict[Reference, TaskStory] = {}
         self._site = site
-        self._words = Words(site)
+        self._words = words or Words(site)
         self._bodies: dict[int, _Body] = {}
         self._open: list[TaskStory] = []
         self._silence_us = MISSED_BEATS * site.timing.heartbeat_us
@@ -116,6 +119,8 @@ class Why:
         if isinstance(message, Heartbeat):
             self._on_heartbeat(body, message, time_us)
         body.heard_us = time_us
+        self._words.hear(message)
+        body.deed = self._words.system.deed(message) or body.deed
         match message:
             case CallForProposals() if is_task(message):
                 self._on_call(message, time_us)
@@ -213,9 +218,9 @@ class Why:
             return Cause(f"still busy with task {self._words.reference(before.task)}", story.owner)
         body = self._body(story.owner)
         if not way_site(self._site).tracks:
-            # Machines of other systems tell no place that this fold knows; the task's phase is what there is.
+            # Machines of other systems tell no place that this fold knows; what they do is in their system's words.
             phase = max(story.phases, default=TaskPhase.AWARDED)
-            return Cause(f"has the task, {phase.name.lower()}", story.owner)
+            return Cause(body.deed or f"has the task, {plain(phase.name)}", story.owner)
         lift = self._lift_under(body)
         if lift is not None:
             return self._ride(story, body, lift, now_us)
@@ -225,7 +230,7 @@ class Why:
 
     def _negotiation(self, story: TaskStory) -> Cause:
         if story.result is not None:
-            why = story.reason.name.lower().replace("_", " ")
+            why = self._words.system.reason(story.reason)
             return Cause(f"call {story.result.name.lower()}: {why}", story.caller)
         again = f", attempt {story.calls}" if story.calls > 1 else ""
         return Cause(f"call open: bids until its deadline{again}", story.caller)
@@ -257,18 +262,17 @@ class Why:
 
     def _standing(self, story: TaskStory, body: _Body, now_us: int) -> Cause:
         if body.wait is not None:
-            at = Segment(body.wait.track, body.wait.index)
-            if at.track in way_site(self._site).lifts:
-                return self._lift_awaited(self._site.stewards[at.track], now_us)
-            why = body.wait.reason.name.lower().replace("_", " ")
+            if body.wait.track in way_site(self._site).lifts:
+                return self._lift_awaited(self._site.stewards[body.wait.track], now_us)
+            at, why = self._words.system.slot(body.wait.track, body.wait.index), plain(body.wait.reason.name)
             return Cause(f"in the way at {at}: {why}", body.wait.blocker or story.owner)
         leg = body.legs[body.leg] if body.leg < len(body.legs) else None
         following = body.legs[body.leg + 1] if body.leg + 1 < len(body.legs) else None
         work = self._work(body)
         if work is not None:
-            place = self._words.station(Station(work.track, work.from_index, work.side).number)
-            done = TaskPhase.LOADED in story.phases
-            return Cause(f"{'leaves' if done else 'takes'} the car at {place}", story.owner)
+            place = self._words.system.place(Station(work.track, work.from_index, work.side).number)
+            done, noun = TaskPhase.LOADED in story.phases, self._words.system.noun
+            return Cause(f"{'leaves' if done else 'takes'} the {noun} at {place}", story.owner)
         if body.is_fresh:
             return Cause("started anew: finds its place and the others' plans first", story.owner)
         refused = self._refused(body, now_us)
@@ -300,8 +304,8 @@ class Why:
         if refusal.token_kind is TokenKind.SEGMENT and refusal.token >> 8 in way_site(self._site).lifts:
             # Platform and gate are asked for in turn: to the customer it is one wait.
             return self._lift_awaited(refusal.sender, now_us)
-        why = refusal.reason.name.lower().replace("_", " ")
-        token = self._words.token(refusal.token_kind, refusal.token)
+        why = self._words.system.reason(refusal.reason)
+        token = self._words.system.resource(refusal.token_kind, refusal.token)
         return Cause(f"refuses {token}: {why}", refusal.sender)
 
     def _planned_wait(self, story: TaskStory, following: Leg | None) -> Cause:
@@ -334,7 +338,7 @@ def _put_down(story: TaskStory, begin_us: int, end_us: int, cause: Cause) -> Non
 
 def told(story: TaskStory, words: Words, start_us: int) -> list[str]:
     """The story of one task: its parts in order, then how much each machine and cause took."""
-    what = story.operation.name.lower()
+    what = words.system.operation(story.operation)
     state = (
         "served" if TaskPhase.DONE in story.phases else "not served in this log" if story.end_us is None else "refused"
     )

@@ -297,7 +297,7 @@ export class Stage {
 
   // Who named a car, and its number there, where there is room for both.
   carName(car) {
-    return this.cell > 38 && this.bays.size > 1 ? car : car.split(".")[1];
+    return this.cell > 38 && this.bays.size > 1 ? car : car.split("/").at(-1);
   }
 
   text(pen, words, box, colour) {

@@ -6,6 +6,7 @@ from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Bid, LeftOut, Message, Reference
 from onboard.core.mirror import Obstacle
 from onboard.core.negotiation import CallTerms, Negotiation
+from onboard.core.negotiation.initiator import ACCEPT_WITHIN_US
 from onboard.core.negotiation.winners import LOST_AFTER_US, STANDS_AFTER_US, Winners
 from tests.sites import one_floor
 
@@ -110,3 +111,12 @@ def test_who_has_a_task_that_nobody_needs_any_more_hears_so_and_is_not_left_out(
     assert isinstance(word, Award)
     assert (word.task, word.call, word.winner, word.result) == (TASK, call, NOBODY, CallResult.REJECTED)
     assert not desk.negotiation.trust.left_out(TASK, SECOND, last_attempt=False)
+
+
+def test_an_award_that_was_not_heard_while_its_initiator_was_held_is_no_loss() -> None:
+    desk = Desk()
+    desk.award(ALICE)
+    assert desk.winners.lost(TASK, 40 * SECOND) is Reason.NODE_SILENT
+    desk.winners.begin_anew(40 * SECOND)
+    assert desk.winners.lost(TASK, 40 * SECOND + ACCEPT_WITHIN_US - 1) is Reason.NONE
+    assert desk.winners.lost(TASK, 40 * SECOND + ACCEPT_WITHIN_US) is Reason.NODE_SILENT

@@ -4,11 +4,11 @@ from onboard.systems.car_park.checks.cars import CarsConserved, OneCustodian
 from onboard.systems.car_park.checks.customers import CustomersServed, FullMeansFull, TasksServed
 from onboard.systems.car_park.checks.doors import Doors
 from onboard.systems.car_park.checks.lifts import LiftByGate, LiftCrush, PlatformThere
+from onboard.systems.car_park.checks.liveness import NobodyStarves, NoRounds, SomethingHappens
 from onboard.systems.car_park.checks.motion import InsideAuthority, OneBody
 from onboard.systems.car_park.checks.shuttles import TornCar
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.holds import LetGoAgain
-from onboard.trace.check.liveness import NobodyStarves, NoRounds, SomethingHappens
 from onboard.trace.check.owners import OneOwner
 from onboard.trace.check.rights import OneHolder
 from onboard.trace.check.rule import Rule

@@ -203,7 +203,6 @@ class NobodyStarves(Rule):
 
     def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self.longest_us: dict[int, int] = {}
         self.limit_us = patience_us(picture.site)
         self._waiting: dict[int, Event[Waiting]] = {}
         self._told: set[int] = set()

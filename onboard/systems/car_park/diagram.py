@@ -13,15 +13,13 @@ from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, TokenKind
 from onboard.core.messages import BusTime, Itinerary, Leg, Progress, TokenGrant, TokenHeld
 from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site
+from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
 from onboard.trace.chart.svg import Drawing, colour, dashes
 from onboard.trace.listener import Said
 from onboard.ways.site import way_site
 
-_WIDTH, _LEFT, _RIGHT, _TOP, _BOTTOM, _GAP = 1200, 90, 20, 46, 30, 14
 #: Height of a segment's row, and of a lift's floor, pixels.
 _ROW, _MOST_HEIGHT = 14.0, 260.0
-_STEPS_S = (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1_200, 1_800, 3_600, 7_200, 14_400)
-_MOST_TICKS = 14
 
 
 class Point(NamedTuple):
@@ -189,23 +187,18 @@ def draw(site: Site, picture: Picture, start_us: int) -> Drawing:
     ways = way_site(site)
     tracks = list(ways.tracks.values())
     heights = [min(_MOST_HEIGHT, _ROW * max(3, track.length + 2)) for track in tracks]
-    drawing = Drawing(_WIDTH, _TOP + sum(heights) + _GAP * len(tracks) + _BOTTOM, f"{site.name}: time and space")
+    drawing = Drawing(WIDTH, TOP + sum(heights) + GAP * len(tracks) + BOTTOM, f"{site.name}: time and space")
     numbers = {node: number for number, node in enumerate(sorted(site.machines))}
     moving = [site.machines[node] for node in sorted({node for node, _, _ in picture.runs} & set(site.machines))]
-    x = float(_LEFT)
-    for machine in moving:
-        number = numbers[machine.node_id]
-        drawing.line([(x, 14), (x + 24, 14)], colour(number), width=2.5, dash=dashes(number))
-        drawing.text(x + 28, 18, machine.name)
-        x += 44 + 8 * len(machine.name)
-    drawing.text(x + 10, 18, "light band: reserved; dark band: authority held")
+    names = [(machine.name, numbers[machine.node_id]) for machine in moving]
+    name_machines(drawing, names, "light band: reserved; dark band: authority held")
     span_us = max(1, picture.last_us - picture.first_us)
-    scale = (_WIDTH - _LEFT - _RIGHT) / span_us
-    top = float(_TOP)
+    scale = (WIDTH - LEFT - RIGHT) / span_us
+    top = float(TOP)
     for track, height in zip(tracks, heights, strict=True):
         is_lift = track.number in ways.lifts
         name = f"lift {site.machines[site.stewards[track.number]].name}" if is_lift else f"track {track.number}"
-        drawing.area([(_LEFT, top), (_WIDTH - _RIGHT, top), (_WIDTH - _RIGHT, top + height), (_LEFT, top + height)],
+        drawing.area([(LEFT, top), (WIDTH - RIGHT, top), (WIDTH - RIGHT, top + height), (LEFT, top + height)],
                      "#f3f3f3", opacity=1)  # fmt: skip
         drawing.text(8, top + 12, name)
         speed_mm_s = (ways.lift if is_lift else ways.carrier).speed_mm_s
@@ -216,8 +209,8 @@ def draw(site: Site, picture: Picture, start_us: int) -> Drawing:
         panel.bands(picture.reservations, numbers, 0.22, "reserved", site)
         panel.bands(picture.authority, numbers, 0.38, "authority", site)
         panel.runs(numbers)
-        top += height + _GAP
-    _time_axis(drawing, picture, start_us, scale, top)
+        top += height + GAP
+    time_axis(drawing, picture.first_us, picture.last_us, start_us, top)
     return drawing
 
 
@@ -234,7 +227,7 @@ class _Panel:
     speed_mm_s: int
 
     def x(self, time_us: float) -> float:
-        return min(_WIDTH - _RIGHT, max(_LEFT, _LEFT + (time_us - self.picture.first_us) * self.scale))
+        return min(WIDTH - RIGHT, max(LEFT, LEFT + (time_us - self.picture.first_us) * self.scale))
 
     def y(self, place: float) -> float:
         """Platforms lie beside an alley, at both ends: places -1 and the length."""
@@ -245,7 +238,7 @@ class _Panel:
         every = max(1, round(12 / (self.height / (self.length + 2))))
         for index in range(1, self.length + 1, every):
             label = f"floor {index}" if is_lift else f"p({self.track},{index})"
-            self.drawing.text(_LEFT - 4, self.y(index - 1) + 4, label, anchor="end", fill="#666666")
+            self.drawing.text(LEFT - 4, self.y(index - 1) + 4, label, anchor="end", fill="#666666")
 
     def bands(self, bands: list[Band], numbers: dict[int, int], opacity: float, what: str, site: Site) -> None:
         for band in bands:
@@ -279,12 +272,30 @@ def _line(points: list[Point], pitch_mm: int, speed_mm_s: int) -> list[tuple[flo
     return [*found, (last.time_us, last.place)]
 
 
-def _time_axis(drawing: Drawing, picture: Picture, start_us: int, scale: float, bottom: float) -> None:
-    span_s = (picture.last_us - picture.first_us) / 1e6
-    step_s = next((step for step in _STEPS_S if span_s / step <= _MOST_TICKS), _STEPS_S[-1])
-    second = -(-(picture.first_us - start_us) // (step_s * 1_000_000)) * step_s
-    while start_us + second * 1_000_000 <= picture.last_us:
-        x = _LEFT + (start_us + second * 1_000_000 - picture.first_us) * scale
-        drawing.line([(x, _TOP - 4), (x, bottom - _GAP)], "#cccccc", width=0.6)
-        drawing.text(x, _TOP - 8, f"{second} s", anchor="middle", fill="#666666")
-        second += step_s
+class TimeSpace:
+    """The diagram of a log: fed with the fleet bus, within a time of it."""
+
+    def __init__(self, site: Site, from_us: int | None, until_us: int | None) -> None:
+        self._site = site
+        self._watcher = Watcher(site, from_us, until_us)
+
+    @property
+    def first_us(self) -> int:
+        """The first time that is shown, us of the log."""
+        return self._watcher.picture.first_us
+
+    @property
+    def last_us(self) -> int:
+        """The last one."""
+        return self._watcher.picture.last_us
+
+    def feed(self, said: Said) -> None:
+        """Take up one message of the fleet bus."""
+        self._watcher.feed(said)
+
+    def draw(self, start_us: int) -> Drawing:
+        """The log is over."""
+        return draw(self._site, self._watcher.finish(), start_us)
+
+
+DIAGRAM = TimeSpace

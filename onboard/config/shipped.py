@@ -1,0 +1,43 @@
+"""Sites that ship with a package, by name: wherever a site file is named, such a name will do.
+
+A package offers its folder of site files under the entry point ``onboard.sites``; what boards carry offers none.
+"""
+
+from importlib.metadata import entry_points
+from importlib.resources import files
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+from onboard.config.files import read_text
+from onboard.config.problems import ConfigError, Problem, nearest
+
+#: Under this name packages say which of their folders holds site files.
+GROUP = "onboard.sites"
+_SUFFIX = ".toml"
+
+
+def shipped_sites() -> dict[str, Traversable]:
+    """Site files of all installed packages by their names, in the order of these."""
+    folders = [files(entry.load()) for entry in entry_points(group=GROUP)]
+    found = {file.name.removesuffix(_SUFFIX): file for folder in folders for file in folder.iterdir() if _is_site(file)}
+    return dict(sorted(found.items()))
+
+
+def site_source(path: Path) -> tuple[str, str]:
+    """The text of a site file, or of a shipped site by its bare name, and what messages call it.
+
+    Raises ``ConfigError`` with one problem where there is neither.
+    """
+    if path.suffix or path.name != str(path) or path.is_file():
+        return read_text(path, "site"), str(path)
+    shipped = shipped_sites()
+    if path.name in shipped:
+        return shipped[path.name].read_text(encoding="utf-8"), f"{path.name}{_SUFFIX}"
+    if path.exists() or not shipped:
+        return read_text(path, "site"), str(path)
+    remedy = f"name a site file, or a shipped site; {nearest(path.name, list(shipped))}"
+    raise ConfigError([Problem(str(path), 0, "", None, "no such file, and no such shipped site", remedy)])
+
+
+def _is_site(file: Traversable) -> bool:
+    return file.name.endswith(_SUFFIX)

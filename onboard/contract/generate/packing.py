@@ -1,0 +1,249 @@
+"""Straight-line functions between message objects and bytes as Python text.
+
+A frame is cut into words of 1, 2, 4 or 8 bytes such that no signal crosses a cut, and ``struct`` does the rest. Where
+several signals share a word they are put together with sums of products: on CPython 3.11 both have a fast way of their
+own for whole numbers, shifts and ``|`` have none (bench/codec.py).
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from onboard.contract.generate.model import TUPLES, Field, Frame
+from onboard.wire.dbc_file import SignalLayout
+
+#: Letters of ``struct`` by length in bytes.
+_LETTERS = {1: "B", 2: "H", 4: "I", 8: "Q"}
+#: Bits of one digit of CPython's whole numbers: sums that stay below are several times as fast.
+_DIGIT_BITS = 30
+#: Cost of one more word and of one more signal in a word, in ns on the machine of docs/figures.md, and of each signal
+#: behind the first in a word that is longer than a digit.
+_WORD_NS, _SIGNAL_NS, _LONG_NS = 12, 30, 20
+
+
+class Word(NamedTuple):
+    """Bytes ``start`` to ``start + length`` of a frame with the signals in them; without signals they are 0."""
+
+    start: int
+    length: int
+    signals: tuple[SignalLayout, ...]
+
+    @property
+    def letter(self) -> str:
+        """The word in a format of ``struct``."""
+        if not self.signals:
+            return "x" * self.length
+        letter = _LETTERS[self.length]
+        return letter.lower() if self.is_plain and self.signals[0].signed else letter
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether one signal fills the word."""
+        return len(self.signals) == 1 and self.signals[0].bits == self.length * 8
+
+
+def words(frame: Frame) -> tuple[Word, ...]:
+    """The cheapest cut of a frame into words."""
+    length = frame.layout.length
+    best: dict[int, tuple[int, tuple[Word, ...]]] = {0: (0, ())}
+    for end in range(1, length + 1):
+        found = []
+        for size in (1, 2, 4, 8):
+            if end - size not in best:
+                continue
+            cost, before = best[end - size]
+            word = _word(frame, end - size, size)
+            if word is not None:
+                found.append((cost + _cost(word), (*before, word)))
+        if found:
+            best[end] = min(found, key=lambda one: one[0])
+    return best[length][1]
+
+
+def _word(frame: Frame, start: int, size: int) -> Word | None:
+    """The word there, None where a signal crosses one of its ends."""
+    low, high = start * 8, (start + size) * 8
+    inside = []
+    for signal in frame.layout.signals:
+        first, end = signal.shift, signal.shift + signal.bits
+        if end <= low or first >= high:
+            continue
+        if first < low or end > high:
+            return None
+        inside.append(signal)
+    return Word(start, size, tuple(inside))
+
+
+def _cost(word: Word) -> int:
+    if not word.signals:
+        return 0
+    more = _SIGNAL_NS + (_LONG_NS if word.length > 4 else 0)
+    return _WORD_NS + (len(word.signals) - 1) * more
+
+
+def struct_format(frame: Frame) -> str:
+    """The format of a frame, little-endian."""
+    return "<" + "".join(word.letter for word in words(frame))
+
+
+def function_name(frame: Frame) -> str:
+    """``car_at`` of ``CarAt``."""
+    return "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in frame.layout.name).lstrip("_")
+
+
+def pack_function(frame: Frame) -> str:
+    """The function from a message to its bytes."""
+    name = function_name(frame)
+    lines = [f"def pack_{name}(message: {frame.layout.name}) -> bytes:"]
+    for field in frame.fields:
+        for signal, path in _paths(field):
+            if field.kind in ("int", *TUPLES):
+                lines.append(f"    {signal.name} = message.{path}")
+                lines += _refusal(frame, signal)
+    enums = {signal.name: f"message.{path}" for field in frame.fields for signal, path in _paths(field)}
+    ints = {signal.name for field in frame.fields if field.kind in ("int", *TUPLES) for signal in field.signals}
+    values = [
+        _written(word, {name: name if name in ints else path for name, path in enums.items()})
+        for word in words(frame)
+        if word.signals
+    ]
+    lines.append(f"    return _{_shape(frame)}.pack({', '.join(values)})")
+    return "\n".join(lines) + "\n"
+
+
+def _paths(field: Field) -> Iterator[tuple[SignalLayout, str]]:
+    for number, signal in enumerate(field.signals):
+        yield signal, f"{field.name}.{TUPLES[field.kind][number]}" if field.kind in TUPLES else field.name
+
+
+def _refusal(frame: Frame, signal: SignalLayout) -> list[str]:
+    where = f'"{frame.layout.name}.{signal.name}"'
+    return [
+        f"    if not {signal.minimum} <= {signal.name} <= {signal.maximum}:",
+        f"        raise OutOfRangeError({where}, {signal.name}, {signal.minimum}, {signal.maximum})",
+    ]
+
+
+def _written(word: Word, names: dict[str, str]) -> str:
+    """The expression that makes a word of its signals, those of one digit of a whole number together."""
+    digits: list[list[SignalLayout]] = []
+    for signal in word.signals:
+        end = signal.shift + signal.bits
+        if digits and end - digits[-1][0].shift <= _DIGIT_BITS:
+            digits[-1].append(signal)
+        else:
+            digits.append([signal])
+    sums = []
+    for digit in digits:
+        terms = [_times(_raw(word, signal, names[signal.name]), signal.shift - digit[0].shift) for signal in digit]
+        shift = digit[0].shift - word.start * 8
+        total = " + ".join(terms)
+        sums.append(_times(f"({total})" if shift and len(terms) > 1 else total, shift))
+    return " + ".join(sums)
+
+
+def _raw(word: Word, signal: SignalLayout, name: str) -> str:
+    """What a signal holds of a value."""
+    term = name
+    if signal.scale != 1:
+        term = f"({term} - {signal.offset}) // {signal.scale}" if signal.offset else f"{term} // {signal.scale}"
+        term = term if len(word.signals) == 1 else f"({term})"
+    return f"({term} & {_mask(signal)})" if signal.signed and not word.is_plain else term
+
+
+def _times(term: str, shift: int) -> str:
+    return f"{term} * 0x{1 << shift:X}" if shift else term
+
+
+def _mask(signal: SignalLayout) -> str:
+    return f"0x{(1 << signal.bits) - 1:X}"
+
+
+def _shape(frame: Frame) -> str:
+    """The name of the frame's ``Struct``."""
+    return (
+        struct_format(frame)
+        .lstrip("<")
+        .replace("b", "sb")
+        .replace("h", "sh")
+        .replace("i", "si")
+        .replace("q", "sq")
+        .upper()
+    )
+
+
+def shapes(frames: tuple[Frame, ...]) -> str:
+    """A ``Struct`` for each format in use."""
+    found = {_shape(frame): struct_format(frame) for frame in frames}
+    return "".join(f'_{shape} = Struct("{found[shape]}")\n' for shape in sorted(found))
+
+
+def unpack_function(frame: Frame) -> str:
+    """The function from a sender and bytes to a message, or None."""
+    name, parts = function_name(frame), [word for word in words(frame) if word.signals]
+    lines = [f"def unpack_{name}(sender: int, data: bytes) -> {frame.layout.name} | None:"]
+    if parts:
+        names = [word.signals[0].name if len(word.signals) == 1 else f"word_{word.start}" for word in parts]
+        lines.append(f"    {', '.join(names)}{',' if len(names) == 1 else ''} = _{_shape(frame)}.unpack_from(data)")
+    tables = {field.signals[0].name: field.kind for field in frame.fields if field.kind not in ("int", "bool", *TUPLES)}
+    booleans = {field.signals[0].name for field in frame.fields if field.kind == "bool"}
+    for word in parts:
+        for signal in word.signals:
+            lines += _read(word, signal, is_bool=signal.name in booleans)
+    arguments = ["sender"]
+    for field in sorted(frame.fields, key=lambda field: bool(field.default)):
+        if field.kind in TUPLES:
+            arguments.append(f"_new({field.kind}, ({', '.join(signal.name for signal in field.signals)}))")
+        elif field.kind == "bool":
+            arguments.append(_bool(parts, field.signals[0]))
+        elif field.name in tables:
+            arguments.append(f"{table_name(field.kind)}[{field.name}]")
+        else:
+            arguments.append(field.name)
+    lines.append(f"    return {frame.layout.name}({', '.join(arguments)})")
+    return "\n".join(lines) + "\n"
+
+
+def table_name(kind: str) -> str:
+    """The tuple of an enumeration's members, by value."""
+    return "_" + "".join(f"_{letter}" if letter.isupper() else letter.upper() for letter in kind).lstrip("_")
+
+
+def _word_of(parts: list[Word], signal: SignalLayout) -> Word:
+    return next(word for word in parts if signal in word.signals)
+
+
+def _bool(parts: list[Word], signal: SignalLayout) -> str:
+    word = _word_of(parts, signal)
+    name = signal.name if len(word.signals) == 1 else f"word_{word.start}"
+    return f"{name} & 0x{1 << signal.shift - word.start * 8:X} != 0"
+
+
+def _read(word: Word, signal: SignalLayout, *, is_bool: bool) -> Iterator[str]:
+    """The lines that take a signal out of its word and refuse what is out of its range."""
+    if is_bool:
+        return
+    name, shift = signal.name, signal.shift - word.start * 8
+    source = name if len(word.signals) == 1 else f"word_{word.start}"
+    value = source
+    if not word.is_plain:
+        is_top = shift + signal.bits == word.length * 8
+        value = f"{source} >> {shift}" if shift else source
+        value = value if is_top and shift else f"{value} & {_mask(signal)}"
+        if signal.signed:
+            half = f"0x{1 << signal.bits - 1:X}"
+            value = f"({value} ^ {half}) - {half}" if " " not in value else f"(({value}) ^ {half}) - {half}"
+    if signal.scale != 1:
+        value = f"({value}) * {signal.scale}" if " " in value else f"{value} * {signal.scale}"
+        value = f"{value} + {signal.offset}" if signal.offset else value
+    if value != name:
+        yield f"    {name} = {value}"
+    low = -(1 << signal.bits - 1) if signal.signed else 0
+    high = low + (1 << signal.bits) - 1
+    refused = []
+    if signal.minimum > low * signal.scale + signal.offset:
+        refused.append(f"{name} < {signal.minimum}")
+    if signal.maximum < high * signal.scale + signal.offset:
+        refused.append(f"{name} > {signal.maximum}")
+    if refused:
+        yield f"    if {' or '.join(refused)}:"
+        yield "        return None"

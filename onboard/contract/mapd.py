@@ -1,0 +1,147 @@
+"""What the machines of the system mapd say beyond the messages of all.
+
+Written by ``make docs`` from ``dbc/mapd.dbc``: change that file, never this one.
+"""
+
+from enum import IntEnum
+
+from onboard.contract.base import Message, message
+
+
+class CartAction(IntEnum):
+    """Orders to a robot's body."""
+
+    MOVE = 0
+    LOAD = 1
+    UNLOAD = 2
+
+
+class TransportResult(IntEnum):
+    """What became of a transport."""
+
+    RECEIVED = 0
+    DONE = 1
+    REFUSED = 2
+
+
+@message(frozen=True, slots=True)
+class TransportCall(Message):
+    """A call for proposals, which stands until a robot tells that it has the task aboard.
+
+    The task is the sender's.
+    """
+
+    #: Serial number of the task at the desk, modulo 65535. 0 to 65534.
+    task: int
+    #: Cell where it is. 0 to 63999.
+    pickup: int
+    #: Cell to which it is to be brought. 0 to 63999.
+    delivery: int
+
+
+@message(frozen=True, slots=True)
+class StepRound(Message):
+    """Step begins: sent when all robots have told that they have come to it.
+
+    Asks for bids for all calls that stand; bids end when the first StepAward of the step is heard.
+    """
+
+    #: The step. 0 to 4194303.
+    step: int
+    #: How many calls stand: who knows of another number asks the desk. 0 to 65535.
+    open_tasks: int
+    #: Differs where the round of a step is opened again. 0 to 255.
+    attempt: int
+    #: Whether bids are asked for; if not, robots go on.
+    bidding: bool
+
+
+@message(frozen=True, slots=True)
+class StepAward(Message):
+    """Closes the round of a step: one for each change, or one with changes 0.
+
+    The robots named plan in this order, each after it has heard the paths of those before.
+    """
+
+    #: The step. 0 to 4194303.
+    step: int
+    #: Number of this change, from 0. 0 to 255.
+    index: int
+    #: How many changes there are. 0 to 255.
+    changes: int
+    #: Node-ID of the robot, 0 where there are no changes. 0 to 250.
+    robot: int
+    #: The task that it has now, 65535 for none. 0 to 65535.
+    task: int
+
+
+@message(frozen=True, slots=True)
+class TransportBid(Message):
+    """A bid, sent only where it is better than every bid for that task heard in the round (lower cost.
+
+    Then lower node-ID); better bids are sent sooner. It takes the sender's former bid of the round back.
+    """
+
+    #: Lowest 16 bits of the step. 0 to 65535.
+    step_low: int
+    #: That of the StepRound. 0 to 255.
+    attempt: int
+    #: The task, 65535 for none: the sender asks for a turn to plan, as others need its place. 0 to 65535.
+    task: int
+    #: Hundredths of a step: until it is free, to the pick-up, and half of those from there to the delivery. 0 to
+    #: 16777215.
+    cost: int
+
+
+@message(frozen=True, slots=True)
+class PathHead(Message):
+    """A path; its moves follow in PathMoves.
+
+    It ends where the robot may stay for ever. An incomplete path is no path.
+    """
+
+    #: Step at which the robot is in cell. 0 to 4194303.
+    step: int
+    #: First cell. 0 to 63999.
+    cell: int
+    #: Number of moves, one a step. 0 to 4095.
+    moves: int
+    #: Grows by one with each path of the sender. 0 to 255.
+    version: int
+    #: Whether the robot found no other path, keeps its former one and has no task.
+    kept: bool
+
+
+@message(frozen=True, slots=True)
+class PathMoves(Message):
+    """Twelve moves of a path, four bits each.
+
+    0 to wait, n for the n-th of the ways that lead from the cell, in the order of the site file's map (up, left,
+    right, down) or lines.
+    """
+
+    #: Version of the path. 0 to 255.
+    version: int
+    #: Number of this frame, from 0. 0 to 255.
+    part: int
+    #: Moves, the first one in the lowest bits; 0 after the last. 0 to 281474976710655.
+    codes: int
+
+
+@message(frozen=True, slots=True)
+class StepState(Message):
+    """A robot has come to a step.
+
+    Said again for whoever asks.
+    """
+
+    #: The step. 0 to 4194303.
+    step: int
+    #: Where it is. 0 to 63999.
+    cell: int
+    #: The task that it has, 65535 for none. 0 to 65535.
+    task: int
+    #: Whether that is aboard.
+    loaded: bool
+    #: Whether it was delivered on the way to this step: then the robot has no task any more.
+    served: bool

@@ -1,0 +1,197 @@
+"""Bytes of the messages in ``onboard.contract.cell_device``, and back.
+
+Written by ``make docs`` from ``dbc/cell.dbc``: change that file, never this one.
+"""
+
+from struct import Struct
+
+from onboard.contract.base import FrameCode, OutOfRangeError, Reference
+from onboard.contract.cell import ArmMode, GripAction, GripMode, OrderResult
+from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
+
+_new = tuple.__new__
+_ARM_MODE = tuple(ArmMode)
+_GRIP_ACTION = tuple(GripAction)
+_GRIP_MODE = tuple(GripMode)
+_ORDER_RESULT = tuple(OrderResult)
+_BIXXX = Struct("<BIxxx")
+_Q = Struct("<Q")
+
+
+def pack_arm_order(message: ArmOrder) -> bytes:
+    sequence = message.sequence
+    if not 0 <= sequence <= 255:
+        raise OutOfRangeError("ArmOrder.sequence", sequence, 0, 255)
+    x_mm = message.x_mm
+    if not -524288 <= x_mm <= 524287:
+        raise OutOfRangeError("ArmOrder.x_mm", x_mm, -524288, 524287)
+    y_mm = message.y_mm
+    if not -524288 <= y_mm <= 524287:
+        raise OutOfRangeError("ArmOrder.y_mm", y_mm, -524288, 524287)
+    return _Q.pack(sequence + (x_mm & 0xFFFFF) * 0x100 + (y_mm & 0xFFFFF) * 0x10000000)
+
+
+def unpack_arm_order(sender: int, data: bytes) -> ArmOrder | None:
+    (word_0,) = _Q.unpack_from(data)
+    sequence = word_0 & 0xFF
+    x_mm = ((word_0 >> 8 & 0xFFFFF) ^ 0x80000) - 0x80000
+    y_mm = ((word_0 >> 28 & 0xFFFFF) ^ 0x80000) - 0x80000
+    return ArmOrder(sender, sequence, x_mm, y_mm)
+
+
+def pack_grip_order(message: GripOrder) -> bytes:
+    sequence = message.sequence
+    if not 0 <= sequence <= 255:
+        raise OutOfRangeError("GripOrder.sequence", sequence, 0, 255)
+    part_origin = message.part.origin
+    if not 0 <= part_origin <= 255:
+        raise OutOfRangeError("GripOrder.part_origin", part_origin, 0, 255)
+    part_number = message.part.number
+    if not 0 <= part_number <= 65535:
+        raise OutOfRangeError("GripOrder.part_number", part_number, 0, 65535)
+    return _BIXXX.pack(sequence, message.grip_action + part_origin * 0x2 + part_number * 0x200)
+
+
+def unpack_grip_order(sender: int, data: bytes) -> GripOrder | None:
+    sequence, word_1 = _BIXXX.unpack_from(data)
+    grip_action = word_1 & 0x1
+    part_origin = word_1 >> 1 & 0xFF
+    part_number = word_1 >> 9 & 0xFFFF
+    return GripOrder(sender, sequence, _GRIP_ACTION[grip_action], _new(Reference, (part_origin, part_number)))
+
+
+def pack_order_answer(message: OrderAnswer) -> bytes:
+    order = message.order
+    if not 0 <= order <= 65535:
+        raise OutOfRangeError("OrderAnswer.order", order, 0, 65535)
+    cost_mm = message.cost_mm
+    if not 0 <= cost_mm <= 4294967295:
+        raise OutOfRangeError("OrderAnswer.cost_mm", cost_mm, 0, 4294967295)
+    return _Q.pack(order + message.order_result * 0x10000 + cost_mm * 0x80000)
+
+
+def unpack_order_answer(sender: int, data: bytes) -> OrderAnswer | None:
+    (word_0,) = _Q.unpack_from(data)
+    order = word_0 & 0xFFFF
+    order_result = word_0 >> 16 & 0x7
+    if order_result > 3:
+        return None
+    cost_mm = word_0 >> 19 & 0xFFFFFFFF
+    return OrderAnswer(sender, order, _ORDER_RESULT[order_result], cost_mm)
+
+
+def pack_arm_state(message: ArmState) -> bytes:
+    sequence = message.sequence
+    if not 0 <= sequence <= 255:
+        raise OutOfRangeError("ArmState.sequence", sequence, 0, 255)
+    x_mm = message.x_mm
+    if not -524288 <= x_mm <= 524287:
+        raise OutOfRangeError("ArmState.x_mm", x_mm, -524288, 524287)
+    y_mm = message.y_mm
+    if not -524288 <= y_mm <= 524287:
+        raise OutOfRangeError("ArmState.y_mm", y_mm, -524288, 524287)
+    return _Q.pack(sequence + (x_mm & 0xFFFFF) * 0x100 + ((y_mm & 0xFFFFF) + message.arm_mode * 0x100000) * 0x10000000)
+
+
+def unpack_arm_state(sender: int, data: bytes) -> ArmState | None:
+    (word_0,) = _Q.unpack_from(data)
+    sequence = word_0 & 0xFF
+    x_mm = ((word_0 >> 8 & 0xFFFFF) ^ 0x80000) - 0x80000
+    y_mm = ((word_0 >> 28 & 0xFFFFF) ^ 0x80000) - 0x80000
+    arm_mode = word_0 >> 48 & 0x3
+    if arm_mode > 1:
+        return None
+    return ArmState(sender, sequence, x_mm, y_mm, _ARM_MODE[arm_mode])
+
+
+def pack_grip_state(message: GripState) -> bytes:
+    sequence = message.sequence
+    if not 0 <= sequence <= 255:
+        raise OutOfRangeError("GripState.sequence", sequence, 0, 255)
+    part_origin = message.part.origin
+    if not 0 <= part_origin <= 255:
+        raise OutOfRangeError("GripState.part_origin", part_origin, 0, 255)
+    part_number = message.part.number
+    if not 0 <= part_number <= 65535:
+        raise OutOfRangeError("GripState.part_number", part_number, 0, 65535)
+    return _BIXXX.pack(sequence, message.grip_mode + part_origin * 0x4 + part_number * 0x400)
+
+
+def unpack_grip_state(sender: int, data: bytes) -> GripState | None:
+    sequence, word_1 = _BIXXX.unpack_from(data)
+    grip_mode = word_1 & 0x3
+    part_origin = word_1 >> 2 & 0xFF
+    part_number = word_1 >> 10 & 0xFFFF
+    return GripState(sender, sequence, _GRIP_MODE[grip_mode], _new(Reference, (part_origin, part_number)))
+
+
+def pack_order_from(message: OrderFrom) -> bytes:
+    order = message.order
+    if not 0 <= order <= 65535:
+        raise OutOfRangeError("OrderFrom.order", order, 0, 65535)
+    x_mm = message.x_mm
+    if not -524288 <= x_mm <= 524287:
+        raise OutOfRangeError("OrderFrom.x_mm", x_mm, -524288, 524287)
+    y_mm = message.y_mm
+    if not -524288 <= y_mm <= 524287:
+        raise OutOfRangeError("OrderFrom.y_mm", y_mm, -524288, 524287)
+    return _Q.pack(order + (x_mm & 0xFFFFF) * 0x10000 + (y_mm & 0xFFFFF) * 0x1000000000)
+
+
+def unpack_order_from(sender: int, data: bytes) -> OrderFrom | None:
+    (word_0,) = _Q.unpack_from(data)
+    order = word_0 & 0xFFFF
+    x_mm = ((word_0 >> 16 & 0xFFFFF) ^ 0x80000) - 0x80000
+    y_mm = ((word_0 >> 36 & 0xFFFFF) ^ 0x80000) - 0x80000
+    return OrderFrom(sender, order, x_mm, y_mm)
+
+
+def pack_order_to(message: OrderTo) -> bytes:
+    order = message.order
+    if not 0 <= order <= 65535:
+        raise OutOfRangeError("OrderTo.order", order, 0, 65535)
+    x_mm = message.x_mm
+    if not -524288 <= x_mm <= 524287:
+        raise OutOfRangeError("OrderTo.x_mm", x_mm, -524288, 524287)
+    y_mm = message.y_mm
+    if not -524288 <= y_mm <= 524287:
+        raise OutOfRangeError("OrderTo.y_mm", y_mm, -524288, 524287)
+    within_ms = message.within_ms
+    if not 0 <= within_ms <= 2550000:
+        raise OutOfRangeError("OrderTo.within_ms", within_ms, 0, 2550000)
+    return _Q.pack(
+        order + (x_mm & 0xFFFFF) * 0x10000 + ((y_mm & 0xFFFFF) + (within_ms // 10000) * 0x100000) * 0x1000000000
+    )
+
+
+def unpack_order_to(sender: int, data: bytes) -> OrderTo | None:
+    (word_0,) = _Q.unpack_from(data)
+    order = word_0 & 0xFFFF
+    x_mm = ((word_0 >> 16 & 0xFFFFF) ^ 0x80000) - 0x80000
+    y_mm = ((word_0 >> 36 & 0xFFFFF) ^ 0x80000) - 0x80000
+    within_ms = (word_0 >> 56) * 10000
+    return OrderTo(sender, order, x_mm, y_mm, within_ms)
+
+
+#: Every frame of this module.
+FRAMES = (
+    FrameCode("ArmOrder", 0x14D00000, 8, pack_arm_order, unpack_arm_order, ArmOrder, ArmOrder, ("Controller",), True),
+    FrameCode(
+        "GripOrder", 0x14D20000, 8, pack_grip_order, unpack_grip_order, GripOrder, GripOrder, ("Controller",), True
+    ),
+    FrameCode(
+        "OrderAnswer",
+        0x14D60000,
+        8,
+        pack_order_answer,
+        unpack_order_answer,
+        OrderAnswer,
+        OrderAnswer,
+        ("Controller",),
+        True,
+    ),
+    FrameCode("ArmState", 0x16D10000, 8, pack_arm_state, unpack_arm_state, ArmState, ArmState, ("Drive",), True),
+    FrameCode("GripState", 0x16D30000, 8, pack_grip_state, unpack_grip_state, GripState, GripState, ("Gripper",), True),
+    FrameCode("OrderFrom", 0x16D40000, 8, pack_order_from, unpack_order_from, OrderFrom, OrderFrom, ("Counter",), True),
+    FrameCode("OrderTo", 0x16D50000, 8, pack_order_to, unpack_order_to, OrderTo, OrderTo, ("Counter",), True),
+)

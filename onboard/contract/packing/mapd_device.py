@@ -1,0 +1,143 @@
+"""Bytes of the messages in ``onboard.contract.mapd_device``, and back.
+
+Written by ``make docs`` from ``dbc/mapd.dbc``: change that file, never this one.
+"""
+
+from struct import Struct
+
+from onboard.contract.base import FrameCode, OutOfRangeError
+from onboard.contract.mapd import CartAction, TransportResult
+from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
+
+_CART_ACTION = tuple(CartAction)
+_TRANSPORT_RESULT = tuple(TransportResult)
+_BHIX = Struct("<BHIx")
+_HBXXXXX = Struct("<HBxxxxx")
+_HHHH = Struct("<HHHH")
+_Q = Struct("<Q")
+
+
+def pack_cart_order(message: CartOrder) -> bytes:
+    sequence = message.sequence
+    if not 0 <= sequence <= 255:
+        raise OutOfRangeError("CartOrder.sequence", sequence, 0, 255)
+    cell = message.cell
+    if not 0 <= cell <= 63999:
+        raise OutOfRangeError("CartOrder.cell", cell, 0, 63999)
+    task = message.task
+    if not 0 <= task <= 65535:
+        raise OutOfRangeError("CartOrder.task", task, 0, 65535)
+    step = message.step
+    if not 0 <= step <= 4194303:
+        raise OutOfRangeError("CartOrder.step", step, 0, 4194303)
+    return _Q.pack(sequence + message.cart_action * 0x100 + cell * 0x400 + task * 0x4000000 + step * 0x40000000000)
+
+
+def unpack_cart_order(sender: int, data: bytes) -> CartOrder | None:
+    (word_0,) = _Q.unpack_from(data)
+    sequence = word_0 & 0xFF
+    cart_action = word_0 >> 8 & 0x3
+    if cart_action > 2:
+        return None
+    cell = word_0 >> 10 & 0xFFFF
+    if cell > 63999:
+        return None
+    task = word_0 >> 26 & 0xFFFF
+    step = word_0 >> 42
+    return CartOrder(sender, sequence, _CART_ACTION[cart_action], cell, task, step)
+
+
+def pack_transport_answer(message: TransportAnswer) -> bytes:
+    task = message.task
+    if not 0 <= task <= 65534:
+        raise OutOfRangeError("TransportAnswer.task", task, 0, 65534)
+    return _HBXXXXX.pack(task, message.transport_result)
+
+
+def unpack_transport_answer(sender: int, data: bytes) -> TransportAnswer | None:
+    task, transport_result = _HBXXXXX.unpack_from(data)
+    if task > 65534:
+        return None
+    transport_result = transport_result & 0x3
+    if transport_result > 2:
+        return None
+    return TransportAnswer(sender, task, _TRANSPORT_RESULT[transport_result])
+
+
+def pack_cart_state(message: CartState) -> bytes:
+    sequence = message.sequence
+    if not 0 <= sequence <= 255:
+        raise OutOfRangeError("CartState.sequence", sequence, 0, 255)
+    cell = message.cell
+    if not 0 <= cell <= 63999:
+        raise OutOfRangeError("CartState.cell", cell, 0, 63999)
+    task = message.task
+    if not 0 <= task <= 65535:
+        raise OutOfRangeError("CartState.task", task, 0, 65535)
+    return _BHIX.pack(sequence, cell, message.moving + task * 0x2)
+
+
+def unpack_cart_state(sender: int, data: bytes) -> CartState | None:
+    sequence, cell, word_3 = _BHIX.unpack_from(data)
+    if cell > 63999:
+        return None
+    task = word_3 >> 1 & 0xFFFF
+    return CartState(sender, sequence, cell, word_3 & 0x1 != 0, task)
+
+
+def pack_transport_key(message: TransportKey) -> bytes:
+    task = message.task
+    if not 0 <= task <= 65534:
+        raise OutOfRangeError("TransportKey.task", task, 0, 65534)
+    pickup = message.pickup
+    if not 0 <= pickup <= 63999:
+        raise OutOfRangeError("TransportKey.pickup", pickup, 0, 63999)
+    delivery = message.delivery
+    if not 0 <= delivery <= 63999:
+        raise OutOfRangeError("TransportKey.delivery", delivery, 0, 63999)
+    release = message.release
+    if not 0 <= release <= 65535:
+        raise OutOfRangeError("TransportKey.release", release, 0, 65535)
+    return _HHHH.pack(task, pickup, delivery, release)
+
+
+def unpack_transport_key(sender: int, data: bytes) -> TransportKey | None:
+    task, pickup, delivery, release = _HHHH.unpack_from(data)
+    if task > 65534:
+        return None
+    if pickup > 63999:
+        return None
+    if delivery > 63999:
+        return None
+    return TransportKey(sender, task, pickup, delivery, release)
+
+
+#: Every frame of this module.
+FRAMES = (
+    FrameCode(
+        "CartOrder", 0x14E00000, 8, pack_cart_order, unpack_cart_order, CartOrder, CartOrder, ("Controller",), True
+    ),
+    FrameCode(
+        "TransportAnswer",
+        0x14E40000,
+        8,
+        pack_transport_answer,
+        unpack_transport_answer,
+        TransportAnswer,
+        TransportAnswer,
+        ("Controller",),
+        True,
+    ),
+    FrameCode("CartState", 0x16E10000, 8, pack_cart_state, unpack_cart_state, CartState, CartState, ("Cart",), True),
+    FrameCode(
+        "TransportKey",
+        0x16E30000,
+        8,
+        pack_transport_key,
+        unpack_transport_key,
+        TransportKey,
+        TransportKey,
+        ("Counter",),
+        True,
+    ),
+)

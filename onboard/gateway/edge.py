@@ -1,0 +1,65 @@
+"""What a system's folder says to the gateway: orders in, where machines are, what they are.
+
+A system's own is the class ``EDGE`` of its folder's ``gateway.py``; without one its machines are shown, and take no
+orders from outside.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from onboard.core.site import Site
+from onboard.gateway.dialect import Json
+from onboard.gateway.whereabouts import Tracker, TrackTracker
+from onboard.gateway.wishes import NoWishes, Wishes
+from onboard.systems.registry import part
+from onboard.systems.words import words_of
+from onboard.trace.view import SiteView
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """Speed m/s, acceleration m/s^2, length m, most load kg; 0 where the site file is silent."""
+
+    speed: float = 0.0
+    acceleration: float = 0.0
+    length: float = 0.0
+    load: float = 0.0
+
+
+class Edge:
+    """A system of which the gateway knows nothing more than its messages; a system replaces what it has."""
+
+    #: Whether a machine takes orders by its name (VDA 5050's ``order``).
+    takes_visits = False
+
+    def __init__(self, site: Site) -> None:
+        self.site = site
+
+    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+        """What orders become; ``view`` is what was heard, ``place`` names a station by its number."""
+        return NoWishes(self.site)
+
+    def tracker(self) -> Tracker:
+        """Where machines are."""
+        return TrackTracker(self.site)
+
+    def place(self, number: int) -> str | None:
+        """A station as topics name it; None for one that the site does not have."""
+        return words_of(self.site).place(number)
+
+    def body(self) -> Body:
+        """What a mobile machine is, as far as the site file tells."""
+        return Body()
+
+    def loads(self) -> Json:
+        """What it carries, as a factsheet's ``loadSpecification``."""
+        return {}
+
+
+def edge_of(site: Site) -> Edge:
+    """The edge of a site's system."""
+    module = part(site.system, "gateway")
+    if module is None:
+        return Edge(site)
+    edge: Edge = module.EDGE(site)
+    return edge

@@ -1,0 +1,125 @@
+"""A car park at the gateway: a transport is a ticket put into a compartment's desk from afar, or its key pressed.
+
+It is the same path as a customer's press (row P52), and the compartment calls for it.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from onboard.core.codes import ANY_STATION, OUTSIDE, Operation, OperatorAction
+from onboard.core.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
+from onboard.gateway.dialect import Json
+from onboard.gateway.edge import Body, Edge
+from onboard.gateway.order import Order, Wish
+from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.systems.car_park.site import CarPark
+from onboard.trace.view import SiteView
+from onboard.ways.site import WaySite, way_site
+
+#: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
+TICKET_AGAIN_US = 30_000_000
+#: A key press is not repeated, for the next car may be another's: heard within this, or refused, us. Ours.
+KEY_PATIENCE_US = 20_000_000
+
+
+class ParkWishes(NoWishes):
+    """A robotized car park; ``view`` is what was heard of it."""
+
+    def __init__(self, site: WaySite, view: SiteView, place: Callable[[int], str | None]) -> None:
+        super().__init__(site)
+        self._view, self._place = view, place
+        self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""
+        urgent = told.get("priority", 0) > 0
+        refuse_load(told)
+        if "to" in told:
+            node = self._desk(told["to"], "$.to")
+            if "car" not in told and "from" not in told:
+                raise RefusedError("INCOMPLETE", "name the car, or from where", "$.car")
+            car = _car(told["car"]) if "car" in told else self._standing(told["from"])
+            return Wish("fetch", node, car, urgent=urgent)
+        if "from" not in told:
+            raise RefusedError("INCOMPLETE", "name a compartment to hand out at, or one to park from", "$.to")
+        return Wish("park", self._desk(told["from"], "$.from"), urgent=urgent)
+
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+        """A ticket, or the key."""
+        wish = order.wish
+        if wish.car is None:
+            if order.was_said:
+                raise RefusedError("NOT_TAKEN", "the compartment has not called for it: no car in it, or not ready")
+            return Said((OperatorOrder(sender, wish.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US)
+        if wish.car not in self._view.cars:
+            raise RefusedError("UNKNOWN_TICKET", "no such car is in the park", "$.car")
+        action = OperatorAction.URGENT_TICKET if wish.urgent else OperatorAction.INSERT_TICKET
+        return Said((OperatorOrder(sender, wish.node, action, wish.car),), TICKET_AGAIN_US)
+
+    def task_of(self, order: Order, message: Message) -> Reference | None:
+        """The compartment's call for the car, or its next call to park."""
+        if not isinstance(message, CallForProposals) or message.sender != order.wish.node or message.depth:
+            return None
+        if order.wish.car is None:
+            return message.task if message.operation is Operation.PARK and order.was_said else None
+        is_it = message.operation is Operation.RETRIEVE and message.car == order.wish.car
+        return message.task if is_it else None
+
+    def is_done(self, order: Order, message: Message) -> bool:
+        """The car has left; or it stands in a place, and its parking was the task, which has the car's own name."""
+        if not isinstance(message, CarAt) or order.task is None:
+            return False
+        if order.wish.car is not None:
+            return message.car == order.wish.car and message.station == OUTSIDE
+        bays = {station.number for station in way_site(self._site).compartments.values()}
+        return message.car == order.task and message.station not in (*bays, ANY_STATION, OUTSIDE)
+
+    def _desk(self, name: str, path: str) -> int:
+        if name not in self._desks:
+            raise RefusedError("UNKNOWN_PLACE", f"no compartment; one of {', '.join(self._desks)}", path)
+        return self._desks[name]
+
+    def _standing(self, place: str) -> Reference:
+        for number, car in self._view.places_taken().items():
+            if self._place(number) == place:
+                return car
+        raise RefusedError("UNKNOWN_TICKET", "no car is known to stand there", "$.from")
+
+
+def _car(text: str) -> Reference:
+    origin, _, number = text.partition(".")
+    if int(origin) > 0xFF or int(number) > 0xFFFF:
+        raise RefusedError("UNKNOWN_TICKET", "no such car can be", "$.car")
+    return Reference(int(origin), int(number))
+
+
+class CarParkEdge(Edge):
+    """A car park: carriers with a speed and a length, cars with limits."""
+
+    def __init__(self, site: CarPark) -> None:
+        super().__init__(site)
+        self._park = site
+
+    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+        """Tickets and keys."""
+        return ParkWishes(self._park, view, place)
+
+    def body(self) -> Body:
+        """The carrier's axis and length; it takes the heaviest car."""
+        axis = self._park.carrier
+        return Body(
+            axis.speed_mm_s / 1000,
+            axis.acceleration_mm_s2 / 1000,
+            self._park.carrier_length_mm / 1000,
+            float(self._park.cars.max_load_kg),
+        )
+
+    def loads(self) -> Json:
+        """Cars."""
+        limits = self._park.cars
+        dimensions = {"length": limits.max_length_mm / 1000, "width": 0.0, "height": limits.max_height_mm / 1000}
+        most_kg = float(limits.max_load_kg)
+        return {"loadSets": [{"setName": "car", "loadType": "car", "loadDimensions": dimensions, "maxWeight": most_kg}]}
+
+
+EDGE = CarParkEdge

@@ -1,0 +1,136 @@
+"""A factory graph at the gateway: an order to a robot by name is a list of nodes to visit (row G11)."""
+
+from collections.abc import Callable
+from typing import Any
+
+from onboard.core.codes import KindCode
+from onboard.core.messages import Message
+from onboard.gateway.edge import Body, Edge
+from onboard.gateway.order import Order, Wish
+from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.systems.graph.messages import NO_NODE, RobotAt, VisitList, five
+from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
+from onboard.trace.view import SiteView
+
+#: A visit list is said again so often until its robot answers, us; as by the desk does.
+VISIT_AGAIN_US = 1_000_000
+
+
+class GraphWishes(NoWishes):
+    """A factory graph."""
+
+    def __init__(self, site: FactoryGraph) -> None:
+        super().__init__(site)
+        self._graph = site
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """``from`` one node ``to`` another: a desk calls for it, and the robot that does it best has it (row G28)."""
+        desks = sorted(node for node, one in self._graph.machines.items() if one.kind is KindCode.DESK)
+        if not desks:
+            raise RefusedError("UNSUPPORTED", "this site has no desk that calls for a transport")
+        refuse_load(told)
+        if "car" in told:
+            raise RefusedError("UNSUPPORTED", "loads have no names here; say from where to where", "$.car")
+        for key in ("from", "to"):
+            if key not in told:
+                raise RefusedError("INCOMPLETE", "say from where to where", f"$.{key}")
+            self._node(told[key], f"$.{key}")
+        return Wish("send", desks[0], stops=(int(told["from"]), int(told["to"])))
+
+    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
+        """The nodes with an action and the last one are stops; between them the robot goes its own way.
+
+        Nodes that are not released yet are its horizon: nothing is done for them before an update releases them.
+        """
+        nodes = told["nodes"]
+        for place, one in enumerate(nodes):
+            self._check(one, f"$.nodes[{place}]")
+        numbers = [step["sequenceId"] for step in nodes]
+        if not nodes or numbers != list(range(numbers[0], numbers[0] + 2 * len(nodes), 2)):
+            raise RefusedError("MALFORMED", "nodes must be there, their numbers two apart", "$.nodes")
+        base = [one for one in nodes if one["released"]]
+        if base != nodes[: len(base)] or not base:
+            raise RefusedError("MALFORMED", "the first nodes must be released, and behind a horizon none", "$.nodes")
+        if since is not None and (base[0]["nodeId"], base[0]["sequenceId"]) != since:
+            why = f"must go on from node {since[0]}, sequenceId {since[1]}, the last one that was released"
+            raise RefusedError("NOT_CONTINUED", why, "$.nodes[0]")
+        new = base if since is None else base[1:]
+        stops = tuple(int(one["nodeId"]) for one in new if one["actions"] or one is new[-1])
+        if len(stops) > MAX_STOPS:
+            raise RefusedError("TOO_LONG", f"at most {MAX_STOPS} stops fit into one order", "$.nodes")
+        end = (base[-1]["nodeId"], base[-1]["sequenceId"])
+        return Wish("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
+
+    def _check(self, node: dict[str, Any], path: str) -> None:
+        self._node(node["nodeId"], f"{path}.nodeId")
+        for number, action in enumerate(node["actions"]):
+            if action["actionType"] not in ("pick", "drop"):
+                where = f"{path}.actions[{number}].actionType"
+                raise RefusedError("UNSUPPORTED", "of actions only pick and drop are known", where)
+
+    def _node(self, name: str, path: str) -> None:
+        if not name.isdecimal() or int(name) not in self._graph.graph.neighbours:
+            raise RefusedError("UNKNOWN_PLACE", "no node of this graph", path)
+
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+        """The list of nodes until the robot answers; without any node, that the order is taken back."""
+        wish = order.wish
+        stops = () if order.is_cancelled else wish.stops
+        assert stops or order.is_cancelled, "an empty list takes an order back"
+        return Said((VisitList(sender, wish.number, wish.node, *five(stops)),), VISIT_AGAIN_US)
+
+
+class GraphTracker:
+    """Robots of a factory graph: nodes by number, no coordinates."""
+
+    def __init__(self, site: FactoryGraph) -> None:
+        self._at = {node: Whereabouts(str(machine.home.track)) for node, machine in site.robots.items()}
+
+    def feed(self, message: Message) -> bool:
+        """Robots say where they are and where they go."""
+        if not isinstance(message, RobotAt) or message.sender not in self._at:
+            return False
+        old = self._at[message.sender]
+        node = str(message.behind if message.on_edge else message.node)
+        first = (message.node,) if message.on_edge else ()
+        coming = (*first, message.ahead1, message.ahead2, message.ahead3, message.goal)
+        ahead: list[str] = []
+        for one in coming:
+            if one != NO_NODE and str(one) != (ahead[-1] if ahead else node):
+                ahead.append(str(one))
+        self._at[message.sender] = Whereabouts(node, tuple(ahead), old.passed + (node != old.node), message.on_edge)
+        return True
+
+    def where(self, node_id: int) -> Whereabouts:
+        """As in the port."""
+        return self._at[node_id]
+
+
+class GraphEdge(Edge):
+    """A factory graph: nodes by number."""
+
+    takes_visits = True
+
+    def __init__(self, site: FactoryGraph) -> None:
+        super().__init__(site)
+        self._graph = site
+
+    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+        """Visits and transports."""
+        return GraphWishes(self._graph)
+
+    def tracker(self) -> Tracker:
+        """By what robots say of their place."""
+        return GraphTracker(self._graph)
+
+    def place(self, number: int) -> str | None:
+        """A node, which orders name by its number alone."""
+        return str(number)
+
+    def body(self) -> Body:
+        """Of a robot only its speed is known."""
+        return Body(speed=self._graph.speed_mm_s / 1000)
+
+
+EDGE = GraphEdge

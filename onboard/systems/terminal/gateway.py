@@ -1,0 +1,140 @@
+"""A terminal at the gateway: a transport is a mission of its desk, for one box (rows M05, M39)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from onboard.core.messages import CarAt, Message
+from onboard.gateway.edge import Edge
+from onboard.gateway.order import Order, Wish
+from onboard.gateway.records import Life
+from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes
+from onboard.systems.terminal.messages import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
+from onboard.systems.terminal.site import EntityKind, Terminal
+from onboard.trace.view import SiteView
+
+#: An order is said again so often until the desk answers it, us; as vehicles do.
+ORDER_AGAIN_US = 1_000_000
+#: The longest time that a terminal's desk is told, s (dbc/terminal.dbc).
+MOST_WITHIN_S = 32_767
+
+
+class TerminalWishes(NoWishes):
+    """A container terminal: a mission of its desk, for one box (rows M05, M39)."""
+
+    def __init__(self, site: Terminal) -> None:
+        super().__init__(site)
+        self._terminal = site
+        self._boxes = {box.name: number for number, box in enumerate(site.boxes, start=1)}
+        stations = [one for one in site.entities.values() if one.kind is EntityKind.STATION]
+        self._stations = {one.name: one.number for one in stations}
+
+    def transport(self, told: dict[str, Any]) -> Wish:
+        """``load``, a box by its name, ``to`` a station."""
+        for key in ("load", "to"):
+            if key not in told:
+                raise RefusedError("INCOMPLETE", "name the box and the station", f"$.{key}")
+        if told["load"] not in self._boxes:
+            raise RefusedError("UNKNOWN_LOAD", "no box of this name", "$.load")
+        if told["to"] not in self._stations:
+            raise RefusedError("UNKNOWN_PLACE", f"no station; one of {', '.join(self._stations)}", "$.to")
+        stops = (self._boxes[told["load"]], self._stations[told["to"]])
+        return Wish("send", self._terminal.desk, stops=stops, urgent=told.get("priority", 0) > 0)
+
+    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+        """The order, until the desk answers."""
+        wish, within_s = order.wish, 0
+        if order.before_us is not None:
+            within_s = min(max(1, (order.before_us - wall_us) // 1_000_000), MOST_WITHIN_S)
+        box, station = wish.stops
+        return Said((BoxOrder(sender, wish.node, wish.number, box, station, within_s, wish.urgent),), ORDER_AGAIN_US)
+
+    def is_done(self, order: Order, message: Message) -> bool:
+        """The box stands there: the vehicle's own report may have been lost."""
+        if not isinstance(message, CarAt) or order.life in (Life.ACCEPTED, Life.CALLED):
+            return False
+        box, station = order.wish.stops
+        return (message.car.number, message.station) == (box, station)
+
+
+@dataclass(slots=True)
+class _Plan:
+    """A vehicle's plan as far as it was heard, by step."""
+
+    version: int
+    steps: int
+    entities: dict[int, int]
+    done: int = 0
+
+
+class EntityTracker:
+    """Vehicles of a terminal: entities by name, no coordinates."""
+
+    def __init__(self, site: Terminal) -> None:
+        self._site = site
+        self._at = {node: Whereabouts(self._name(site.machines[node].home.track)) for node in site.vehicles}
+        self._plans: dict[int, _Plan] = {}
+
+    def feed(self, message: Message) -> bool:
+        """Plans and the steps done of them."""
+        if message.sender not in self._at:
+            return False
+        plan = self._plans.get(message.sender)
+        match message:
+            case PlanHead() if plan is None or message.version != plan.version:
+                self._plans[message.sender] = _Plan(message.version, message.steps, {})
+            case PlanStep() if plan is not None and plan.version == message.version:
+                plan.entities[message.step] = message.entity
+            case StepReport() if plan is not None and plan.version == message.version:
+                self._on_report(message, plan)
+            case _:
+                return False
+        return True
+
+    def _on_report(self, report: StepReport, plan: _Plan) -> None:
+        if report.result is not StepResult.DONE:
+            self._at[report.sender] = replace(self._at[report.sender], driving=False)
+            return
+        plan.done = max(plan.done, report.step + 1)
+        node, old = self._name(plan.entities.get(plan.done, report.entity)), self._at[report.sender]
+        self._at[report.sender] = Whereabouts(node, (), old.passed + (node != old.node), plan.done < plan.steps)
+
+    def where(self, node_id: int) -> Whereabouts:
+        """As in the port."""
+        at, plan = self._at[node_id], self._plans.get(node_id)
+        if plan is None or len(plan.entities) < plan.steps:
+            return at
+        ahead: list[str] = []
+        for step in range(plan.done, plan.steps):
+            name = self._name(plan.entities[step])
+            if name != (ahead[-1] if ahead else at.node):
+                ahead.append(name)
+        return replace(at, ahead=tuple(ahead))
+
+    def _name(self, number: int) -> str:
+        entity = self._site.entities.get(number)
+        return entity.name if entity is not None else str(number)
+
+
+class TerminalEdge(Edge):
+    """A terminal: entities by their names."""
+
+    def __init__(self, site: Terminal) -> None:
+        super().__init__(site)
+        self._terminal = site
+
+    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+        """Missions for one box."""
+        return TerminalWishes(self._terminal)
+
+    def tracker(self) -> Tracker:
+        """By the plans that vehicles tell."""
+        return EntityTracker(self._terminal)
+
+    def place(self, number: int) -> str | None:
+        """An entity."""
+        return self._terminal.entities[number].name if number in self._terminal.entities else None
+
+
+EDGE = TerminalEdge

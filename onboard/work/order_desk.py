@@ -1,0 +1,277 @@
+"""What every order desk does: hear orders at its counter, call for each, hear of completion, answer the counter.
+
+A desk is an initiator and nothing else: it bids for nothing. Of an order it journals how it stands, so that a restart
+calls for nothing twice: it listens first, because whoever has an order in hand says so.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import ClassVar, Generic, TypeVar
+
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.journal_records import JournalRecord
+from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
+from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
+from onboard.core.negotiation.winners import STANDS_AFTER_US
+from onboard.work.order_life import NEXT, OrderEvent, OrderState, WorkOrder
+
+#: After power-up a desk listens so long before it calls, us: who has an order in hand says so with its first signs of
+#: life.
+LISTEN_US = 3_000_000
+#: The counter is told how an order stands this often, us (dbc/cell.dbc, dbc/graph.dbc, dbc/turning.dbc).
+ANSWER_US = 2_000_000
+
+AnOrder = TypeVar("AnOrder", bound=WorkOrder)
+
+
+@dataclass
+class OrderDesk(ABC, Generic[AnOrder]):
+    """One desk. ``orders`` by name, in the order in which they came."""
+
+    #: The kind of machine that carries orders out.
+    takers: ClassVar[KindCode]
+    #: Who has an order in hand is asked how it stands this often, us.
+    ask_us: ClassVar[int]
+    #: An order that nobody can do is refused after so many calls of several attempts each; None for never.
+    max_calls: ClassVar[int | None] = None
+    #: After a call that nobody could do it is called for again after this, us.
+    call_again_us: ClassVar[int] = 0
+
+    fleet: Fleet
+    kind: KindCode = KindCode.DESK
+    orders: dict[Reference, AnOrder] = field(default_factory=dict)
+    _listen_until_us: int | None = None
+
+    def __post_init__(self) -> None:
+        self.replay()
+
+    # --- what differs from desk to desk ------------------------------------------------------------------------
+
+    @abstractmethod
+    def replay(self) -> None:
+        """Take up orders from the journal; ``take_up`` for each state of one."""
+
+    @abstractmethod
+    def order_record(self, order: AnOrder) -> JournalRecord:
+        """What came in."""
+
+    @abstractmethod
+    def state_record(self, order: AnOrder) -> JournalRecord:
+        """How it stands."""
+
+    @abstractmethod
+    def terms(self, order: AnOrder) -> CallTerms:
+        """What is called for."""
+
+    @abstractmethod
+    def answer(self, order: AnOrder) -> Message | None:
+        """What the counter is told of an order; None for one that did not come in there."""
+
+    def note_price(self, order: AnOrder) -> None:
+        """Note what the winner asks for an order."""
+
+    def may_take_back(self, order: AnOrder) -> bool:
+        """Whether an order that its winner does not carry out may go to another: it is not begun, by all I know."""
+        return not order.is_begun
+
+    def may_be_given_back(self, order: AnOrder) -> bool:
+        """Whether its winner may give it back by its word alone."""
+        return True
+
+    def stands_us(self, order: AnOrder) -> int:
+        """How long its winner may tell no change."""
+        return STANDS_AFTER_US
+
+    def in_turn(self) -> Iterable[AnOrder]:
+        """The order in which to look after orders; as they came."""
+        return self.orders.values()
+
+    # --- the Behaviour -----------------------------------------------------------------------------------------
+
+    @property
+    def state(self) -> MachineState:
+        """Heartbeat state."""
+        return MachineState.IDLE if all(one.is_over for one in self.orders.values()) else MachineState.WORKING
+
+    @property
+    def itinerary_version(self) -> int:
+        """A desk goes nowhere."""
+        return 0
+
+    def start(self, now_us: int) -> list[Effect]:
+        """Listen first: orders of an earlier life may be in hand."""
+        self._listen_until_us = now_us + LISTEN_US
+        for order in self.orders.values():
+            order.answer_at_us = now_us
+            order.due_us = None if order.is_over else now_us + LISTEN_US
+            self._watch(order, now_us)
+        return []
+
+    def hear(self, message: Message, now_us: int) -> list[Effect]:
+        """Reports about orders of mine, by machines that can carry one out."""
+        if not isinstance(message, TaskReport) or message.task not in self.orders:
+            return []
+        order = self.orders[message.task]
+        machine = self.fleet.site.machines.get(message.sender)
+        if machine is None or machine.kind is not self.takers:
+            self.fleet.drops[Reason.NOT_OF_KIND] += 1
+            return []
+        if order.is_over:
+            return []
+        if self._may_say(order, message.sender, now_us):
+            return self._on_report(order, message, now_us)
+        # Who has lost it, or never won it, says nothing that counts.
+        is_claim = message.phase is TaskPhase.AWARDED and not order.named
+        return self.fleet.winners.remind(order.task, message.sender) if is_claim else []
+
+    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
+        """A call is over: somebody has the order, or nobody."""
+        order = self.orders.get(event.call.task) if isinstance(event, Closed) else None
+        if not isinstance(event, Closed) or order is None:
+            return []
+        if event.winner:
+            return self._goes_to(order, OrderEvent.WON, event.winner, now_us, event.call.call)
+        refused = event.result is CallResult.REFUSED
+        if refused and self.max_calls is not None and order.calls >= self.max_calls:
+            return self.put(order, OrderEvent.HOPELESS, now_us)
+        return self.put(order, OrderEvent.NOT_WON, now_us, self.call_again_us if refused else 0)
+
+    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """A desk keeps no rights."""
+        return Reason.NOT_AUTHORISED
+
+    def advance(self, now_us: int) -> list[Effect]:
+        """Call for orders, ask who has one in hand, and answer the counter."""
+        effects: list[Effect] = []
+        if self._listen_until_us is not None and self._listen_until_us <= now_us:
+            self._listen_until_us = None
+        for order in self.in_turn():
+            effects += self.look_after(order, now_us)
+            if self._listen_until_us is None and order.due_us is not None and order.due_us <= now_us:
+                effects += self.go_on(order, now_us)
+            if order.answer_at_us is not None and order.answer_at_us <= now_us:
+                order.answer_at_us = None if order.is_over else now_us + ANSWER_US
+                answer = self.answer(order)
+                effects += [Actuate(answer)] if answer is not None else []
+        return effects
+
+    def next_wake(self) -> int | None:
+        """When something is to be said or called."""
+        times = [self._listen_until_us]
+        for order in self.orders.values():
+            times.append(order.answer_at_us)
+            if self._listen_until_us is None:
+                times.append(order.due_us)
+        return min((time for time in times if time is not None), default=None)
+
+    def statements(self, now_us: int) -> list[Effect]:
+        """No rights, no itinerary."""
+        return []
+
+    # --- orders ------------------------------------------------------------------------------------------------
+
+    def come_in(self, order: AnOrder, now_us: int) -> list[Effect]:
+        """A new order: it is journalled before anything follows."""
+        self.orders[order.task] = order
+        order.answer_at_us = order.due_us = now_us
+        self._watch(order, now_us)
+        return [Record(self.order_record(order))]
+
+    def take_up(self, order: AnOrder, state: OrderState) -> None:
+        """As the journal says that it stood.
+
+        A call does not outlive its desk: it is made again, unless somebody says by its report that it has the order.
+        """
+        order.may_be_won = state in (OrderState.HEARD, OrderState.CALLED)
+        order.state = OrderState.HEARD if state is OrderState.CALLED else state
+
+    def put(self, order: AnOrder, event: OrderEvent, now_us: int, due_in_us: int = 0) -> list[Effect]:
+        """What an event does to an order; the counter is told. ``due_in_us``: when it is called for, if it is again."""
+        if not order.meet(event):
+            return []
+        order.answer_at_us = now_us
+        match order.state:
+            case OrderState.HEARD:
+                order.due_us = now_us + due_in_us
+            case OrderState.IN_HAND:
+                order.due_us = now_us + self.ask_us
+            case _:
+                order.due_us = None
+        if order.is_over:
+            self.fleet.winners.over(order.task)
+        return [Record(self.state_record(order))]
+
+    def look_after(self, order: AnOrder, now_us: int) -> list[Effect]:
+        """An order whose winner is lost is called for anew, without it."""
+        if order.state not in (OrderState.CALLED, OrderState.IN_HAND):
+            return []
+        reason = self.fleet.winners.lost(order.task, now_us)
+        if reason is Reason.NONE:
+            return []
+        if not self.may_take_back(order):
+            self.fleet.winners.keeps(order.task)
+            return []
+        # That somebody failed in it says nothing of the others.
+        order.calls = 0
+        said = self.fleet.winners.take_back(order.task, reason, now_us)
+        return said + self.put(order, OrderEvent.TAKEN_BACK, now_us)
+
+    def go_on(self, order: AnOrder, now_us: int) -> list[Effect]:
+        """What is due for an order: to be called for, or to be asked after."""
+        if order.state is OrderState.HEARD:
+            order.calls += 1
+            effects = self.put(order, OrderEvent.CALL, now_us)
+            return effects + self.fleet.negotiation.open(self.terms(order), now_us)
+        order.due_us = now_us + self.ask_us
+        return [Send(SyncRequest(self.fleet.node_id, order.winner))]
+
+    def _may_say(self, order: AnOrder, node: int, now_us: int) -> bool:
+        """Whether a word about an order counts: by who has it, is named, or may have won it in my earlier life."""
+        if order.named or order.state is OrderState.IN_HAND:
+            return node == order.winner
+        return order.may_be_won and self.fleet.winners.may_claim(order.task, node, now_us)
+
+    def _on_report(self, order: AnOrder, report: TaskReport, now_us: int) -> list[Effect]:
+        """How an order stands, by who may say it."""
+        match report.phase:
+            case TaskPhase.REFUSED if order.named:
+                return self.put(order, OrderEvent.HOPELESS, now_us)
+            case TaskPhase.FORFEITED | TaskPhase.REFUSED:
+                if order.named or order.state is not OrderState.IN_HAND or not self.may_be_given_back(order):
+                    return []
+                self.fleet.winners.over(order.task)
+                return self.put(order, OrderEvent.GIVEN_BACK, now_us)
+            case TaskPhase.DONE:
+                said = self._withdraw(order, now_us)
+                if order.state is not OrderState.IN_HAND:
+                    order.winner = report.sender
+                    self.note_price(order)
+                return said + self.put(order, OrderEvent.CARRIED_OUT, now_us)
+        if order.state is OrderState.IN_HAND:
+            return []
+        return self._withdraw(order, now_us) + self._goes_to(order, OrderEvent.CLAIMED, report.sender, now_us)
+
+    def _goes_to(self, order: AnOrder, event: OrderEvent, winner: int, now_us: int, call: int = 0) -> list[Effect]:
+        """Somebody has it, by ``call`` where it is known."""
+        if (order.state, event) not in NEXT:
+            return []
+        order.winner, order.may_be_won, order.is_begun = winner, False, False
+        self.note_price(order)
+        effects = self.put(order, event, now_us)
+        self._watch(order, now_us, call)
+        return effects
+
+    def _withdraw(self, order: AnOrder, now_us: int) -> list[Effect]:
+        """Close the call for what somebody has already."""
+        if order.state is not OrderState.CALLED:
+            return []
+        said = self.fleet.negotiation.withdraw(self.terms(order), now_us)
+        return [item for item in said if not isinstance(item, NegotiationEvent)]
+
+    def _watch(self, order: AnOrder, now_us: int, call: int = 0) -> None:
+        if order.state is OrderState.IN_HAND or (order.named and not order.is_over):
+            self.fleet.winners.takes(order.task, order.winner, now_us, call, self.stands_us(order))

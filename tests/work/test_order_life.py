@@ -1,0 +1,68 @@
+"""The life of an order: every state meets every event, at a desk of each system that has one."""
+
+from collections.abc import Iterable
+from itertools import product
+
+import pytest
+
+from bus_sim.sites import find_site
+from onboard.core.codes import KindCode
+from onboard.core.effects import Record
+from onboard.core.holon import Holon
+from onboard.core.messages import Reference
+from onboard.systems.cell.contracts import Goal
+from onboard.systems.cell.desk import Order as GoalOrder
+from onboard.systems.cell.geometry import Point
+from onboard.systems.graph.desk import Visits
+from onboard.systems.registry import factory_for
+from onboard.systems.turning.desk import Order as JobOrder
+from onboard.systems.turning.lathe import Job
+from onboard.work.order_desk import OrderDesk
+from onboard.work.order_life import NEXT, OVER, OrderEvent, OrderState, WorkOrder
+
+TASK = Reference(9, 1)
+GOAL = Goal(TASK, TASK, Point(10_000, 10_000), Point(40_000, 30_000), (), 0)
+ORDERS: dict[str, WorkOrder] = {
+    "cell": GoalOrder(TASK, GOAL),
+    "graph": Visits(TASK, (4, 6)),
+    "turning": JobOrder(TASK, Job(1, 1, 16)),
+}
+NOW_US = 5_000_000
+
+
+def desk_of(system: str, entries: Iterable[Record] = ()) -> OrderDesk[WorkOrder]:
+    """The site's desk, as it starts with these records."""
+    site = find_site(system)
+    machine = next(one for one in site.machines.values() if one.kind is KindCode.DESK)
+    holon = Holon(site, machine, factory_for(site, machine.kind), boot=1, entries=[one.entry for one in entries])
+    desk = holon.behaviour
+    assert isinstance(desk, OrderDesk)
+    return desk
+
+
+@pytest.mark.parametrize("system", ORDERS)
+@pytest.mark.parametrize(("state", "event"), list(product(OrderState, OrderEvent)))
+def test_every_state_meets_every_event(system: str, state: OrderState, event: OrderEvent) -> None:
+    desk, order = desk_of(system), type(ORDERS[system])(**vars(ORDERS[system]))
+    written = [one for one in desk.come_in(order, NOW_US) if isinstance(one, Record)]
+    order.state, order.answer_at_us, order.due_us = state, None, None
+    effects = desk.put(order, event, NOW_US)
+    following = NEXT.get((state, event))
+    if following is None:
+        assert (effects, order.state, order.answer_at_us, order.due_us) == ([], state, None, None)
+        return
+    assert [order.state, order.answer_at_us] == [following, NOW_US], "the counter is told"
+    assert (order.due_us is None) is (following in (*OVER, OrderState.CALLED)), "asked after, or called for again"
+    # What is written says the same after a restart; only a call is made anew, and somebody may have won it.
+    again = desk_of(system, [*written, *(one for one in effects if isinstance(one, Record))]).orders[TASK]
+    kept = OrderState.HEARD if following is OrderState.CALLED else following
+    assert (again.state, again.may_be_won) == (kept, kept is OrderState.HEARD)
+
+
+def test_nothing_follows_what_is_over_and_all_else_comes_to_an_end() -> None:
+    assert not [state for state, _ in NEXT if state in OVER]
+    for state in OrderState:
+        reached = {state}
+        while more := {to for (from_, _), to in NEXT.items() if from_ in reached} - reached:
+            reached |= more
+        assert OrderState.DONE in reached or state is OrderState.REFUSED
