@@ -31,7 +31,7 @@ from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
 from onboard.gateway.whereabouts import Tracker, Whereabouts
 
-#: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/core/presence.py).
+#: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/holon/presence.py).
 SILENT_BEATS = 3
 #: An arm stands where it is bolted down: it is no machine that VDA 5050 speaks of.
 TRAVELLERS = MOBILE_KINDS - {KindCode.ARM}

@@ -4,7 +4,6 @@ import pytest
 
 from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, OperatorAction, Reason, TokenKind
 from onboard.core.effects import Report, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     Blocked,
     BusTime,
@@ -19,6 +18,7 @@ from onboard.core.messages import (
     TokenHeld,
 )
 from onboard.core.recovery_messages import Go
+from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import way_mirror
 from onboard.wire.codec import fleet_codec

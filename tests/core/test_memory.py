@@ -5,10 +5,10 @@ import pytest
 from onboard.core.authority import segment_token
 from onboard.core.codes import CONTRACT_VERSION, OUTSIDE, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Report, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import CarAt, Heartbeat, Reference, SyncRequest, TokenGrant, TokenHeld
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
+from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.ways.cars import MAX_GONE_CARS
 from onboard.ways.mirror import WayMirror, way_mirror

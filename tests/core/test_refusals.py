@@ -6,9 +6,9 @@ from onboard.core.codes import Reason
 from onboard.core.messages import TokenRefusal
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation
-from onboard.core.rights import Rights
 from onboard.core.site import Segment
-from onboard.core.witness import Witness
+from onboard.holon.rights import Rights
+from onboard.holon.witness import Witness
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)

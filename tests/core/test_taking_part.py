@@ -9,12 +9,12 @@ from bus_sim.sites import find_site
 from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator, Plain
 from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
 from onboard.core.effects import Effect
-from onboard.core.holon import Holon
 from onboard.core.messages import Heartbeat, Message
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
+from onboard.holon.holon import Holon
 
 SITE = find_site("small")
 ME, PEER, OTHER = sorted(SITE.machines)[-1], sorted(SITE.machines)[0], sorted(SITE.machines)[1]

@@ -13,7 +13,6 @@ from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
 from onboard.core.effects import Effect, Halt, Record, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     DriveState,
     Itinerary,
@@ -28,6 +27,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Machine, Segment, Site
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.travel import ORDER_PATIENCE_US
 from onboard.systems.registry import factory_for
 from onboard.ways.all_or_none import AllOrNone

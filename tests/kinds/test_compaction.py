@@ -16,10 +16,10 @@ from bus_sim.faults.scenario import Arrivals, Scenario
 from bus_sim.run import RunOptions, run_until
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.holon import Holon
 from onboard.core.journal_records import JournalRecord, by_name
 from onboard.core.records import CORE_RECORDS
 from onboard.core.site import Site
+from onboard.holon.holon import Holon
 from onboard.io.sealed import SLOTS_BYTES, read
 from onboard.ports.journal import Entry
 from onboard.systems.registry import compaction_for, factory_for, system_of

@@ -21,7 +21,6 @@ from onboard.core.codes import (
     TokenKind,
 )
 from onboard.core.effects import Actuate, Effect, Record, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     BayState,
     BusTime,
@@ -43,6 +42,7 @@ from onboard.core.messages import (
 from onboard.core.negotiation.winners import LOST_AFTER_US
 from onboard.core.recovery_messages import Go
 from onboard.core.site import Station
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_memory import winner_record
 from onboard.systems.registry import factory_for
 from onboard.ways.tokens import car_token

@@ -5,7 +5,6 @@ from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, Reason, ShuttleMode, Side, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     BusTime,
     DriveOrder,
@@ -22,6 +21,7 @@ from onboard.core.messages import (
     TokenRequest,
 )
 from onboard.core.site import Segment
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.lift import Lift
 from onboard.systems.car_park.robot import Robot
 from onboard.systems.car_park.site import car_park

@@ -5,9 +5,9 @@ from onboard.core.authority import TokenBook
 from onboard.core.codes import ANY_STATION, MachineState, Reason
 from onboard.core.messages import CarAt, Reference
 from onboard.core.mirror import Peer
-from onboard.core.presence import Presence
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
+from onboard.holon.presence import Presence
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 from onboard.systems.car_park.site import car_park

@@ -10,11 +10,11 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.run import Simulation
 from bus_sim.sites import find_site
 from onboard.controller.shell import Controller
-from onboard.core import holon
 from onboard.core.authority import genesis_holder, segment_token, station_token
 from onboard.core.codes import SEEN_VERSION_BITS, CallResult, Grade, MachineState, Reason
 from onboard.core.messages import Award, Bid, Blocked, CallForProposals, Clear, Heartbeat, Itinerary, Progress
 from onboard.core.site import Segment
+from onboard.holon import holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.robot import Robot
 from onboard.systems.car_park.site import car_park

@@ -15,12 +15,12 @@ from bus_sim.run import Simulation
 from bus_sim.sites import find_site
 from onboard.controller.shell import Controller
 from onboard.core.codes import ANY_STATION, CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
-from onboard.core.holon import Holon
 from onboard.core.messages import Award, CallForProposals, Heartbeat, Reference, Stamp, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Site
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import Program, Step, to_itinerary

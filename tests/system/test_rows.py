@@ -25,7 +25,6 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     Award,
     Bid,
@@ -45,6 +44,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site, Station
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.compartment_factory import CompartmentFactory
 from onboard.systems.car_park.generation import CarParkGeneration

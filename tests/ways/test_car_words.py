@@ -3,8 +3,8 @@
 import pytest
 
 from onboard.core.codes import ANY_STATION, Reason, TokenKind
-from onboard.core.holon import Holon
 from onboard.core.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
+from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import way_mirror
 from onboard.ways.tokens import car_token

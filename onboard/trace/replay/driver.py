@@ -13,12 +13,12 @@ from typing import NamedTuple
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
 from onboard.core.frame import Frame
-from onboard.core.holon import Holon
 from onboard.core.messages import CallForProposals
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.negotiation.events import Needs, Proposal
 from onboard.core.site import Machine, Site
+from onboard.holon.holon import Holon
 from onboard.trace.candump import format_frame
 from onboard.trace.frame_bits import INTERMISSION_BITS, frame_bits
 from onboard.trace.raw import RawFrame

@@ -8,15 +8,11 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from onboard.core.admission import Admission
 from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory
 from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
-from onboard.core.drops import ToldDrops
 from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
-from onboard.core.holding import Hold, Holding
-from onboard.core.holds import Holds, without_rights
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.journal_state import INTACT, OLD, RIGHTS_LOST, JournalCondition, reason_of, still_counting
 from onboard.core.messages import (
@@ -37,16 +33,20 @@ from onboard.core.messages import (
     TokenHeld,
 )
 from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_of
-from onboard.core.own_number import OwnNumber
-from onboard.core.presence import Presence
 from onboard.core.records import BootRecord
 from onboard.core.recovery_messages import Go, Halted, Regeneration
-from onboard.core.regeneration import Regenerating
-from onboard.core.rights import Rights
 from onboard.core.site import Machine, Site
-from onboard.core.taking_part import TakingPart
-from onboard.core.timekeeper import Heard, Timekeeper
-from onboard.core.witness import Doubt, Witness
+from onboard.holon.admission import Admission
+from onboard.holon.drops import ToldDrops
+from onboard.holon.holding import Hold, Holding
+from onboard.holon.holds import Holds, without_rights
+from onboard.holon.own_number import OwnNumber
+from onboard.holon.presence import Presence
+from onboard.holon.regeneration import Regenerating
+from onboard.holon.rights import Rights
+from onboard.holon.taking_part import TakingPart
+from onboard.holon.timekeeper import Heard, Timekeeper
+from onboard.holon.witness import Doubt, Witness
 
 #: Most effects that one event may cause before the holon counts as running away.
 MAX_ROUNDS = 100

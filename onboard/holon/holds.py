@@ -1,4 +1,4 @@
-"""What a machine says and does about its holds (core/holding.py): words, journal, and the way back."""
+"""What a machine says and does about its holds (holon/holding.py): words, journal, and the way back."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from onboard.core.codes import Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.holding import Hold, Holding, Outcome
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.messages import (
     Award,
@@ -22,10 +21,11 @@ from onboard.core.messages import (
     TokenHeld,
     TokenRequest,
 )
-from onboard.core.own_number import OwnNumber
-from onboard.core.presence import Presence
 from onboard.core.records import BootRecord
 from onboard.core.recovery_messages import Go, Halted, TokenDispute, TokenGiven
+from onboard.holon.holding import Hold, Holding, Outcome
+from onboard.holon.own_number import OwnNumber
+from onboard.holon.presence import Presence
 
 #: Words that make a contract, or claim or move a right: not those of a machine whose journal is not to be relied on.
 #: That they are missing is for all others as if they were lost on the bus, which they bear.

@@ -21,7 +21,7 @@ from onboard.core.messages import (
     TokenRequest,
 )
 from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
-from onboard.core.witness import Witness
+from onboard.holon.witness import Witness
 
 #: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
 ASK_AGAIN_US = 1_000_000

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 from onboard.core.codes import MachineState, Reason
-from onboard.core.holding import Holding
 from onboard.core.messages import Heartbeat
-from onboard.core.presence import Presence
-from onboard.core.regeneration import Regenerating
-from onboard.core.timekeeper import Timekeeper
-from onboard.core.witness import Witness
+from onboard.holon.holding import Holding
+from onboard.holon.presence import Presence
+from onboard.holon.regeneration import Regenerating
+from onboard.holon.timekeeper import Timekeeper
+from onboard.holon.witness import Witness
 
 #: States of machines that do not bid.
 _NO_BIDDERS = (MachineState.OBSTACLE, MachineState.STOPPED, MachineState.STARTING)
