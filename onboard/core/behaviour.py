@@ -12,9 +12,10 @@ from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect
 from onboard.core.journal_records import Entry
-from onboard.core.messages import CallForProposals, Message
+from onboard.core.messages import Message
 from onboard.core.mirror import Mirror
-from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
+from onboard.core.motion_authority import MotionAuthority
+from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent
 from onboard.core.negotiation.winners import Winners
 from onboard.core.petitions import Petitions
 from onboard.core.site import Machine, Segment, Site
@@ -36,6 +37,8 @@ class Fleet:
     #: Input that came to nothing, by reason: the holon's own count.
     drops: Counter[Reason] = field(default_factory=Counter)
     petitions: Petitions = field(init=False)
+    #: What permits motion.
+    motion: MotionAuthority = field(init=False)
     #: Who has this machine's tasks in hand, and whether it is at work.
     winners: Winners = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
@@ -49,6 +52,7 @@ class Fleet:
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)
+        self.motion = MotionAuthority(self.tokens)
         self.winners = Winners(self.node_id, self.negotiation, self.mirror.aside)
         self.mirror.joins(self.tokens, self.drops)
 
@@ -115,61 +119,3 @@ class BehaviourFactory(Protocol):
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """The machine's steps."""
-
-
-class NoEstimator:
-    """The task-generation function of a machine that bids for nothing: a desk, a host of node agents."""
-
-    def floor(self, call: CallForProposals, now_us: int) -> int:
-        """Asked for in vain: whoever has no lower bound has no floor either."""
-        return 0
-
-    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
-        """None: it can do nothing."""
-        return None
-
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """None: it can do nothing."""
-        return None
-
-
-@dataclass
-class Plain:
-    """A behaviour that does nothing by itself: a kind built on it writes only what its machine does."""
-
-    fleet: Fleet
-    kind: KindCode = KindCode.ANY
-    state: MachineState = MachineState.IDLE
-    itinerary_version: int = 0
-
-    def start(self, now_us: int) -> list[Effect]:
-        """Nothing to silence, nothing to ask."""
-        return []
-
-    def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """No devices."""
-        return []
-
-    def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """Nothing beyond what tokens, mirror and negotiation have heard."""
-        return []
-
-    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
-        """Whatever is won, nothing is done for it."""
-        return []
-
-    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
-        """Nothing that it holds is used."""
-        return Reason.NONE
-
-    def advance(self, now_us: int) -> list[Effect]:
-        """Nothing is ever due."""
-        return []
-
-    def next_wake(self) -> int | None:
-        """Never."""
-        return None
-
-    def statements(self, now_us: int) -> list[Effect]:
-        """Nothing to vouch for."""
-        return []

@@ -3,7 +3,9 @@
 A *segment* is what one body fills, a *station* what stands beside one: resources with numbers, each with its token.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from typing import ClassVar, NamedTuple
 
 from onboard.core.codes import KindCode, Side
@@ -79,6 +81,14 @@ class Timing:
     sub_call_percent: int = 50
 
 
+class Needs(Enum):
+    """What an order by which something moves needs beside a machine that stands in nobody's way."""
+
+    RIGHT = "each needs a right: what it moves in is shared with others"
+    PLACE = "some need a right, by where they move: there is open ground, or a part that nobody else comes to"
+    ALONE = "none: it moves within the machine only"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Site:
     """Everything a machine knows beforehand, of any system. Built and checked by ``onboard.config``; frozen thereafter.
@@ -97,6 +107,8 @@ class Site:
     #: Names of the fields that say what comes to the site in a run of the simulator. No machine knows them, so they are
     #: not in the digest.
     demand: ClassVar[frozenset[str]] = frozenset()
+    #: The messages of the device bus by which something moves: no other does, and these only as ``authorised`` lets.
+    moved_by: ClassVar[Mapping[str, Needs]] = {}
 
     name: str
     digest: int
@@ -104,6 +116,8 @@ class Site:
     machines: dict[int, Machine]
     timing: Timing
     stewards: dict[int, int] = field(default_factory=dict)
+    #: IANA name of the site's local time, for people who look at it; empty where the file has none. Not in the digest.
+    time_zone: str = ""
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from onboard.config.site import parse_site
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
 from onboard.core.effects import Effect, Halt, Record, Send
 from onboard.core.messages import (
@@ -32,6 +32,7 @@ from onboard.systems.car_park.travel import ORDER_PATIENCE_US
 from onboard.systems.registry import factory_for
 from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.mirror import WayFleet, way_fleet
+from onboard.work.plain import NoEstimator
 
 STEP_US = 20_000
 #: A walker needs this long for a segment.

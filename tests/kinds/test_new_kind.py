@@ -9,10 +9,12 @@ from typing import Any, ClassVar
 
 import pytest
 
-from bus_sim.run import BusRun, RunOptions, buses_of
+from bus_sim.devices.timers import LoopTimers
+from bus_sim.options import RunOptions
+from bus_sim.run import BusRun, buses_of
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator, Plain
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import Criterion, KindCode, Operation, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import NO_REFERENCE, Award, Bid, Message, Reference, TaskReport
@@ -21,6 +23,7 @@ from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.registry import add_system, remove_system
 from onboard.systems.system import System
+from onboard.work.plain import NoEstimator, Plain
 
 PAGE = Path(__file__).parents[2] / "docs" / "new-kind.md"
 DESK, OLD, NEW = 1, 21, 22
@@ -60,6 +63,9 @@ class DeskFactory(BehaviourFactory):
 
 
 class NoPlant:
+    def __init__(self) -> None:
+        self.timers = LoopTimers(asyncio.get_running_loop())
+
     def start(self) -> None:
         """Nothing outside the controllers."""
 
@@ -92,7 +98,7 @@ def test_p22_the_machine_of_the_tutorial_works_as_it_is_written(shop: Shop) -> N
     loop = VirtualTimeLoop()
 
     async def play() -> None:
-        run = BusRun(shop, RunOptions(), loop, *buses_of(shop, RunOptions(), loop), NoPlant())
+        run = BusRun(shop, RunOptions(), loop, *buses_of(shop, (), loop), NoPlant())
         run.observers.append(lambda message, time_us: said.append((time_us, message)))
         run.start()
         await asyncio.sleep(120)

@@ -1,10 +1,11 @@
 """What a robotized car park has beyond any other site: cars, shuttles, and when lifts are asked for."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from onboard.core.site import Site
+from onboard.core.site import Needs, Site
 from onboard.ways.site import Axis, WaySite
 from onboard.work.timing import DeviceTiming
 
@@ -36,6 +37,11 @@ class CarPark(WaySite):
 
     system: ClassVar[str] = "car-park"
     has_regeneration: ClassVar[bool] = True
+    moved_by: ClassVar[Mapping[str, Needs]] = {
+        "DriveOrder": Needs.RIGHT,
+        "ShuttleOrder": Needs.RIGHT,
+        "DoorOrder": Needs.PLACE,
+    }
 
     timing: DeviceTiming
     shuttle: Axis

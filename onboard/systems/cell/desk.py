@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
@@ -26,6 +26,7 @@ from onboard.systems.cell.messages import ArmProgress, OrderAnswer, OrderFrom, O
 from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderState, WorkOrder
+from onboard.work.plain import NoEstimator
 
 
 @dataclass

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
-from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import NOBODY, KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
@@ -14,12 +14,12 @@ from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Site
 from onboard.systems.graph.errands import TRANSPORT_STOPS
 from onboard.systems.graph.messages import (
+    OrderResult,
     RobotAt,
     RobotMode,
     VisitAnswer,
     VisitKey,
     VisitList,
-    VisitResult,
     five,
     stops_of,
 )
@@ -28,6 +28,7 @@ from onboard.systems.graph.records import VisitRecord
 from onboard.systems.graph.site import FactoryGraph
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderEvent, OrderState, WorkOrder
+from onboard.work.plain import NoEstimator
 
 #: An order by name is said again after this while its robot is not heard, us. Ours.
 LIST_AGAIN_US = 1_000_000
@@ -160,4 +161,4 @@ class VisitDesk(OrderDesk[Visits]):
         """How it stands, and who has it; nothing at the counter for one that came from outside."""
         if order.task.origin != self.fleet.node_id:
             return None
-        return VisitAnswer(self.fleet.node_id, order.task.number, VisitResult[order.told], order.winner)
+        return VisitAnswer(self.fleet.node_id, order.task.number, OrderResult[order.told], order.winner)

@@ -1,15 +1,14 @@
 """For imports that are not rewritten yet: ``onboard.contract.mapd``."""
 
+from onboard.contract.codes import OrderResult
 from onboard.contract.mapd import (
     CartAction,
     PathHead,
     PathMoves,
-    StepAward,
     StepRound,
     StepState,
-    TransportBid,
-    TransportCall,
-    TransportResult,
+    StepTurn,
+    TurnRequest,
 )
 from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
 from onboard.systems.mapd.fields import LAST_STEP, MOST_MOVES, MOST_WAYS, MOVE_BITS, MOVES_A_FRAME, NO_TASK
@@ -24,14 +23,13 @@ __all__ = [
     "CartAction",
     "CartOrder",
     "CartState",
+    "OrderResult",
     "PathHead",
     "PathMoves",
-    "StepAward",
     "StepRound",
     "StepState",
+    "StepTurn",
     "TransportAnswer",
-    "TransportBid",
-    "TransportCall",
     "TransportKey",
-    "TransportResult",
+    "TurnRequest",
 ]

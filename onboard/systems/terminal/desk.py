@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import (
     CallResult,
     Criterion,
@@ -20,7 +20,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
+from onboard.core.effects import Effect, Halt, Record, Report, Send, Tell
 from onboard.core.messages import (
     CallForProposals,
     CarAt,
@@ -56,6 +56,7 @@ from onboard.systems.terminal.vehicle import terminal
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
 from onboard.work.order_life import OrderEvent
+from onboard.work.plain import NoEstimator
 
 #: After a refusal, and while no robot is about to be free, the desk looks again after this, us. Ours.
 LOOK_US = 5_000_000
@@ -258,8 +259,8 @@ class Desk:
         order = self.orders.key(key)
         is_taken = self.orders.answer(key)
         if order is None:
-            return [] if is_taken is None else [Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
-        taken = Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True))
+            return [] if is_taken is None else [Tell(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
+        taken = Tell(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True))
         return [*self._ranked(order.urgent, now_us), taken]
 
     def _ordered(self, wanted: BoxOrder, now_us: int) -> list[Effect]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from onboard.core.behaviour import BehaviourFactory, Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode
 from onboard.core.effects import Effect
 from onboard.core.journal_records import records_in
@@ -18,13 +18,14 @@ from onboard.systems.turning.messages import (
     BillBar,
     JobAnswer,
     JobEntry,
-    JobResult,
     LathePhase,
     LatheProgress,
+    OrderResult,
 )
 from onboard.systems.turning.records import JobOrderRecord, JobOrderStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import WorkOrder
+from onboard.work.plain import NoEstimator
 
 
 @dataclass
@@ -132,5 +133,5 @@ class JobDesk(OrderDesk[Order]):
 
     def answer(self, order: Order) -> Message:
         """With the lathe and its price."""
-        number, result = order.task.number, JobResult[order.told]
+        number, result = order.task.number, OrderResult[order.told]
         return JobAnswer(self.fleet.node_id, number, result, order.winner, order.total_ct)
