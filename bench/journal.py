@@ -21,14 +21,14 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.authority import car_token
 from onboard.core.codes import TokenKind
-from onboard.core.holon import Holon
 from onboard.core.site import Site, journal_owner
+from onboard.holon.holon import Holon
 from onboard.io.journal import GROWTH, LEAST_BYTES, FileJournal
 from onboard.io.sealed import begin
 from onboard.ports.journal import Entry
 from onboard.systems.registry import compaction_for, factory_for
+from onboard.ways.tokens import car_token
 
 #: Arrivals and stays of the run that is repeated, s.
 MEAN_S, SIGMA_S, STAY_S = 110.0, 30.0, 150.0
@@ -56,21 +56,21 @@ def repeated(entries: list[Entry], times: int, step: int) -> Iterator[Entry]:
     cars = {(int(one["car_origin"]), int(one["car"])) for one in entries if "car" in one and "car_origin" in one}
     tokens = (int(one["number"]) for one in entries if one.get("kind") == TokenKind.CAR)
     cars |= {(number >> 16, number & 0xFFFF) for number in tokens}
-    cars -= {(int(one["car_origin"]), int(one["car"])) for one in entries if one["record"] == "car_left"}
+    cars -= {(int(one["load_origin"]), int(one["load"])) for one in entries if one["record"] == "retired"}
     for again in range(times):
         by = again * step
         yield from (_shifted(entry, by) for entry in entries)
         for origin, number in sorted(cars):
             key = car_token(origin, number + by)
-            left: Entry = {"record": "car_left", "kind": int(key.kind), "number": key.number, "car_origin": origin}
-            yield {**left, "car": number + by}
+            left: Entry = {"record": "retired", "kind": int(key.kind), "number": key.number, "load_origin": origin}
+            yield {**left, "load": number + by}
 
 
 def _shifted(entry: Entry, by: int) -> Entry:
     fields = dict(entry)
     if entry.get("kind") == TokenKind.CAR or entry["record"] == "number":
         fields["number"] = int(entry["number"]) + by
-    for name in ("car", "task"):
+    for name in ("car", "load", "task"):
         if name in entry:
             fields[name] = int(entry[name]) + by
     return fields

@@ -25,11 +25,12 @@ from typing import Any, NamedTuple
 
 from planning import MAX_EXPANSIONS, Fleet, park
 
-from onboard.core.site import Axis, Segment, Site, TrackKind
+from onboard.core.site import Segment, Site
 from onboard.ways.departures import Departures
 from onboard.ways.reservations import Interval
 from onboard.ways.roads import Roads, roads_of
 from onboard.ways.sipp import Route, Visit, plan_route
+from onboard.ways.site import Axis, TrackKind
 
 TICK_US = 400_000
 #: So long that rounding to mm, and a body shorter than a place by a trifle, are less than a millisecond in a tick.

@@ -20,10 +20,10 @@ from onboard.controller.shell import Controller, Ports
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
 from onboard.core.frame import Frame
-from onboard.core.holon import Holon
 from onboard.core.messages import Message
 from onboard.core.records import next_boot
 from onboard.core.site import Machine, Site, journal_owner
+from onboard.holon.holon import Holon
 from onboard.ports.bus import Bus
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import compaction_for, condition_for, factory_for

@@ -10,9 +10,9 @@ from hil.cable import Cable
 from hil.short_circuit import ShortCircuit
 from onboard.config.site import parse_site
 from onboard.controller.shell import Controller, Ports
-from onboard.core.holon import Holon
 from onboard.core.records import next_boot
 from onboard.core.site import Machine
+from onboard.holon.holon import Holon
 from onboard.ports.bus import BusHealth
 from onboard.systems.registry import condition_for, factory_for
 

@@ -13,11 +13,11 @@ from onboard.config.arguments import Parser
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
-from onboard.core.holon import Holon
 from onboard.core.records import next_boot
 from onboard.core.site import journal_owner
 from onboard.gateway.options import add_mqtt_arguments
 from onboard.gateway.settings import GatewayError
+from onboard.holon.holon import Holon
 from onboard.io.broker_address import is_mqtt_installed
 from onboard.io.console import ConsoleTelemetry, ManyTelemetry
 from onboard.io.endings import Ending

@@ -1,7 +1,7 @@
 """Sites for tests, as TOML text."""
 
 from onboard.config.site import parse_site
-from onboard.core.site import Site
+from onboard.systems.car_park.site import CarPark, car_park
 
 ONE_FLOOR = """
 [site]
@@ -16,7 +16,7 @@ at = "p(1,4)"
 """
 
 
-def one_floor(robots: int = 1, positions: int = 12, extra: str = "") -> Site:
+def one_floor(robots: int = 1, positions: int = 12, extra: str = "") -> CarPark:
     """One alley, a compartment at p(1,4), robots MR1.. on nodes 11.. at the highest positions, one apart.
 
     Several robots on one alley are more than the loader takes by itself.
@@ -24,4 +24,4 @@ def one_floor(robots: int = 1, positions: int = 12, extra: str = "") -> Site:
     text = ONE_FLOOR.format(positions=positions)
     for number in range(1, robots + 1):
         text += f'[[robots]]\nname = "MR{number}"\nnode = {10 + number}\nhome = "p(1,{positions + 1 - number})"\n'
-    return parse_site(text + extra, "test.toml", crowded=True)
+    return car_park(parse_site(text + extra, "test.toml", crowded=True))

@@ -24,9 +24,9 @@ from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.controller.shell import Controller, Ports
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame
-from onboard.core.holon import Holon
 from onboard.core.records import next_boot
 from onboard.core.site import Machine, Site
+from onboard.holon.holon import Holon
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import factory_for

@@ -11,8 +11,8 @@ from bus_sim.journal import SimulatedJournal
 from bus_sim.run import BusRun, NoWatchdog
 from onboard.controller.shell import Controller, Ports
 from onboard.core.frame import Frame
-from onboard.core.holon import Holon
 from onboard.core.site import Site
+from onboard.holon.holon import Holon
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
 
 #: The lowest byte of an identifier is the sender's node-ID.

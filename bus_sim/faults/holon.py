@@ -3,8 +3,8 @@
 import math
 
 from onboard.core.effects import Effect
-from onboard.core.holon import Holon
 from onboard.core.messages import Message
+from onboard.holon.holon import Holon
 
 #: Messages that wait for a process that stands still; beyond that the oldest stay and the newest are lost, as in the
 #: receive buffer of a socket (Linux' default holds some hundred CAN frames). Ours.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet, Plain
+from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.codes import KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CallForProposals, Message, TaskReport
@@ -16,6 +16,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, Awarded, Estimator, Needs, NegotiationEvent, Proposal
 from onboard.core.site import Machine, Site
 from onboard.systems.registry import factory_for
+from onboard.work.plain import Plain
 
 
 class Stranger(Enum):
@@ -95,12 +96,15 @@ class _Standing(Plain):
 
 
 @dataclass
-class _Factory:
+class _Factory(BehaviourFactory):
     """Makes machines of one kind, one of which is the stranger."""
 
     target: int
     how: Stranger
     honest: BehaviourFactory
+
+    def __post_init__(self) -> None:
+        self.fleet_type = self.honest.fleet_type
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """What it bids."""

@@ -28,7 +28,8 @@ from onboard.core.messages import (
     TaskReport,
     TokenHeld,
 )
-from onboard.core.site import Machine, TrackKind
+from onboard.core.site import Machine
+from onboard.ways.site import TrackKind, way_site
 
 #: From power to taking part, s. Ours; a board may boot for a while.
 JOIN_S = 60.0
@@ -150,7 +151,7 @@ def _tell_plan_through(stage: Stage, other: Machine, own: Heartbeat) -> None:
     """
     home, mine, node = other.home, stage.machine.home, other.node_id
     now_ms = stage.bus_time_ms()
-    lift = next(one.number for one in stage.site.tracks.values() if one.kind is TrackKind.LIFT)
+    lift = next(one.number for one in way_site(stage.site).tracks.values() if one.kind is TrackKind.LIFT)
     steps = (
         (LegAction.TRAVEL, home.track, home.index, 0),
         (LegAction.RIDE, lift, home.track, mine.track),

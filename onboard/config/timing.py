@@ -2,7 +2,7 @@
 
 from onboard.config.reader import Table
 from onboard.core.negotiation.bidding import slot_length_us
-from onboard.core.site import Timing
+from onboard.work.timing import DeviceTiming
 
 #: Longest classic frame with 29-bit identifier and 8 data bytes, bits (Davis, Burns, Bril and Lukkien 2007).
 WORST_FRAME_BITS = 160
@@ -10,7 +10,7 @@ WORST_FRAME_BITS = 160
 _SHORTEST_DELAY_MS = 300
 
 
-def read_timing(table: Table, robots: int, machines: int, bitrate: int) -> Timing:
+def read_timing(table: Table, robots: int, machines: int, bitrate: int) -> DeviceTiming:
     """``[timing]``, written in ms.
 
     The bidding delay W (design, section 4) is at least 3 N times the bus latency, N the robots and the latency that
@@ -35,7 +35,7 @@ def read_timing(table: Table, robots: int, machines: int, bitrate: int) -> Timin
             f"call_window_ms {window_ms}"
         )
         table.bad(name, table.values.get(name), what, f"write call_window_ms = {needed_ms + 1} or more")
-    return Timing(
+    return DeviceTiming(
         window_ms * 1000,
         delay_ms * 1000,
         half_ms * 1000,
@@ -45,7 +45,7 @@ def read_timing(table: Table, robots: int, machines: int, bitrate: int) -> Timin
         table.integer("token_repeat_ms", 10, 10_000, 200) * 1000,
         table.integer("heartbeat_ms", 100, 60_000, 2_000) * 1000,
         table.integer("bus_time_ms", 100, 60_000, 5_000) * 1000,
-        table.integer("door_ms", 100, 60_000, 3_000) * 1000,
-        table.integer("grip_ms", 100, 60_000, 2_000) * 1000,
         table.integer("drive_refresh_ms", 10, 450, 200) * 1000,
+        door_us=table.integer("door_ms", 100, 60_000, 3_000) * 1000,
+        grip_us=table.integer("grip_ms", 100, 60_000, 2_000) * 1000,
     )

@@ -14,7 +14,7 @@ from onboard.controller.rest import Rest
 from onboard.core.codes import MachineState, Reason
 from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, Send, Tell
 from onboard.core.frame import Frame
-from onboard.core.holon import Holon
+from onboard.holon.holon import Holon
 from onboard.ports.bus import Bus
 from onboard.ports.journal import Compaction, Journal
 from onboard.ports.telemetry import Telemetry

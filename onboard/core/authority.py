@@ -17,16 +17,15 @@ from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
-from onboard.core.records import CarLeftRecord, TokenGivenRecord, TokenGoneRecord, TokenHeldRecord, TokenRecord
+from onboard.core.records import RetiredRecord, TokenGivenRecord, TokenGoneRecord, TokenHeldRecord, TokenRecord
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Site
-from onboard.core.token_keys import TokenKey, car_token, genesis_holder, may_exist, segment_token, station_token
+from onboard.core.token_keys import TokenKey, genesis_holder, may_exist, segment_token, station_token
 
 __all__ = [
     "Claim",
     "TokenBook",
     "TokenKey",
-    "car_token",
     "genesis_holder",
     "may_exist",
     "segment_token",
@@ -122,8 +121,8 @@ class TokenBook:
 
     def replay(self, entries: Iterable[Entry]) -> None:
         """Restore holdings from the journal, oldest entry first; entries of other record types are passed over."""
-        for record in records_in(entries, CarLeftRecord, TokenHeldRecord, TokenGivenRecord, TokenGoneRecord):
-            if isinstance(record, CarLeftRecord):
+        for record in records_in(entries, RetiredRecord, TokenHeldRecord, TokenGivenRecord, TokenGoneRecord):
+            if isinstance(record, RetiredRecord):
                 self.retire(TokenKey(record.kind, record.number))
             if not isinstance(record, TokenRecord):
                 continue
@@ -174,14 +173,14 @@ class TokenBook:
         self.changes += 1
 
     def create(self, key: TokenKey) -> list[Effect]:
-        """Bring a new token (of a car) into the world, held by this node. Raises ``ValueError`` where it exists."""
+        """Bring a new token into the world, held by this node. Raises ``ValueError`` where it exists."""
         if self.is_known(key):
             raise ValueError(f"token {key} exists already")
         self._hold(key, 1)
         return [_record(TokenHeldRecord, key, 1, self.node_id)]
 
     def retire(self, key: TokenKey) -> bool:
-        """Forget the token of a car that left so long ago that no frame about it can still be under way; True if so.
+        """Forget the token of what ended so long ago that no frame about it can still be under way; True if so.
 
         Its number comes again after 65,535 others; what was never retired is remembered for good.
         """

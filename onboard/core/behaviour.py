@@ -6,25 +6,27 @@ The core knows tasks, segments, windows, bids and tokens; a kind knows what its 
 
 from collections import Counter
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
-from onboard.core.authority import TokenBook, TokenKey, car_token
-from onboard.core.codes import KindCode, MachineState, Reason, TokenKind
-from onboard.core.effects import Effect, Record
+from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.codes import KindCode, MachineState, Reason
+from onboard.core.effects import Effect
 from onboard.core.journal_records import Entry
-from onboard.core.messages import CallForProposals, CarAt, Message, Reference
+from onboard.core.messages import Message
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import MotionAuthority
-from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
+from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent
 from onboard.core.negotiation.winners import Winners
 from onboard.core.petitions import Petitions
-from onboard.core.records import CarLeftRecord
 from onboard.core.site import Machine, Segment, Site
 
 
 @dataclass
 class Fleet:
     """What the core lends to a behaviour of the same node; ``entries`` are the journal's, oldest first."""
+
+    #: What this machine believes of the others: more than the core's, where a system's own fleet says so.
+    mirror_type: ClassVar[type[Mirror]] = Mirror
 
     site: Site
     machine: Machine
@@ -45,26 +47,14 @@ class Fleet:
     slots_told: tuple[Segment, ...] = ()
     #: Whether nobody knows this machine's rights, and so not where it is.
     has_no_rights: bool = False
-    #: Where cars stand whose custody came to this machine so.
-    cars_told: dict[Reference, CarAt] = field(default_factory=dict)
     #: Machines whose rights were made anew: of what was promised to them before they know nothing.
     forgetful: set[int] = field(default_factory=set)
-    _left: list[Reference] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)
         self.motion = MotionAuthority(self.tokens)
-        self.winners = Winners(self.node_id, self.negotiation, self.mirror.obstacles.machines)
-        self.mirror.on_forgotten.append(self._retire)
-
-    def _retire(self, car: Reference) -> None:
-        if self.tokens.retire(car_token(*car)):
-            self._left.append(car)
-
-    def forgotten(self) -> list[Effect]:
-        """Cars that left long ago, for the journal: what it has of them may go."""
-        left, self._left = self._left, []
-        return [Record(CarLeftRecord(TokenKind.CAR, car_token(*car).number, car)) for car in left]
+        self.winners = Winners(self.node_id, self.negotiation, self.mirror.aside)
+        self.mirror.joins(self.tokens, self.drops)
 
     @property
     def node_id(self) -> int:
@@ -107,7 +97,7 @@ class Behaviour(Protocol):
         """When ``advance`` should be called next if nothing else happens."""
 
     def statements(self, now_us: int) -> list[Effect]:
-        """Say again what this node vouches for: its itinerary and the cars in its custody."""
+        """Say again what this node vouches for: its itinerary, and what is in its custody."""
 
 
 @runtime_checkable
@@ -121,66 +111,11 @@ class Attentive(Protocol):
 class BehaviourFactory(Protocol):
     """Makes the behaviour of one kind; ``estimator`` is what the negotiation asks for bids."""
 
+    #: What the core lends to it: more than the core's own where its system keeps more in its mirror.
+    fleet_type: type[Fleet] = Fleet
+
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """The task-generation function of a machine of this kind."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """What one machine does from power-up on; ``estimator`` is the one that this factory made for it."""
-
-
-class NoEstimator:
-    """The task-generation function of a machine that bids for nothing: a desk, a host of node agents."""
-
-    def floor(self, call: CallForProposals, now_us: int) -> int:
-        """Asked for in vain: whoever has no lower bound has no floor either."""
-        return 0
-
-    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
-        """None: it can do nothing."""
-        return None
-
-    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
-        """None: it can do nothing."""
-        return None
-
-
-@dataclass
-class Plain:
-    """A behaviour that does nothing by itself: a kind built on it writes only what its machine does."""
-
-    fleet: Fleet
-    kind: KindCode = KindCode.ANY
-    state: MachineState = MachineState.IDLE
-    itinerary_version: int = 0
-
-    def start(self, now_us: int) -> list[Effect]:
-        """Nothing to silence, nothing to ask."""
-        return []
-
-    def sense(self, message: Message, now_us: int) -> list[Effect]:
-        """Whatever its device bus says changes nothing."""
-        return []
-
-    def hear(self, message: Message, now_us: int) -> list[Effect]:
-        """Nothing beyond what tokens, mirror and negotiation have heard."""
-        return []
-
-    def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
-        """Whatever is won, nothing is done for it."""
-        return []
-
-    def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
-        """Nothing that it holds is used."""
-        return Reason.NONE
-
-    def advance(self, now_us: int) -> list[Effect]:
-        """Nothing is ever due by itself."""
-        return []
-
-    def next_wake(self) -> int | None:
-        """None: it waits for no moment in time."""
-        return None
-
-    def statements(self, now_us: int) -> list[Effect]:
-        """It has no itinerary and keeps no cars, so there is nothing to say again."""
-        return []

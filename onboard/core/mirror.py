@@ -1,27 +1,25 @@
 """The mirror: what this machine believes of the others, built from bus traffic alone (row P35).
 
-A wrong mirror costs time, never safety: what moves is guarded by tokens.
+The core keeps versions: who lives, what each last planned, where it last was, and who is in the way. What a plan
+occupies, and what else is believed of the site's things, a system's own mirror adds (``onboard.ways``). A wrong mirror
+costs time, never safety: what moves is guarded by tokens.
 """
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any, ClassVar, NamedTuple
 
-from onboard.core.codes import ANY_STATION, MOBILE_KINDS, OUTSIDE, Grade, KindCode, MachineState, Reason
-from onboard.core.messages import Blocked, CarAt, Clear, Heartbeat, Itinerary, Progress, Reference
-from onboard.core.serial import is_newer, reread_us
-from onboard.core.site import Segment, Site, Station
-from onboard.ways.lift_uses import standing_after
-from onboard.ways.lifts import lift_tracks
-from onboard.ways.obstacles import Obstacles
-from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, turned_in
-from onboard.ways.passing import Plan, next_plan
-from onboard.ways.passing_order import PassingOrder
-from onboard.ways.reservations import Reservations
+from onboard.core.authority import TokenBook
+from onboard.core.codes import NOBODY, Grade, KindCode, MachineState, Reason
+from onboard.core.effects import Effect
+from onboard.core.messages import Heartbeat, Itinerary, Message, Progress
+from onboard.core.serial import is_newer
+from onboard.core.site import Machine, Segment, Site
+from onboard.core.token_keys import TokenKey
 
 #: Heartbeats missed before a node counts as silent.
 MISSED_HEARTBEATS = 3
-#: Cars that have left and are still remembered; bounds the memory of a machine that runs for years.
-MAX_GONE_CARS = 64
 
 
 @dataclass
@@ -41,14 +39,12 @@ class Peer:
     beat: Heartbeat | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class CarRecord:
-    """Where a car stands, who vouches for it, under which version of its token, and its wheelbase in mm."""
+class Obstacle(NamedTuple):
+    """One machine in the way: its slots, since when (bus us) and why."""
 
-    station: int
-    custodian: int
-    version: int
-    wheelbase_mm: int
+    slots: frozenset[Segment]
+    since_us: int
+    reason: Reason
 
 
 def _crc16(values: list[int]) -> int:
@@ -64,29 +60,23 @@ def _crc16(values: list[int]) -> int:
 
 @dataclass
 class Mirror:
-    """Everybody's itineraries by version, cars by custodian, and who is alive."""
+    """Everybody's itineraries by version, who is alive, and who is in the way."""
+
+    #: Messages that only who has its rights may say, beside those of the core.
+    vouching: ClassVar[tuple[type[Message], ...]] = ()
 
     site: Site
     node_id: int
     peers: dict[int, Peer] = field(default_factory=dict)
     itineraries: dict[int, Itinerary] = field(default_factory=dict)
-    #: The same with when their first legs began, and what each replaced: the order of passing comes from there.
-    plans: dict[int, Plan] = field(default_factory=dict)
-    replaced: dict[int, Plan] = field(default_factory=dict)
-    cars: dict[Reference, CarRecord] = field(default_factory=dict)
     progress: dict[int, Progress] = field(default_factory=dict)
+    #: Machines that do not follow their plans.
+    aside: dict[int, Obstacle] = field(default_factory=dict)
     #: Boot counter of each node's life before the present one, 0 where I knew of none.
     boots_before: dict[int, int] = field(default_factory=dict)
-    reservations: Reservations = field(default_factory=Reservations)
-    order: PassingOrder = field(init=False)
-    obstacles: Obstacles = field(init=False)
-    #: Who wants to know that a car which left long ago is remembered no longer.
-    on_forgotten: list[Callable[[Reference], object]] = field(default_factory=list)
+    #: Whether all stand, as rights are made anew.
+    is_frozen: Callable[[], bool] = bool
     _digest: int | None = None
-
-    def __post_init__(self) -> None:
-        self.order = PassingOrder(self.site)
-        self.obstacles = Obstacles(self.site, lambda: self.reservations)
 
     def on_heartbeat(self, beat: Heartbeat, now_us: int) -> bool:
         """Note a sign of life; True where the sender is new or was restarted, so that its statements are wanted."""
@@ -97,7 +87,7 @@ class Mirror:
             return False
         fresh = known is None or known.boot != beat.boot or starts
         if fresh:
-            self._drop_itinerary(beat.sender)
+            self._forget_plan(beat.sender)
             self.boots_before[beat.sender] = known.boot if known is not None else 0
         since_us = now_us if known is None or fresh else known.since_us
         self.peers[beat.sender] = Peer(
@@ -116,6 +106,10 @@ class Mirror:
     def _has_just_come(self, peer: Peer, now_us: int) -> bool:
         return now_us - peer.since_us < self.site.timing.heartbeat_us // 2
 
+    def _forget_plan(self, node: int) -> None:
+        if self.itineraries.pop(node, None) is not None:
+            self._digest = None
+
     def on_itinerary(self, itinerary: Itinerary, now_us: int) -> bool:
         """Take up a firm itinerary by version; True where it was news. Tentative ones are hints and not kept here."""
         if itinerary.grade is Grade.TENTATIVE:
@@ -124,120 +118,24 @@ class Mirror:
         if known is not None and not is_newer(itinerary.version, known.version, 8):
             return False
         self.itineraries[itinerary.sender] = itinerary
-        plans = self.plans
-        if known is not None and itinerary.sender in plans:
-            self.replaced[itinerary.sender] = plans[itinerary.sender]
-        plans[itinerary.sender] = next_plan(plans.get(itinerary.sender), itinerary, now_us)
-        if itinerary.sender not in self.obstacles.machines:
-            self._count_on(plans[itinerary.sender], now_us)
         self._digest = None
         return True
-
-    def _count_on(self, plan: Plan, now_us: int) -> None:
-        """Plan around a machine's plan, and keep its place in the order of passing."""
-        itinerary = plan.itinerary
-        self.order.on_plan(plan, now_us)
-        self.reservations.release(itinerary.sender)
-        self.reservations.reserve(
-            itinerary.sender,
-            itinerary_windows(self.site, itinerary, now_us, plan.first_begin_us),
-            lift_uses(self.site, itinerary, now_us, plan.first_begin_us),
-        )
-
-    def retime(self, now_us: int) -> None:
-        """My clock was set anew: read the times of all plans again, as the nearest to ``now_us`` that they can be."""
-        self.reservations, self.order = Reservations(), PassingOrder(self.site)
-        for plans in (self.plans, self.replaced):
-            for node, plan in plans.items():
-                plans[node] = plan._replace(first_begin_us=reread_us(plan.first_begin_us, now_us))
-        for node, plan in self.plans.items():
-            if node not in self.obstacles.machines:
-                self._count_on(plan, now_us)
-        for progress in self.progress.values():
-            self.order.on_progress(progress)
-        self.obstacles.retime(now_us)
-
-    def on_word(self, word: Blocked | Clear, now_us: int) -> bool:
-        """Take up that a segment is blocked, or clear again; True where it is news."""
-        self._digest = None
-        return self.obstacles.hear(word, now_us)
-
-    def set_aside(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> None:
-        """A machine does not follow its plan: it is an obstacle at ``slots`` and passes nothing."""
-        if self.obstacles.take_up(node, slots, reason, now_us):
-            self.order.drop(node)
-
-    def admit(self, node: int, now_us: int) -> None:
-        """A machine that was an obstacle takes part: its plan counts, if it has told one."""
-        if self.obstacles.let_go(node) and node in self.plans:
-            self._count_on(self.plans[node], now_us)
 
     def on_progress(self, progress: Progress) -> None:
         """Last known position of a machine, my own included."""
         self.progress[progress.sender] = progress
-        self.order.on_progress(progress)
 
-    def on_car(self, statement: CarAt) -> bool:
-        """Take up a custodian's statement; True where it changed anything."""
-        known = self.cars.get(statement.car)
-        record = CarRecord(statement.station, statement.sender, statement.version, statement.wheelbase_mm)
-        if known == record:
+    def set_aside(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> bool:
+        """A machine does not follow its plan: it is an obstacle at ``slots``; True where that was not known so."""
+        known = self.aside.get(node)
+        if known is not None and (known.slots, known.reason) == (slots, reason):
             return False
-        if known is not None and not is_newer(statement.version, known.version, 16):
-            # One version of a car's token has one custodian: whoever else speaks under it is wrong.
-            again = statement.version == known.version and statement.sender == known.custodian
-            if not again:
-                return False
-        self.cars[statement.car] = record
-        self._digest = None
-        self._prune_gone()
+        self.aside[node] = Obstacle(slots, now_us if known is None else known.since_us, reason)
         return True
 
-    def _prune_gone(self) -> None:
-        """Keep the last cars that left, so that a late statement about them is still known to be old."""
-        if len(self.cars) <= MAX_GONE_CARS:
-            return
-        gone = [car for car, record in self.cars.items() if record.station == OUTSIDE]
-        for car in gone[: max(0, len(gone) - MAX_GONE_CARS)]:
-            del self.cars[car]
-            for listener in self.on_forgotten:
-                listener(car)
-
-    def others_standing(self) -> list[Segment]:
-        """Where the plans of all other machines end: there they stand until they plan anew; obstacles stand now."""
-        found = [
-            final_position(self.site, itinerary)
-            for node, itinerary in sorted(self.itineraries.items())
-            if node != self.node_id and node not in self.obstacles.machines
-        ]
-        for node in sorted(self.obstacles.machines):
-            seen, machine = self.progress.get(node), self.site.machines[node]
-            if machine.kind in MOBILE_KINDS:
-                here = machine.home if seen is None else Segment(seen.track, seen.index)
-                found += [here, turned_in(self.site, here)]
-        return [position for position in found if position is not None]
-
-    def lift_floors(self, now_us: int, at_us: int) -> dict[int, int]:
-        """Where each lift (by its track) stands at ``at_us``, by its own word and the rides planned until then."""
-        standing = {}
-        uses = []
-        for track in lift_tracks(self.site):
-            seen = self.progress.get(self.site.stewards[track])
-            standing[track] = seen.index if seen is not None else 1
-            uses += self.reservations.uses(track, excluding=0)
-        return standing_after(uses, standing, now_us, at_us)
-
-    def free_places(self) -> list[Station]:
-        """Places at which no car is known to stand, in the site's order."""
-        taken = {record.station for record in self.cars.values()}
-        return [place for place in self.site.places if place.number not in taken]
-
-    def car_station(self, car: Reference) -> Station | None:
-        """Where a car stands, or None where it is unknown or aboard a machine."""
-        record = self.cars.get(car)
-        if record is None or record.station in (ANY_STATION, OUTSIDE):
-            return None
-        return Station.from_number(record.station)
+    def admit(self, node: int, now_us: int) -> bool:
+        """A machine takes part: its plan counts, if it has told one; True where it was an obstacle."""
+        return self.aside.pop(node, None) is not None
 
     def alive(self, now_us: int) -> set[int]:
         """Nodes heard within ``MISSED_HEARTBEATS`` heartbeat periods."""
@@ -245,20 +143,85 @@ class Mirror:
         return {node for node, peer in self.peers.items() if peer.heard_at_us >= limit_us}
 
     def digest(self) -> int:
-        """16 bits over firm itineraries (node, version), cars (number, station) and blocked segments."""
+        """16 bits over firm itineraries (node, version) and what else all are to believe."""
         if self._digest is None:
-            words = [node << 8 | it.version for node, it in sorted(self.itineraries.items())]
-            for car, record in sorted(self.cars.items()):
-                if record.station == OUTSIDE:
-                    continue
-                words += [car.origin << 16 | car.number, record.station]
-            words += [1 << 31 | segment.number for segment in sorted(self.obstacles.blocked)]
-            self._digest = _crc16(words)
+            plans = [node << 8 | itinerary.version for node, itinerary in sorted(self.itineraries.items())]
+            self._digest = _crc16([*plans, *self._believed()])
         return self._digest
 
-    def _drop_itinerary(self, node: int) -> None:
-        # Its body is still somewhere: the reservation stays until its first new itinerary replaces it.
-        self.plans.pop(node, None)
-        self.replaced.pop(node, None)
-        if self.itineraries.pop(node, None) is not None:
-            self._digest = None
+    # --- what a system's own mirror adds ------------------------------------------------------------------------
+
+    def _believed(self) -> list[int]:
+        """More words for the digest, 32 bits each."""
+        return []
+
+    def joins(self, tokens: TokenBook, drops: Counter[Reason]) -> None:
+        """Whose rights decide which words count, and where those that do not are counted."""
+
+    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+        """Take up what the journal tells of the site's things."""
+
+    def handlers(self) -> dict[type[Message], Callable[[Any, int], list[Effect]]]:
+        """Handler of each message about the site's things."""
+        return {}
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """Any message, before whoever it is for takes it up."""
+
+    def settle(self, key: TokenKey) -> Message | None:
+        """A word that waited, and is proven by what was just heard of its token."""
+        return None
+
+    def statements(self) -> list[Effect]:
+        """What this machine says again of the site's things, to who asks."""
+        return []
+
+    def forgotten(self) -> list[Effect]:
+        """What of the site's things is no more, for the journal."""
+        return []
+
+    def retime(self, now_us: int) -> None:
+        """My clock was set anew: read the times of all plans again, as the nearest to ``now_us`` that they can be."""
+
+    def slots_of(self, machine: Machine, holder_of: Callable[[TokenKey], int]) -> frozenset[Segment]:
+        """Slots that a machine is in, or may enter: nobody else plans to be there while it is in the way."""
+        return frozenset()
+
+    def stands(self, node: int, now_us: int) -> bool:
+        """Whether a machine has stood for too long where its plan does not leave it."""
+        return False
+
+    def is_planless(self, machine: Machine) -> bool:
+        """Whether nobody can plan around a machine until it has told a plan."""
+        return False
+
+    def is_laden(self, node: int) -> bool:
+        """Whether a machine has something aboard that nobody can take from it."""
+        return False
+
+    def predecessor(self, node: int, key: TokenKey) -> int:
+        """Who is to have a token right before ``node``, by the plans of both."""
+        return NOBODY
+
+    def on_return(self, node: int, key: TokenKey) -> None:
+        """A machine gave a token back that it does not need any more."""
+
+    def is_false(self, message: Message) -> bool:
+        """Whether a word under my own number vouches for what I never said."""
+        return False
+
+    # --- rights that are made anew -----------------------------------------------------------------------------
+
+    def site_tokens(self) -> Iterable[TokenKey]:
+        """All tokens that the site has from the first."""
+        return ()
+
+    def recalls(self) -> None:
+        """From now on whoever remembers a thing of the lost machine speaks in its place."""
+
+    def vouched(self, node: int) -> dict[TokenKey, tuple[int, Message]]:
+        """What a machine vouches for: version of the token, and the word about it, as I remember them."""
+        return {}
+
+    def takes_over(self, keys: Collection[TokenKey]) -> None:
+        """These tokens are this machine's now: it vouches by what others remember."""

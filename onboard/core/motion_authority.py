@@ -75,7 +75,7 @@ class Permit:
         return authorised(self.motion, self.rights)
 
     def unless(self, lacks: Reason) -> "Permit":
-        """The same, but for what else is missing: a platform that nobody said is there."""
+        """The same, but for what else is missing: nobody said that what it enters is there."""
         return self if lacks is Reason.NONE or not self else replace(self, reason=lacks)
 
     def order(self, message: Message) -> list[Effect]:

@@ -32,8 +32,8 @@ class TokenRecord(JournalRecord):
     holder: int
 
     def load_number(self) -> int | None:
-        """The car that a car's token is about."""
-        return self.number if self.kind is TokenKind.CAR else None
+        """The load that its token is about, where it is neither a segment's nor a station's."""
+        return None if self.kind in (TokenKind.SEGMENT, TokenKind.STATION) else self.number
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,15 +63,15 @@ class TokenGoneRecord(TokenRecord):
 
 
 @dataclass(frozen=True, slots=True)
-class CarLeftRecord(JournalRecord):
-    """A car left long ago: what the journal has of it may go."""
+class RetiredRecord(JournalRecord):
+    """What a token is about ended long ago: what the journal has of it may go, in all families of such a load."""
 
-    NAME = "car_left"
-    RULES = (End(("token", "given", "gone"), _TOKEN), End(("car_at", "winner", "ticket"), ("car",)))
+    NAME = "retired"
+    RULES = (End(("token", "given", "gone"), _TOKEN), End(("stands", "winner", "ticket"), ("load",)))
 
     kind: TokenKind
     number: int
-    car: Reference
+    load: Reference
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,7 +170,7 @@ CORE_RECORDS: RecordTypes = (
     TokenHeldRecord,
     TokenGivenRecord,
     TokenGoneRecord,
-    CarLeftRecord,
+    RetiredRecord,
     BlockedRecord,
     ClearRecord,
     ManualRecord,

@@ -1,14 +1,11 @@
-"""The site: what all machines of a fleet agree on, as plain values.
+"""The site: what all machines of a fleet agree on, as plain values; read from a TOML file by ``onboard.config``.
 
-Read from a TOML file by ``onboard.config``. Words: a *track* is a line of *segments* (an alley, a lift shaft, a spur);
-``Segment(track, index)`` is one body slot of it, written p(k,i) on the alley of floor k (row P31). A *station* is where
-a car can stand: a place or a compartment, on one side of a segment.
+A *segment* is what one body fills, a *station* what stands beside one: resources with numbers, each with its token.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from functools import cached_property
 from typing import ClassVar, NamedTuple
 
 from onboard.core.codes import KindCode, Side
@@ -30,7 +27,7 @@ class Segment(NamedTuple):
 
 
 class Station(NamedTuple):
-    """A place or compartment beside a segment: 16-bit number ``track << 8 | side << 7 | index``, index 1 to 127."""
+    """What is beside a segment: 16-bit number ``track << 8 | side << 7 | index``, index 1 to 127."""
 
     track: int
     index: int  # type: ignore[assignment]  # the position number hides tuple.index on purpose
@@ -55,40 +52,9 @@ class Station(NamedTuple):
         return f"p({self.track},{self.index}){'NF'[self.side]}"
 
 
-class TrackKind(Enum):
-    """What a track is."""
-
-    ALLEY = "alley"
-    LIFT = "lift"
-    SPUR = "spur"
-
-
-@dataclass(frozen=True, slots=True)
-class Track:
-    """A line of ``length`` segments, indices 1 to ``length``, centres ``pitch_mm`` apart; index 1 at 0 mm.
-
-    Alleys are tracks 1 to 127 and their number is the floor; lifts 128 to 191 with one segment per floor served;
-    spurs 192 to 254, joined to ``joins`` on an alley.
-    """
-
-    number: int
-    kind: TrackKind
-    length: int
-    pitch_mm: int
-    joins: tuple[Segment, ...] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Axis:
-    """Limits of one moving axis: top speed in mm/s, acceleration and braking in mm/s^2, both above 0."""
-
-    speed_mm_s: int
-    acceleration_mm_s2: int
-
-
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """One machine of the site. ``home`` is where a robot or lift stands at first, or the compartment's segment."""
+    """One machine of the site. ``home`` is where it stands at first, or before its ``station`` where it is fixed."""
 
     node_id: int
     name: str
@@ -99,7 +65,7 @@ class Machine:
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Protocol and device times of a site, in microseconds unless named otherwise."""
+    """Times of the protocol, in microseconds unless named otherwise; those of devices a class beside it adds."""
 
     call_window_us: int
     bid_delay_us: int
@@ -110,15 +76,9 @@ class Timing:
     token_repeat_us: int
     heartbeat_us: int
     bus_time_us: int
-    door_us: int
-    grip_us: int
     drive_refresh_us: int
     #: Share of the time left for a bid that its sub-calls may take, per cent.
     sub_call_percent: int = 50
-
-
-#: A site without machines that move along tracks: nobody reads it.
-_NO_AXIS = Axis(1, 1)
 
 
 class Needs(Enum):
@@ -133,10 +93,9 @@ class Needs(Enum):
 class Site:
     """Everything a machine knows beforehand, of any system. Built and checked by ``onboard.config``; frozen thereafter.
 
-    ``stewards`` maps each track number to the node-ID of the fixed machine that holds its segments', places' and stored
-    cars' tokens at first. ``digest`` is 16 bits over what the site is (docs/site-file.md): two files that mean the same
-    have the same. A system whose machines do not move along tracks has none, nor what follows; it adds its own in a
-    class of its own.
+    ``stewards`` maps each track number to the node-ID of the fixed machine that holds the tokens of its segments and
+    stations at first. ``digest`` is 16 bits over what the site is (docs/site-file.md): two files that mean the same
+    have the same. A system adds its own in a class of its own.
     """
 
     #: Which system this is, as the site file says it; it chooses the kinds' behaviours.
@@ -157,51 +116,8 @@ class Site:
     machines: dict[int, Machine]
     timing: Timing
     stewards: dict[int, int] = field(default_factory=dict)
-    tracks: dict[int, Track] = field(default_factory=dict)
-    #: In the order of the file's floors, sides and indices.
-    places: tuple[Station, ...] = ()
-    carrier: Axis = _NO_AXIS
-    carrier_length_mm: int = 0
-    carrier_clearance_mm: int = 0
-    #: How long a carrier takes to turn from an alley into a spur, or back, standing in the spur's mouth.
-    carrier_turn_us: int = 0
-    lift: Axis = _NO_AXIS
-    floor_height_mm: int = 0
     #: IANA name of the site's local time, for people who look at it; empty where the file has none. Not in the digest.
     time_zone: str = ""
-
-    @cached_property
-    def compartments(self) -> dict[int, Station]:
-        """Station of each compartment by node-ID."""
-        return {m.node_id: m.station for m in self.machines.values() if m.station is not None}
-
-    @cached_property
-    def lifts(self) -> tuple[int, ...]:
-        """Track numbers of all lifts, in the site's order."""
-        return tuple(number for number, track in self.tracks.items() if track.kind is TrackKind.LIFT)
-
-    @cached_property
-    def platforms(self) -> dict[Segment, int]:
-        """Lift track by the platform's position on each alley served: index 0 at the left end, length + 1 at the right.
-
-        Worked out once: every motion asks for it many times.
-        """
-        found: dict[Segment, int] = {}
-        for lift in self.lifts:
-            for at in self.tracks[lift].joins:
-                end = 0 if at.index == 1 else self.tracks[at.track].length + 1
-                found.setdefault(Segment(at.track, end), lift)
-        return found
-
-    @cached_property
-    def spurs(self) -> dict[Segment, int]:
-        """Spur track by its mouth: the alley segment that it joins, and no other spur does."""
-        return {
-            mouth: track.number
-            for track in self.tracks.values()
-            if track.kind is TrackKind.SPUR
-            for mouth in track.joins
-        }
 
     def machine(self, name: str) -> Machine:
         """The machine so named. Raises ``KeyError`` where there is none."""
@@ -209,10 +125,6 @@ class Site:
             if machine.name == name:
                 return machine
         raise KeyError(name)
-
-    def position_mm(self, segment: Segment) -> int:
-        """Centre of a segment along its track, in mm from that of index 1."""
-        return (segment.index - 1) * self.tracks[segment.track].pitch_mm
 
 
 def journal_owner(site: Site, machine: Machine) -> str:

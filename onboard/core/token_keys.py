@@ -21,31 +21,26 @@ def segment_token(segment: Segment) -> TokenKey:
 
 
 def station_token(station: Station) -> TokenKey:
-    """The token of one place, or of a compartment's bay: who holds it may send a shuttle in."""
+    """The token of one station: who holds it may reach into it."""
     return TokenKey(TokenKind.STATION, station.number)
-
-
-def car_token(origin: int, number: int) -> TokenKey:
-    """The token of one car: its holder is the custodian."""
-    return TokenKey(TokenKind.CAR, origin << 16 | number)
 
 
 def genesis_holder(site: Site, key: TokenKey) -> int:
     """Who holds a token before it first moves, by the site file alone.
 
-    A robot holds the segment of its home, a compartment its bay; the track's steward holds all other segments and
-    places. Cars and tasks are made by their origin node.
+    A robot holds the segment of its home, a fixed machine its station; the track's steward holds all other segments and
+    stations. All else is made by its origin node.
     """
-    if key.kind in (TokenKind.CAR, TokenKind.TASK):
+    if key.kind not in (TokenKind.SEGMENT, TokenKind.STATION):
         return key.number >> 16
     if key.kind is TokenKind.SEGMENT:
         for machine in site.machines.values():
             if machine.kind is KindCode.ROBOT and machine.home.number == key.number:
                 return machine.node_id
     else:
-        for node_id, station in site.compartments.items():
-            if station.number == key.number:
-                return node_id
+        for machine in site.machines.values():
+            if machine.station is not None and machine.station.number == key.number:
+                return machine.node_id
     return site.stewards.get(key.number >> 8, 0)
 
 

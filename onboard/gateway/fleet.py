@@ -20,6 +20,7 @@ from onboard.history.calls import Call, CallAnswered, CallOpened
 from onboard.history.history import Fact
 from onboard.history.tasks import TaskTold
 from onboard.trace.words import Words
+from onboard.ways.site import way_site
 from onboard.web.picture import LivePicture
 
 #: Calls for a whole task; all others are for a part of one, or for room.
@@ -159,7 +160,8 @@ class FleetTopics:
         told: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
         if machine.kind is KindCode.LIFT:
             segment, _ = view.positions[node]
-            floors = self.site.tracks[segment.track].joins if segment.track in self.site.tracks else ()
+            shaft = way_site(self.site).tracks.get(segment.track)
+            floors = shaft.joins if shaft is not None else ()
             if 1 <= segment.index <= len(floors):
                 told["floor"] = floors[segment.index - 1].track
         yield f"machine/{machine.name}", told

@@ -32,7 +32,7 @@ from onboard.gateway.whereabouts import Tracker, Whereabouts
 from onboard.history.calls import CallAnswered
 from onboard.history.history import Fact
 
-#: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/core/presence.py).
+#: Three heartbeats missed, a machine counts as silent: as the machines themselves count (onboard/holon/presence.py).
 SILENT_BEATS = 3
 #: An arm stands where it is bolted down: it is no machine that VDA 5050 speaks of.
 TRAVELLERS = MOBILE_KINDS - {KindCode.ARM}

@@ -11,7 +11,8 @@ from typing import Protocol
 
 from onboard.core.codes import Grade, LegAction
 from onboard.core.messages import Itinerary, Message, Progress
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment, Site
+from onboard.ways.site import TrackKind, way_site
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,7 @@ class TrackTracker:
         return replace(at, ahead=tuple(ahead))
 
     def _place(self, segment: Segment, offset_mm: int, speed_mm_s: int, passed: int) -> Whereabouts:
-        track = self._site.tracks.get(segment.track)
+        track = way_site(self._site).tracks.get(segment.track)
         node, driving = str(segment), speed_mm_s != 0
         if track is None:
             return Whereabouts(node, (), passed, driving)
@@ -97,7 +98,7 @@ class TrackTracker:
             passed,
             driving,
             map_of(track.kind, track.number),
-            (self._site.position_mm(segment) + offset_mm) / 1000,
+            (way_site(self._site).position_mm(segment) + offset_mm) / 1000,
             pi / 2 if track.kind is TrackKind.SPUR else 0.0,
             abs(offset_mm) / 1000,
             speed_mm_s / 1000,

@@ -13,9 +13,10 @@ from onboard.core.authority import TokenKey, genesis_holder, may_exist
 from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE, TokenKind
 from onboard.core.messages import CarAt
 from onboard.core.recovery_messages import TokenAssigned
-from onboard.core.regeneration import tokens_of
 from onboard.core.site import Machine, Segment, Site, Station
 from onboard.ways.lifts import gate, lift_at, platform
+from onboard.ways.site import way_site
+from onboard.ways.tokens import tokens_of
 
 #: Highest version of a token (dbc/fleet.dbc): above it nothing can be made anew.
 LAST_VERSION = (1 << 28) - 1
@@ -97,7 +98,7 @@ class Body:
         """A lift's platform and gate, a compartment's bay."""
         if machine.station is not None:
             return cls(bay=machine.station)
-        if machine.home.track in site.lifts:
+        if machine.home.track in way_site(site).lifts:
             return cls(frozenset((platform(machine.home.track), gate(machine.home.track))))
         return cls()
 
@@ -106,7 +107,7 @@ class Body:
         """A platform goes with its gate: who may stand on the sill keeps the lift where it is."""
         slots: set[Segment] = set()
         for segment in segments:
-            lift = lift_at(site, segment)
+            lift = lift_at(way_site(site), segment)
             slots.update([segment] if lift is None else [platform(lift), gate(lift)])
         return cls(frozenset(slots))
 
@@ -147,7 +148,7 @@ def assign(said: Statements, whose: Whose, operator: int) -> Assignment:
     """
     given: list[TokenAssigned] = []
     nobodys: list[TokenKey] = []
-    for key in sorted({*tokens_of(said.site), *said.seen}):
+    for key in sorted({*tokens_of(way_site(said.site)), *said.seen}):
         if key in said.held or not _is_orphan(said, key, whose):
             continue
         to = _heir(said, key, whose)
@@ -190,7 +191,7 @@ def _heir_of_car(said: Statements, key: TokenKey, whose: Whose) -> int:
     word = said.cars.get(key)
     if word is not None and word.station not in (ANY_STATION, OUTSIDE):
         station = Station.from_number(word.station)
-        keeper = next((node for node, one in said.site.compartments.items() if one == station), None)
+        keeper = next((node for node, one in way_site(said.site).compartments.items() if one == station), None)
         keeper = said.site.stewards.get(station.track, NOBODY) if keeper is None else keeper
         if keeper in said.site.machines and keeper != whose.absent:
             return keeper

@@ -4,7 +4,8 @@ import re
 
 from onboard.config.problems import nearest
 from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, NOBODY, Reason
-from onboard.core.site import Machine, Segment, Site, TrackKind
+from onboard.core.site import Machine, Segment, Site
+from onboard.ways.site import TrackKind, way_site
 
 #: Node-IDs under which a person's tool may speak (dbc/fleet.dbc: kept for gateways and tools).
 FIRST_TOOL, LAST_TOOL = MAX_NODE_ID + 1, 255
@@ -35,13 +36,13 @@ def movable_of(site: Site, name: str) -> Machine:
 
 def segment_of(site: Site, text: str) -> Segment:
     """A segment of an alley or a spur, written ``p(1,3)``. Raises ``OperateError``."""
-    if not site.tracks:
+    if not way_site(site).tracks:
         raise OperateError(f"{text}: a {site.system} has no segments that can be blocked")
     match = re.fullmatch(r"p\((\d{1,3}),(\d{1,3})\)", text.replace(" ", ""))
     segment = Segment(int(match[1]), int(match[2])) if match is not None else None
-    track = site.tracks.get(segment.track) if segment is not None else None
+    track = way_site(site).tracks.get(segment.track) if segment is not None else None
     if segment is None or track is None or track.kind is TrackKind.LIFT or not 1 <= segment.index <= track.length:
-        numbers = [str(one) for one, track in site.tracks.items() if track.kind is not TrackKind.LIFT]
+        numbers = [str(one) for one, track in way_site(site).tracks.items() if track.kind is not TrackKind.LIFT]
         raise OperateError(
             f"{text}: no segment of site {site.name}; write p(TRACK,INDEX), tracks are {', '.join(numbers)}"
         )
@@ -50,11 +51,11 @@ def segment_of(site: Site, text: str) -> Segment:
 
 def slot_of(site: Site, text: str) -> Segment:
     """A slot in which a body can be: a segment, or a lift's platform by the lift's name. Raises ``OperateError``."""
-    lifts = {machine.name: machine for machine in site.machines.values() if machine.home.track in site.lifts}
+    lifts = {machine.name: machine for machine in site.machines.values() if machine.home.track in way_site(site).lifts}
     if text not in lifts:
         return segment_of(site, text)
-    floor = site.tracks[lifts[text].home.track].joins[0]
-    return Segment(floor.track, 0 if floor.index == 1 else site.tracks[floor.track].length + 1)
+    floor = way_site(site).tracks[lifts[text].home.track].joins[0]
+    return Segment(floor.track, 0 if floor.index == 1 else way_site(site).tracks[floor.track].length + 1)
 
 
 def node_of(site: Site, text: str) -> int:

@@ -22,11 +22,11 @@ from onboard.core.recovery_messages import (
 )
 from onboard.core.remedies import reason_words
 from onboard.core.serial import is_newer, successor
-from onboard.core.site import TrackKind
 from onboard.operate.assignment import NO_BODY, Assignment, Body, Statements, Whose, assign
 from onboard.operate.order import AGAIN_US, MISTAKE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
+from onboard.ways.site import TrackKind, way_site
 
 #: How long all may stand frozen while the person reads and decides, us. Ours: a site that waits longer is forgotten.
 DECIDE_US = 300_000_000
@@ -309,7 +309,7 @@ class Regenerate(Order):
 
     def _blocks(self) -> list[Message]:
         """The slots of a body that is locked off are planned around."""
-        tracks = self.park.site.tracks
+        tracks = way_site(self.park.site).tracks
         return [
             Blocked(self.node, *slot, Reason.OPERATOR)
             for slot in sorted(self._who.blocked.slots)

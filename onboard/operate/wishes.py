@@ -17,6 +17,7 @@ from onboard.operate.park import Park
 from onboard.operate.regenerate import Lost, Regenerate
 from onboard.operate.status import Status
 from onboard.operate.stops import GoAgain, LetGo, Stop
+from onboard.ways.site import way_site
 
 #: Heartbeat periods for which the bus is listened to before anything is said: everybody is heard, and once lost.
 LISTEN_BEATS = 2
@@ -70,6 +71,7 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
 
 def _lost_of(site: Site, wish: Wish) -> Lost:
     """Who lost its rights, who is locked off, and where their bodies are. Raises ``OperateError``."""
+    ways = way_site(site)
     lost = machine_of(site, wish.machine)
     if not site.has_regeneration:
         raise OperateError(
@@ -79,7 +81,7 @@ def _lost_of(site: Site, wish: Wish) -> Lost:
         return Lost(lost.node_id, lost.node_id, blocked=_body_of(site, lost, wish.body, "--body"))
     body = _body_of(site, lost, wish.body, "--body")
     if lost.kind in MOBILE_KINDS and {slot.track for slot in body.slots} not in [
-        {one} for one in site.tracks if one not in site.lifts
+        {one} for one in ways.tracks if one not in ways.lifts
     ]:
         raise OperateError(f"--body: {lost.name} must stand on one track, off the lifts; push it there first")
     if not wish.absent:

@@ -11,12 +11,12 @@ from types import ModuleType
 from onboard import systems
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import KindCode
-from onboard.core.compaction import compact
 from onboard.core.journal_records import Entry
 from onboard.core.journal_state import JournalCondition, condition_of
 from onboard.core.site import Site
 from onboard.systems.folders import Folders
 from onboard.systems.system import System
+from onboard.work.compaction import compact
 
 #: What a site file is that does not say: those of version 0.1 had no other system.
 FIRST_SYSTEM = "car-park"

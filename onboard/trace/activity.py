@@ -21,6 +21,7 @@ from onboard.core.messages import (
 from onboard.core.site import Segment, Site
 from onboard.history.calls import Call, CallAnswered
 from onboard.history.history import Fact
+from onboard.ways.site import way_site
 
 #: Operations whose winner has a task until it reports the end.
 TASKS = (Operation.PARK, Operation.RETRIEVE)
@@ -71,15 +72,16 @@ class Activities:
     """Give it every message of the fleet bus in the order of the log, and what a history was told by it."""
 
     def __init__(self, site: Site, begin_us: int = 0) -> None:
+        ways = way_site(site)
         self.bodies: dict[int, Body] = {}
         self._site = site
         self._begin_us = begin_us
         for machine in site.machines.values():
             if machine.kind in (KindCode.ROBOT, KindCode.LIFT):
-                track = next((t for t in site.lifts if site.stewards[t] == machine.node_id), machine.home.track)
+                track = next((t for t in ways.lifts if site.stewards[t] == machine.node_id), machine.home.track)
                 at = machine.home if machine.kind is KindCode.ROBOT else Segment(track, machine.home.index)
                 self.bodies[machine.node_id] = Body(
-                    machine.node_id, machine.kind, at, site.position_mm(at), since_us=begin_us
+                    machine.node_id, machine.kind, at, ways.position_mm(at), since_us=begin_us
                 )
 
     def begin(self, time_us: int) -> None:
@@ -119,10 +121,10 @@ class Activities:
 
     def _on_progress(self, message: Progress, time_us: int) -> None:
         body = self.bodies.get(message.sender)
-        if body is None or message.track not in self._site.tracks:
+        if body is None or message.track not in way_site(self._site).tracks:
             return
         at = Segment(message.track, message.index)
-        position_mm = self._site.position_mm(at) + message.offset_mm
+        position_mm = way_site(self._site).position_mm(at) + message.offset_mm
         left = self._platform_of(body)
         if body.heard and at.track == body.at.track:
             self._travel(body, abs(position_mm - body.position_mm))
@@ -188,7 +190,7 @@ class Activities:
     # --- time --------------------------------------------------------------------------------------------------
 
     def _platform_of(self, body: Body) -> int | None:
-        return self._site.platforms.get(body.at) if body.kind is KindCode.ROBOT else None
+        return way_site(self._site).platforms.get(body.at) if body.kind is KindCode.ROBOT else None
 
     def _passengers(self, lift: Body) -> bool:
         return any(self._platform_of(body) == lift.at.track for body in self.bodies.values())

@@ -10,7 +10,7 @@ from functools import lru_cache
 from math import isqrt
 from typing import NamedTuple
 
-from onboard.core.site import Axis
+from onboard.ways.site import Axis
 
 _NS_PER_S = 1_000_000_000
 _NS_PER_US = 1_000

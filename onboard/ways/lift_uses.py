@@ -9,9 +9,9 @@ gap begins where the lift stands.
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from onboard.core.site import Site
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.reservations import FOREVER, Interval, Use
+from onboard.ways.site import WaySite
 
 #: The gate's token goes to the lift before it moves and back to the robot behind: four frames and four journal writes,
 #: counted as part of a ride. Ours.
@@ -32,12 +32,12 @@ class Gap(NamedTuple):
     to_index: int | None
 
 
-def run_up_us(site: Site, lift_track: int, floors: int) -> int:
+def run_up_us(site: WaySite, lift_track: int, floors: int) -> int:
     """Duration of the platform's run over ``floors`` >= 0 floors, in whole milliseconds."""
     return run_duration_us(floors * site.tracks[lift_track].pitch_mm, site.lift)
 
 
-def ride_us(site: Site, lift_track: int, from_index: int, to_index: int) -> int:
+def ride_us(site: WaySite, lift_track: int, from_index: int, to_index: int) -> int:
     """Duration of a RIDE leg between two floors: the platform's run, and the gate's tokens."""
     return run_up_us(site, lift_track, abs(to_index - from_index)) + GATE_US
 
@@ -60,7 +60,7 @@ def lift_gaps(uses: Iterable[Use], start_us: int, standing_index: int) -> list[G
     return gaps
 
 
-def floor_intervals(site: Site, lift_track: int, gaps: Iterable[Gap], lift_index: int) -> list[Interval]:
+def floor_intervals(site: WaySite, lift_track: int, gaps: Iterable[Gap], lift_index: int) -> list[Interval]:
     """When somebody may board, stand on the platform and leave it at one floor; at most one interval for each gap."""
     found = []
     for gap in gaps:
@@ -73,7 +73,7 @@ def floor_intervals(site: Site, lift_track: int, gaps: Iterable[Gap], lift_index
     return found
 
 
-def are_compatible(site: Site, one: Use, other: Use) -> bool:
+def are_compatible(site: WaySite, one: Use, other: Use) -> bool:
     """Whether two uses of one lift leave it the time to go from the floor of the first to that of the second."""
     if one.lift_track != other.lift_track:
         return True

@@ -6,7 +6,8 @@ the platform moves. On an alley's axis the platform is the position before index
 """
 
 from onboard.core.messages import Progress
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.ways.site import WaySite
 
 #: Index of the platform's token on a lift's track, and of its gate's.
 PLATFORM_INDEX = 0
@@ -28,17 +29,17 @@ def gate(lift_track: int) -> Segment:
     return Segment(lift_track, GATE_INDEX)
 
 
-def lift_tracks(site: Site) -> tuple[int, ...]:
+def lift_tracks(site: WaySite) -> tuple[int, ...]:
     """All lifts of a site by their track numbers."""
     return site.lifts
 
 
-def sill(site: Site, lift_track: int, lift_index: int) -> Segment:
+def sill(site: WaySite, lift_track: int, lift_index: int) -> Segment:
     """The alley segment before a lift's platform at its floor ``lift_index``, 1 to the number of floors served."""
     return site.tracks[lift_track].joins[lift_index - 1]
 
 
-def lift_index_of(site: Site, lift_track: int, floor: int) -> int | None:
+def lift_index_of(site: WaySite, lift_track: int, floor: int) -> int | None:
     """The lift's index of a floor (an alley's track number), or None where it does not stop there."""
     for index, segment in enumerate(site.tracks[lift_track].joins, start=1):
         if segment.track == floor:
@@ -46,7 +47,7 @@ def lift_index_of(site: Site, lift_track: int, floor: int) -> int | None:
     return None
 
 
-def platform_on(site: Site, lift_track: int, floor: int) -> Segment | None:
+def platform_on(site: WaySite, lift_track: int, floor: int) -> Segment | None:
     """The platform as a position on a floor's alley: index 0 at the left end, length + 1 at the right; None: none."""
     lift_index = lift_index_of(site, lift_track, floor)
     if lift_index is None:
@@ -55,7 +56,7 @@ def platform_on(site: Site, lift_track: int, floor: int) -> Segment | None:
     return Segment(floor, 0 if at.index == 1 else site.tracks[floor].length + 1)
 
 
-def lift_at(site: Site, position: Segment) -> int | None:
+def lift_at(site: WaySite, position: Segment) -> int | None:
     """The lift whose platform is meant by an alley position before index 1 or behind the last; None for all others."""
     return site.platforms.get(position)
 

@@ -7,33 +7,29 @@ on the bus (``Blocked``) until another clears it. What is known here steers plan
 
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
-from onboard.core.authority import segment_token
 from onboard.core.codes import MOBILE_KINDS, Reason
 from onboard.core.messages import Blocked, Clear, Progress
-from onboard.core.site import Machine, Segment, Site, TrackKind
-from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX, lift_at, platform
+from onboard.core.mirror import Obstacle
+from onboard.core.site import Machine, Segment
+from onboard.ways.lifts import PLATFORM_INDEX, lift_at, platform
 from onboard.ways.occupancy import standing_segments
 from onboard.ways.reservations import FOREVER, Reservations, Use, Window
+from onboard.ways.site import WaySite
+from onboard.ways.tokens import site_slots
 
 #: Owner of the windows of segments that are blocked by a word on the bus: no node carries it.
 BLOCKED = 256
 
 
-class Obstacle(NamedTuple):
-    """One machine in the way: its slots, since when (bus us) and why."""
-
-    slots: frozenset[Segment]
-    since_us: int
-    reason: Reason
-
-
 @dataclass
 class Obstacles:
-    """All obstacles known to one machine. ``changes`` grows with every change, so that nobody need look twice."""
+    """All obstacles known to one machine: ``machines`` is its mirror's table of who does not follow a plan.
 
-    site: Site
+    ``changes`` grows with every change, so that nobody need look twice.
+    """
+
+    site: WaySite
     reservations: Callable[[], Reservations]
     machines: dict[int, Obstacle] = field(default_factory=dict)
     #: Segments that somebody says nobody can pass, and those of which it was taken back, each with why.
@@ -42,23 +38,10 @@ class Obstacles:
     changes: int = 0
     _slots: tuple[Segment, ...] = ()
 
-    def take_up(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> bool:
-        """A machine is in the way at ``slots``; True where that was not known so."""
-        known = self.machines.get(node)
-        if known is not None and (known.slots, known.reason) == (slots, reason):
-            return False
-        since_us = now_us if known is None else known.since_us
-        self.machines[node] = Obstacle(slots, since_us, reason)
-        self._put(node, slots, now_us)
-        return True
-
-    def let_go(self, node: int) -> bool:
-        """A machine takes part again, or its plan is known; True where it was an obstacle."""
-        if self.machines.pop(node, None) is None:
-            return False
+    def let_go(self, node: int) -> None:
+        """A machine is an obstacle no more: it takes part again, or its plan is known."""
         self.reservations().release(node)
         self.changes += 1
-        return True
 
     def is_at(self, slot: Segment) -> bool:
         """Whether a slot is blocked, or some machine that is an obstacle has it."""
@@ -75,7 +58,7 @@ class Obstacles:
         else:
             del self.blocked[segment]
             self.cleared[segment] = word.reason
-        self._put(BLOCKED, self.blocked, now_us)
+        self.put(BLOCKED, self.blocked, now_us)
         return True
 
     def words(self, node: int, tracks: Collection[int]) -> list[Blocked | Clear]:
@@ -88,11 +71,12 @@ class Obstacles:
         """All that is in the way is so from now on: since when it was in a time of before is not known any more."""
         for node, obstacle in self.machines.items():
             self.machines[node] = obstacle._replace(since_us=now_us)
-            self._put(node, obstacle.slots, now_us)
+            self.put(node, obstacle.slots, now_us)
         if self.blocked:
-            self._put(BLOCKED, self.blocked, now_us)
+            self.put(BLOCKED, self.blocked, now_us)
 
-    def _put(self, owner: int, slots: Iterable[Segment], now_us: int) -> None:
+    def put(self, owner: int, slots: Iterable[Segment], now_us: int) -> None:
+        """Slots that nobody can pass from ``now_us`` on, for a machine's sake or that of a word on the bus."""
         reservations = self.reservations()
         reservations.release(owner)
         lifts = [slot.track for slot in sorted(slots) if slot.index == PLATFORM_INDEX and slot.track in self.site.lifts]
@@ -118,16 +102,5 @@ class Obstacles:
 
     def _all_slots(self) -> tuple[Segment, ...]:
         if not self._slots:
-            found: list[Segment] = []
-            for number, track in self.site.tracks.items():
-                if track.kind is TrackKind.LIFT:
-                    found += [Segment(number, PLATFORM_INDEX), Segment(number, GATE_INDEX)]
-                else:
-                    found += [Segment(number, index) for index in range(1, track.length + 1)]
-            self._slots = tuple(found)
+            self._slots = tuple(site_slots(self.site))
         return self._slots
-
-
-def holder_in(holder_of: Callable[..., int]) -> Callable[[Segment], int]:
-    """Who holds a slot's token, from who holds a token."""
-    return lambda slot: holder_of(segment_token(slot))

@@ -15,10 +15,11 @@ from typing import NamedTuple
 from onboard.core.codes import LegAction
 from onboard.core.messages import Itinerary, Leg
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Axis, Segment, Site, TrackKind
+from onboard.core.site import Segment
 from onboard.ways.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us
 from onboard.ways.lifts import PLATFORM_INDEX, lift_at, lift_index_of, platform, platform_on
 from onboard.ways.reservations import FOREVER, Use, Window
+from onboard.ways.site import Axis, TrackKind, WaySite
 
 
 class Sweep(NamedTuple):
@@ -29,12 +30,12 @@ class Sweep(NamedTuple):
     leave_us: int
 
 
-def body_mm(site: Site) -> int:
+def body_mm(site: WaySite) -> int:
     """Length of the body: the carrier with its clearance in front and behind."""
     return site.carrier_length_mm + 2 * site.carrier_clearance_mm
 
 
-def reach_segments(site: Site, track: int) -> int:
+def reach_segments(site: WaySite, track: int) -> int:
     """How many segments beyond its own the body touches on either side while it stands."""
     return _reach(site.tracks[track].pitch_mm, body_mm(site))
 
@@ -60,12 +61,12 @@ def run_sweeps(segments: int, pitch_mm: int, length_mm: int, axis: Axis) -> tupl
     return tuple(sweeps)
 
 
-def leg_sweeps(site: Site, track: int, segments: int) -> tuple[Sweep, ...]:
+def leg_sweeps(site: WaySite, track: int, segments: int) -> tuple[Sweep, ...]:
     """Sweeps of the carrier of ``site`` for a run over ``segments`` steps of a track."""
     return run_sweeps(segments, site.tracks[track].pitch_mm, body_mm(site), site.carrier)
 
 
-def alley_segments(site: Site, segment: Segment) -> list[Segment]:
+def alley_segments(site: WaySite, segment: Segment) -> list[Segment]:
     """Segments of its track that a carrier standing at ``segment`` occupies, clearance included, in order of index."""
     reach = reach_segments(site, segment.track)
     last = site.tracks[segment.track].length
@@ -73,7 +74,7 @@ def alley_segments(site: Site, segment: Segment) -> list[Segment]:
     return [Segment(segment.track, index) for index in range(low, high + 1)]
 
 
-def standing_segments(site: Site, segment: Segment) -> list[Segment]:
+def standing_segments(site: WaySite, segment: Segment) -> list[Segment]:
     """Segments that a carrier standing at ``segment`` occupies, a platform first, then those of its track.
 
     Index 0 of a spur is its mouth: whoever turns there is in both.
@@ -86,7 +87,7 @@ def standing_segments(site: Site, segment: Segment) -> list[Segment]:
     return on_track if aboard is None else [aboard, *on_track]
 
 
-def _platform_at(site: Site, position: Segment) -> Segment | None:
+def _platform_at(site: WaySite, position: Segment) -> Segment | None:
     """The platform that a position beyond an alley's ends means, or None for any other position."""
     if 1 <= position.index <= site.tracks[position.track].length:
         return None
@@ -94,12 +95,12 @@ def _platform_at(site: Site, position: Segment) -> Segment | None:
     return None if lift_track is None else platform(lift_track)
 
 
-def turn_in_us(site: Site, spur: int) -> int:
+def turn_in_us(site: WaySite, spur: int) -> int:
     """From standing in the mouth of a spur to standing in it, or back: the turn, then a run over one segment."""
     return ceil_ms(site.carrier_turn_us) + run_duration_us(site.tracks[spur].pitch_mm, site.carrier)
 
 
-def turned_in(site: Site, position: Segment) -> Segment | None:
+def turned_in(site: WaySite, position: Segment) -> Segment | None:
     """The mouth in which a machine at ``position`` is turned, which is index 0 of a spur; None for all others."""
     track = site.tracks.get(position.track)
     if track is None or track.kind is not TrackKind.SPUR or position.index != 0:
@@ -107,7 +108,7 @@ def turned_in(site: Site, position: Segment) -> Segment | None:
     return track.joins[0]
 
 
-def hop_origin(site: Site, leg: Leg) -> Segment | None:
+def hop_origin(site: WaySite, leg: Leg) -> Segment | None:
     """Where a hop through a spur's mouth begins; None for every other leg."""
     if leg.action is not LegAction.TRAVEL or leg.from_index != leg.to_index:
         return None
@@ -118,12 +119,12 @@ def hop_origin(site: Site, leg: Leg) -> Segment | None:
     return None if spur is None else Segment(spur, 1)
 
 
-def junction_segments(site: Site, origin: Segment, inside: Segment) -> list[Segment]:
+def junction_segments(site: WaySite, origin: Segment, inside: Segment) -> list[Segment]:
     """Segments occupied for the whole of a hop between two tracks, such as from an alley into a spur."""
     return standing_segments(site, origin) + standing_segments(site, inside)
 
 
-def travel_windows(site: Site, origin: Segment, to_index: int, begin_us: int, end_us: int) -> list[Window]:
+def travel_windows(site: WaySite, origin: Segment, to_index: int, begin_us: int, end_us: int) -> list[Window]:
     """Windows of one run from standing at ``origin``; either end may be a platform.
 
     Where ``[begin, end)`` is not exactly the run's duration (a delay, a leg under way), a segment counts as occupied
@@ -153,7 +154,9 @@ class _Part(NamedTuple):
     end_us: int
 
 
-def itinerary_windows(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> list[Window]:
+def itinerary_windows(
+    site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
+) -> list[Window]:
     """All windows of an itinerary; after the last leg the machine stands where it ends, without end.
 
     The first leg begins at ``first_begin_us``, by default when the task was awarded. Legs on tracks that the site does
@@ -164,7 +167,7 @@ def itinerary_windows(site: Site, itinerary: Itinerary, now_us: int, first_begin
 
 
 def leg_windows(
-    site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
+    site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None
 ) -> list[tuple[Window, ...]]:
     """The same windows leg by leg, those of the standing behind the last leg at the end."""
     return [tuple(_part_windows(site, part)) for part in _parts(site, itinerary, now_us, first_begin_us)]
@@ -180,7 +183,7 @@ def leg_begins_us(itinerary: Itinerary, now_us: int, first_begin_us: int | None 
     return begins_us
 
 
-def lift_uses(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> list[Use]:
+def lift_uses(site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> list[Use]:
     """Every use of a lift that an itinerary makes, in order: from the first window on its platform to the last.
 
     Floors are those at which it boards and leaves; for one that begins or ends aboard, those where it then stands.
@@ -204,7 +207,7 @@ def lift_uses(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int
     return uses
 
 
-def final_position(site: Site, itinerary: Itinerary) -> Segment | None:
+def final_position(site: WaySite, itinerary: Itinerary) -> Segment | None:
     """Where an itinerary ends and its machine stands for ever; None where it has no leg on the site."""
     ends = [_after(site, leg) for leg in itinerary.legs if leg.track in site.tracks]
     return ends[-1] if ends else None
@@ -214,7 +217,7 @@ def _award_us(itinerary: Itinerary, now_us: int) -> int:
     return from_bus_ms(itinerary.stamp.award_ms, now_us)
 
 
-def _parts(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> Iterator[_Part]:
+def _parts(site: WaySite, itinerary: Itinerary, now_us: int, first_begin_us: int | None = None) -> Iterator[_Part]:
     begin_us = _award_us(itinerary, now_us) if first_begin_us is None else first_begin_us
     here: Segment | None = None
     for leg in itinerary.legs:
@@ -228,7 +231,7 @@ def _parts(site: Site, itinerary: Itinerary, now_us: int, first_begin_us: int | 
         yield _Part(None, here, begin_us, FOREVER)
 
 
-def _after(site: Site, leg: Leg) -> Segment:
+def _after(site: WaySite, leg: Leg) -> Segment:
     """Where a machine stands after a leg: a ride ends on the alley of the floor that it goes to."""
     track = site.tracks[leg.track]
     if leg.action is LegAction.RIDE and track.kind is TrackKind.LIFT and 1 <= leg.to_index <= len(track.joins):
@@ -238,7 +241,7 @@ def _after(site: Site, leg: Leg) -> Segment:
     return Segment(leg.track, leg.to_index)
 
 
-def _floors(site: Site, part: _Part, lift_track: int) -> tuple[int, int]:
+def _floors(site: WaySite, part: _Part, lift_track: int) -> tuple[int, int]:
     """The lift's indices before and after a part that occupies its platform."""
     leg = part.leg
     if leg is not None and leg.track == lift_track:
@@ -249,7 +252,7 @@ def _floors(site: Site, part: _Part, lift_track: int) -> tuple[int, int]:
     return served[0], served[-1]
 
 
-def _part_windows(site: Site, part: _Part) -> list[Window]:
+def _part_windows(site: WaySite, part: _Part) -> list[Window]:
     """Windows of one part; a leg on another track than ``here`` is a ride, or a hop through a junction."""
     leg, here, begin_us, end_us = part
     if leg is None:

@@ -17,9 +17,10 @@ from typing import NamedTuple
 from onboard.core.codes import NOBODY, LegAction, Reason
 from onboard.core.messages import Itinerary, Leg, Progress
 from onboard.core.serial import is_newer
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
 from onboard.ways.occupancy import body_mm, leg_windows
 from onboard.ways.passing import TOLERANCE_US, Plan
+from onboard.ways.site import WaySite
 
 
 class Turn(NamedTuple):
@@ -73,7 +74,7 @@ class _Way:
 class PassingOrder:
     """The order of passing on all segments, as far as one machine has heard."""
 
-    site: Site
+    site: WaySite
     _ways: dict[int, _Way] = field(default_factory=dict)
     #: Turns of both under which two machines last agreed, lower node-ID first.
     _agreed: dict[tuple[int, int], tuple[Turns, Turns]] = field(default_factory=dict)
@@ -253,7 +254,7 @@ def _moves(itinerary: Itinerary) -> tuple[Leg, ...]:
     return tuple(leg._replace(end_ms=0) for leg in itinerary.legs if moves(leg))
 
 
-def _turns(site: Site, plan: Plan, now_us: int) -> Turns:
+def _turns(site: WaySite, plan: Plan, now_us: int) -> Turns:
     legs = [leg for leg in plan.itinerary.legs if leg.track in site.tracks]
     to_come = sum(moves(leg) for leg in legs)
     found: Turns = {}

@@ -6,14 +6,15 @@ that stands at a segment lets nobody past (rows P30, P38).
 
 from collections.abc import Collection
 
-from onboard.core.site import Segment, Site, Station, TrackKind
+from onboard.core.site import Segment, Station
 from onboard.ways.lifts import lift_tracks
+from onboard.ways.site import TrackKind, WaySite
 
 #: Sites whose passages are kept in one process: one in a machine, some in a test run.
 _MAX_KEPT = 16
 
 
-def reached(site: Site, *, lost: Collection[int] = (), standing: Collection[Segment] = ()) -> frozenset[Segment]:
+def reached(site: WaySite, *, lost: Collection[int] = (), standing: Collection[Segment] = ()) -> frozenset[Segment]:
     """Alley segments that a carrier can get to from any compartment's front.
 
     ``lost`` are tracks of lifts that do not run, ``standing`` segments where other machines stand for ever; these are
@@ -34,13 +35,13 @@ def reached(site: Site, *, lost: Collection[int] = (), standing: Collection[Segm
     return frozenset(found)
 
 
-def stranded_by(site: Site, lift_track: int) -> tuple[Station, ...]:
+def stranded_by(site: WaySite, lift_track: int) -> tuple[Station, ...]:
     """The places that cannot be reached from any compartment when a lift is lost, in the order of the site's places."""
     found = reached(site, lost=(lift_track,))
     return tuple(place for place in site.places if place.segment not in found)
 
 
-def hidden_by(site: Site, standing: Collection[Segment], lost: Collection[int] = ()) -> tuple[Station, ...]:
+def hidden_by(site: WaySite, standing: Collection[Segment], lost: Collection[int] = ()) -> tuple[Station, ...]:
     """Places that can be reached, but only after machines at ``standing`` have given way; those before them included.
 
     ``lost`` are tracks of lifts that do not run.
@@ -49,7 +50,7 @@ def hidden_by(site: Site, standing: Collection[Segment], lost: Collection[int] =
     return tuple(place for place in site.places if place.segment in free and place.segment not in behind)
 
 
-def passages(site: Site) -> frozenset[int]:
+def passages(site: WaySite) -> frozenset[int]:
     """Alleys that are the only way to another: a machine standing there for ever would cut that one off.
 
     They are no refuges (design, section 5: every other needed place stays reachable). Worked out once for each site.
@@ -63,10 +64,10 @@ def passages(site: Site) -> frozenset[int]:
     return kept[1]
 
 
-_kept: dict[int, tuple[Site, frozenset[int]]] = {}
+_kept: dict[int, tuple[WaySite, frozenset[int]]] = {}
 
 
-def _find_passages(site: Site) -> frozenset[int]:
+def _find_passages(site: WaySite) -> frozenset[int]:
     everywhere = reached(site)
     found = set()
     for track in site.tracks.values():

@@ -4,8 +4,9 @@ from collections.abc import Iterable
 from functools import lru_cache
 
 from onboard.core.codes import KindCode
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment
 from onboard.ways.reach import passages
+from onboard.ways.site import TrackKind, WaySite
 
 
 @lru_cache(maxsize=16)
@@ -19,7 +20,7 @@ def _refuges(
     return frozenset(found - kept)
 
 
-def refuges(site: Site) -> frozenset[Segment]:
+def refuges(site: WaySite) -> frozenset[Segment]:
     """Alley and spur segments that block neither a compartment, nor a lift's sill, nor a spur's mouth.
 
     That a whole fleet fits (at most F - 1 carriers on F alleys without spurs) is checked where a site is loaded.
@@ -32,7 +33,7 @@ def refuges(site: Site) -> frozenset[Segment]:
     return _refuges(shape, frozenset(kept))
 
 
-def open_refuges(site: Site, standing: Iterable[Segment]) -> frozenset[Segment]:
+def open_refuges(site: WaySite, standing: Iterable[Segment]) -> frozenset[Segment]:
     """Those refuges in which one more machine may end while others stand for ever at ``standing``.
 
     Where there are several floors: no alley before compartments, so that the street alley stays free for all, no alley

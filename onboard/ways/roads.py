@@ -8,12 +8,13 @@ from collections.abc import Collection, Iterator
 from heapq import heappop, heappush
 from typing import NamedTuple
 
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.lifts import lift_tracks, platform_on
 from onboard.ways.occupancy import Sweep, alley_segments, leg_sweeps, turn_in_us
 from onboard.ways.reservations import FOREVER
+from onboard.ways.site import TrackKind, WaySite
 
 #: Sites whose tables are kept in one process: one in a machine, some in a test run.
 _MAX_KEPT = 16
@@ -36,7 +37,7 @@ class Move(NamedTuple):
 class Roads:
     """Moves and shortest times of one site. A position is a segment of an alley or spur, or a platform."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: WaySite) -> None:
         self.site = site
         self._positions: dict[int, dict[int, Segment]] = {}
         self._run_us: dict[int, tuple[int, ...]] = {}
@@ -197,7 +198,7 @@ _Ways = dict[int, list[tuple[int, int]]]
 _kept: dict[int, Roads] = {}
 
 
-def roads_of(site: Site) -> Roads:
+def roads_of(site: WaySite) -> Roads:
     """The roads of a site, built at the first call for this very object."""
     roads = _kept.get(id(site))
     # A kept table holds its site, so an identity in use is never that of another site.

@@ -18,11 +18,12 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 from onboard.core.codes import LegAction
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
 from onboard.ways.departures import Departures
 from onboard.ways.kinematics import ceil_ms
 from onboard.ways.reservations import FOREVER, Interval, Reservations
 from onboard.ways.roads import Move, Roads, roads_of
+from onboard.ways.site import WaySite
 from onboard.ways.stops import Stops
 
 
@@ -68,7 +69,7 @@ class NoRoute(NamedTuple):
     expansions: int
 
 
-def free_flow_us(site: Site, start: Segment, start_us: int, visits: tuple[Visit, ...]) -> int:
+def free_flow_us(site: WaySite, start: Segment, start_us: int, visits: tuple[Visit, ...]) -> int:
     """When the last visit would end with nobody in the way and every lift at hand: the least of all routes.
 
     It depends on nothing but site and arguments. FOREVER where a visit is out of reach.
@@ -87,7 +88,7 @@ def free_flow_us(site: Site, start: Segment, start_us: int, visits: tuple[Visit,
 
 
 def plan_route(
-    site: Site,
+    site: WaySite,
     reservations: Reservations,
     owner: int,
     start: Segment,

@@ -4,14 +4,15 @@ A machine that says what it waits for, or that its plan comes later, is given lo
 the end only its place counts.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, ManualMode
 from onboard.core.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
-from onboard.core.mirror import Mirror
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
 from onboard.ways.occupancy import final_position, turned_in
+from onboard.ways.site import WaySite
 
 #: A machine that says nothing stands for so long after it should have been elsewhere, us: a door or a drive's retries
 #: take less. Ours.
@@ -41,10 +42,10 @@ class _Seen:
 
 @dataclass
 class Standing:
-    """What one machine saw of the others' motions. All times are bus time in us."""
+    """What one machine saw of the others' motions, and their plans. All times are bus time in us."""
 
-    site: Site
-    mirror: Mirror
+    site: WaySite
+    itineraries: Mapping[int, Itinerary]
     _seen: dict[int, _Seen] = field(default_factory=dict)
 
     def hear(self, message: Message, now_us: int) -> None:
@@ -84,7 +85,7 @@ class Standing:
 
     def _leaves_us(self, node: int, seen: _Seen, now_us: int) -> int | None:
         """When its plan has it leave where it stands, at the latest; None where it may stand there for ever."""
-        itinerary = self.mirror.itineraries.get(node)
+        itinerary = self.itineraries.get(node)
         if itinerary is not seen.plan:
             seen.plan = itinerary
             seen.leaves_ms = None if itinerary is None else self._leaves_ms(itinerary, Segment(*seen.place[:2]))

@@ -17,6 +17,7 @@ from onboard.trace.frame_bits import frame_bits
 from onboard.trace.indicators import Indicators
 from onboard.trace.scene.scenes import scene_of
 from onboard.trace.view import SiteView
+from onboard.ways.site import way_site
 
 #: Calls, and lines of events, that a snapshot tells.
 CALLS_SHOWN = 12
@@ -39,7 +40,7 @@ class LivePicture:
         self.history = self.view.history
         self.scene = scene_of(site, self.view)
         #: Whether machines move along tracks here: the indicators of robots and lifts are of such a site.
-        self.has_tracks = bool(site.tracks)
+        self.has_tracks = bool(way_site(site).tracks)
         self.indicators = Indicators(site, history=self.history)
         self._clock = self.history.clock
         self._lives = self.history.lives

@@ -29,7 +29,7 @@ def is_in(kind: KindCode, nodes: Iterable[str]) -> bool:
 def why_unheard(message: Message, machines: Mapping[int, Machine], speakers: Speakers) -> Reason:
     """Why no machine of a site listens to a message of its fleet bus: NOT_OF_SITE, NOT_OF_KIND; NONE where they do.
 
-    For who watches a site: its machines have their own rule (core/admission.py).
+    For who watches a site: its machines have their own rule (holon/admission.py).
     """
     kinds = speakers.get(type(message))
     if kinds is None or isinstance(message, EmergencyStop):

@@ -7,8 +7,8 @@ import pytest
 from bus_sim.systems.cell.plant import CellPlant
 from bus_sim.systems.cell.show import plan
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, TaskPhase
-from onboard.core.holon import Holon
 from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.holon.holon import Holon
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.memory import undertakings
 from onboard.systems.cell.messages import (

@@ -12,6 +12,7 @@ from onboard.config.problems import ConfigError
 from onboard.config.reader import Table
 from onboard.config.site import parse_site
 from onboard.core.site import Segment
+from onboard.systems.car_park.site import car_park
 from tests.config.support import ROOT
 
 SITE_PAGE = ROOT / "docs" / "site-file.md"
@@ -83,7 +84,7 @@ def test_the_site_page_names_every_key_with_its_range_and_default(monkeypatch: p
     asked = Asked(monkeypatch)
     rows = rows_of(SITE_PAGE)
     for text in examples_of(SITE_PAGE):
-        parse_site(text, "site-file.md")
+        car_park(parse_site(text, "site-file.md"))
     told = {section: set(keys) for section, keys in rows.items() if section != "[stewards]"}
     for keys in asked.keys.values():
         keys -= {str(number) for number in range(256)}
@@ -93,7 +94,7 @@ def test_the_site_page_names_every_key_with_its_range_and_default(monkeypatch: p
 
 
 def test_the_example_of_the_site_page_means_what_its_comments_say() -> None:
-    site = parse_site(examples_of(SITE_PAGE)[0], "site-file.md")
+    site = car_park(parse_site(examples_of(SITE_PAGE)[0], "site-file.md"))
     assert [site.tracks[number].length for number in (1, 9, 10, 128, 129)] == [40, 40, 30, 10, 5]
     assert not [place for place in site.places if place.index == 20]
     assert site.machine("MR3").home == Segment(192, 1)
@@ -111,7 +112,7 @@ def test_the_line_of_too_few_refuges_on_the_site_page_is_what_is_printed() -> No
     text = (ROOT / "bus_sim" / "sites" / "standard.toml").read_text(encoding="utf-8")
     more = "".join(f'[[robots]]\nname = "MR{n}"\nnode = {n + 10}\nhome = "p({n - 3},5)"\n' for n in (5, 6))
     with pytest.raises(ConfigError) as caught:
-        parse_site(text + more, "standard.toml")
+        car_park(parse_site(text + more, "standard.toml"))
     assert f"```\n{caught.value}\n```" in SITE_PAGE.read_text(encoding="utf-8")
 
 

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from onboard.config.site import parse_site
 from onboard.core.codes import KindCode
+from onboard.systems.car_park.site import car_park
 from onboard.ways.refuges import open_refuges
 from tests.config.support import problems_of
 
@@ -96,7 +97,7 @@ ROOM = {
 
 @pytest.mark.parametrize("text", ROOM.values(), ids=ROOM.keys())
 def test_enough_room_is_taken(text: str) -> None:
-    assert parse_site(text, "s.toml").machine("MR1").kind is KindCode.ROBOT
+    assert car_park(parse_site(text, "s.toml")).machine("MR1").kind is KindCode.ROBOT
 
 
 def test_a_study_of_crowds_may_ask_for_more_than_there_is_room_for() -> None:
@@ -114,7 +115,7 @@ def test_robots_are_taken_just_where_each_stands_in_a_refuge_that_the_others_lea
     if not fits:
         assert problems_of(text)
         return
-    site = parse_site(text, "s.toml")
+    site = car_park(parse_site(text, "s.toml"))
     stand = [machine.home for machine in site.machines.values() if machine.kind is KindCode.ROBOT]
     for home in stand:
         assert home in open_refuges(site, [other for other in stand if other != home])

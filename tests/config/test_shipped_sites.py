@@ -4,13 +4,14 @@ import pytest
 
 from bus_sim.sites import find_site, site_names
 from onboard.core.codes import KindCode
-from onboard.core.site import Machine, Segment, Site, TrackKind
-from onboard.systems.car_park.site import CarPark
+from onboard.core.site import Machine, Segment
+from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.occupancy import standing_segments
 from onboard.ways.reach import stranded_by
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations, Window
 from onboard.ways.sipp import NoRoute, Visit, plan_route
+from onboard.ways.site import TrackKind, WaySite
 
 SECOND = 1_000_000
 #: Floors, positions, places, then compartments, lifts, robots and spurs.
@@ -22,14 +23,14 @@ SIZES = {
 }
 
 
-def of_kind(site: Site, kind: KindCode) -> list[Machine]:
+def of_kind(site: WaySite, kind: KindCode) -> list[Machine]:
     return [machine for machine in site.machines.values() if machine.kind is kind]
 
 
 def test_p30_every_shipped_site_has_the_size_that_it_is_known_for() -> None:
     assert [name for name in site_names() if find_site(name).system == CarPark.system] == sorted(SIZES)
     for name, size in SIZES.items():
-        site = find_site(name)
+        site = car_park(find_site(name))
         tracks = list(site.tracks.values())
         alleys = [track for track in tracks if track.kind is TrackKind.ALLEY]
         machines = [len(of_kind(site, kind)) for kind in (KindCode.COMPARTMENT, KindCode.LIFT, KindCode.ROBOT)]
@@ -39,13 +40,13 @@ def test_p30_every_shipped_site_has_the_size_that_it_is_known_for() -> None:
 
 @pytest.mark.parametrize("name", ["small", "standard", "large"])
 def test_the_loss_of_either_lift_strands_nothing(name: str) -> None:
-    site = find_site(name)
+    site = car_park(find_site(name))
     assert [stranded_by(site, lift.home.track) for lift in of_kind(site, KindCode.LIFT)] == [(), ()]
 
 
 @pytest.mark.parametrize("name", ["small", "standard", "large"])
 def test_with_all_robots_at_home_for_ever_any_one_finds_a_way_to_every_place_not_before_another(name: str) -> None:
-    site = find_site(name)
+    site = car_park(find_site(name))
     robots = of_kind(site, KindCode.ROBOT)
     fronts = [station.segment for station in site.compartments.values()]
     for number, place in enumerate(site.places):
@@ -56,7 +57,7 @@ def test_with_all_robots_at_home_for_ever_any_one_finds_a_way_to_every_place_not
             assert found, (robot.name, str(place))
 
 
-def route(site: Site, robot: Machine, others: list[Segment], goals: tuple[Segment, ...]) -> bool:
+def route(site: WaySite, robot: Machine, others: list[Segment], goals: tuple[Segment, ...]) -> bool:
     """Whether a robot can carry a car between two segments and end in a refuge, the others standing for ever."""
     reservations = Reservations()
     for node_id, home in enumerate(others, start=100):

@@ -9,7 +9,10 @@ from hypothesis import strategies as st
 
 from onboard.config.site import load_site, parse_site, site_digest
 from onboard.core.codes import KindCode, Side
-from onboard.core.site import Axis, Segment, Station, Timing, Track, TrackKind
+from onboard.core.site import Segment, Station
+from onboard.systems.car_park.site import car_park
+from onboard.ways.site import Axis, Track, TrackKind, way_site
+from onboard.work.timing import DeviceTiming
 from tests.config.support import ROOT, TWO_FLOORS, changed
 
 SHIPPED = sorted((ROOT / "bus_sim" / "sites").glob("*.toml"))
@@ -32,7 +35,7 @@ home = "p(1,1)"
 
 
 def test_p30_p31_floors_lifts_compartments_and_spurs_become_tracks_and_stations() -> None:
-    site = parse_site(TWO_FLOORS, "s.toml")
+    site = car_park(parse_site(TWO_FLOORS, "s.toml"))
     assert site.tracks == {
         1: Track(1, TrackKind.ALLEY, 8, 2_400),
         2: Track(2, TrackKind.ALLEY, 8, 2_400),
@@ -53,19 +56,19 @@ def test_p30_p31_floors_lifts_compartments_and_spurs_become_tracks_and_stations(
 
 
 def test_places_are_in_the_order_of_floor_side_and_index() -> None:
-    places = parse_site(TWO_FLOORS, "s.toml").places
+    places = car_park(parse_site(TWO_FLOORS, "s.toml")).places
     assert list(places) == sorted(places, key=lambda one: (one.track, one.side, one.index))
 
 
 def test_gaps_by_place_by_position_and_on_all_floors() -> None:
     site = parse_site(changed("count = 2", 'count = 2\nwithout = ["p(1,7)N", "p(2,6)", "p(*,3)F"]'), "s.toml")
-    gone = set(parse_site(TWO_FLOORS, "s.toml").places) - set(site.places)
+    gone = set(way_site(parse_site(TWO_FLOORS, "s.toml")).places) - set(way_site(site).places)
     assert sorted(map(str, gone)) == ["p(1,3)F", "p(1,7)N", "p(2,3)F", "p(2,6)F", "p(2,6)N"]
 
 
 def test_a_floor_may_have_a_length_and_sides_of_its_own() -> None:
-    site = parse_site(
-        changed("positions = 8\n", 'positions = 8\n[floors.2]\npositions = 6\nsides = ["near"]\n'), "s.toml"
+    site = car_park(
+        parse_site(changed("positions = 8\n", 'positions = 8\n[floors.2]\npositions = 6\nsides = ["near"]\n'), "s.toml")
     )
     assert [site.tracks[1].length, site.tracks[2].length] == [8, 6]
     assert site.tracks[129].joins == (Segment(1, 8), Segment(2, 6))
@@ -73,7 +76,7 @@ def test_a_floor_may_have_a_length_and_sides_of_its_own() -> None:
 
 
 def test_defaults_of_speeds_lengths_and_times() -> None:
-    site = parse_site(SMALLEST, "s.toml")
+    site = car_park(parse_site(SMALLEST, "s.toml"))
     assert (site.bitrate, site.carrier, site.shuttle, site.lift) == (
         500_000,
         Axis(1_500, 500),
@@ -81,7 +84,7 @@ def test_defaults_of_speeds_lengths_and_times() -> None:
         Axis(1_083, 500),
     )
     assert (site.carrier_length_mm, site.carrier_clearance_mm, site.shuttle_reach_mm) == (2_300, 50, 5_400)
-    assert site.timing == Timing(
+    assert site.timing == DeviceTiming(
         call_window_us=1_000_000,
         bid_delay_us=300_000,
         bid_half_us=10_000_000,
@@ -100,7 +103,9 @@ def test_defaults_of_speeds_lengths_and_times() -> None:
 def test_the_bidding_delay_grows_with_robots_on_a_slow_bus() -> None:
     robots = "".join(f'[[robots]]\nname = "MR{n}"\nnode = {n + 10}\nhome = "p(1,{n + 10})"\n' for n in range(2, 21))
     text = changed("positions = 3", "positions = 40", SMALLEST) + robots + "[timing]\ncall_window_ms = 5_000\n"
-    site = parse_site(changed('name = "smallest"', 'name = "smallest"\nbitrate = 20_000', text), "s.toml", crowded=True)
+    site = car_park(
+        parse_site(changed('name = "smallest"', 'name = "smallest"\nbitrate = 20_000', text), "s.toml", crowded=True)
+    )
     assert site.timing.bid_delay_us == 3 * 20 * 2 * 160 * 1_000_000 // 20_000
 
 
@@ -110,23 +115,23 @@ def test_a_robot_may_be_at_home_in_a_spur() -> None:
 
 
 def test_stewards_are_the_nearest_fixed_machines_unless_named() -> None:
-    site = parse_site(TWO_FLOORS, "s.toml")
+    site = car_park(parse_site(TWO_FLOORS, "s.toml"))
     assert site.stewards == {1: 1, 2: 2, 128: 2, 129: 3, 192: 2}
-    site = parse_site(TWO_FLOORS + '[stewards]\n2 = "IOC1"\n192 = "LR"\n', "s.toml")
+    site = car_park(parse_site(TWO_FLOORS + '[stewards]\n2 = "IOC1"\n192 = "LR"\n', "s.toml"))
     assert site.stewards == {1: 1, 2: 1, 128: 2, 129: 3, 192: 3}
 
 
 def test_ten_floors_of_forty_positions_fit_in_a_few_lines() -> None:
-    site = parse_site(changed("count = 2\npositions = 8", "count = 10\npositions = 40"), "s.toml")
+    site = car_park(parse_site(changed("count = 2\npositions = 8", "count = 10\npositions = 40"), "s.toml"))
     assert len(site.places) == 10 * 40 * 2 - 2
     assert site.tracks[128].length == 10
 
 
 def test_two_texts_that_mean_the_same_have_the_same_digest() -> None:
-    first = parse_site(TWO_FLOORS, "s.toml")
+    first = car_park(parse_site(TWO_FLOORS, "s.toml"))
     head, robots = TWO_FLOORS.split("[[robots]]")
     inline = 'robots = [{node = 0xB, home = "p( 2 , 3 )", name = "MR1"}]  # the same robot\n'
-    second = parse_site(inline + head + "[carrier]\nspeed_mm_s = 1_500\n", "other.toml")
+    second = car_park(parse_site(inline + head + "[carrier]\nspeed_mm_s = 1_500\n", "other.toml"))
     assert robots
     assert second == first
 
@@ -147,12 +152,12 @@ CHANGES = {
 
 @pytest.mark.parametrize(("old", "new"), CHANGES.values(), ids=CHANGES.keys())
 def test_another_meaning_has_another_digest(old: str, new: str) -> None:
-    assert parse_site(changed(old, new), "s.toml").digest != parse_site(TWO_FLOORS, "s.toml").digest
+    assert car_park(parse_site(changed(old, new), "s.toml")).digest != car_park(parse_site(TWO_FLOORS, "s.toml")).digest
 
 
 @given(st.integers(10, 20_000))
 def test_the_digest_is_of_16_bits_and_never_0(speed_mm_s: int) -> None:
-    site = parse_site(SMALLEST, "s.toml")
+    site = car_park(parse_site(SMALLEST, "s.toml"))
     assert 1 <= site_digest(dataclasses.replace(site, carrier=Axis(speed_mm_s, 500))) <= 0xFFFF
 
 
@@ -167,7 +172,7 @@ def test_p31_a_position_is_read_as_it_is_written(floor: int, index: int, blank: 
     compartments = [{{name = "C", node = 1, at = "p({floor % 3 + 1},{index})"}}]
     robots = [{{name = "R", node = 2, home = "{written}"}}]
     """
-    assert parse_site(text, "s.toml").machines[2].home == segment
+    assert car_park(parse_site(text, "s.toml")).machines[2].home == segment
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
@@ -179,5 +184,5 @@ def test_level1_holds_the_cars_of_fourteen_stalls() -> None:
     site = load_site(ROOT / "bus_sim" / "sites" / "level1.toml")
     kinds = [machine.kind for machine in site.machines.values()]
     assert kinds == [KindCode.COMPARTMENT, KindCode.ROBOT]
-    assert len(site.places) == 23
+    assert len(way_site(site).places) == 23
     assert site.stewards == {1: 1}

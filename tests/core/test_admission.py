@@ -4,7 +4,6 @@ import pytest
 
 from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, OperatorAction, Reason, TokenKind
 from onboard.core.effects import Report, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     Blocked,
     BusTime,
@@ -19,7 +18,9 @@ from onboard.core.messages import (
     TokenHeld,
 )
 from onboard.core.recovery_messages import Go
+from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
+from onboard.ways.mirror import way_mirror
 from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
 
@@ -80,7 +81,7 @@ def test_what_its_sender_may_not_say_is_counted_told_and_changes_nothing(said: M
 def test_the_steward_and_an_operator_say_that_a_segment_is_blocked(sender: int) -> None:
     made = robot()
     made.receive(Blocked(sender, TRACK, 3, Reason.OPERATOR), 10)
-    assert [segment.index for segment in made.mirror.obstacles.blocked] == [3]
+    assert [segment.index for segment in way_mirror(made.mirror).obstacles.blocked] == [3]
     assert not made.drops
 
 

@@ -2,9 +2,9 @@
 
 from bus_sim.sites import find_site
 from onboard.core.codes import KindCode, Reason
-from onboard.core.holding import STOP_LASTS_US, Hold
-from onboard.core.holon import Holon
 from onboard.core.messages import BusTime, EmergencyStop
+from onboard.holon.holding import STOP_LASTS_US, Hold
+from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 
 SITE = find_site("small")

@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from onboard.core.codes import Reason
 from onboard.core.messages import SyncRequest, TokenRefusal
+from onboard.ways.mirror import way_mirror
 from tests.core.walkers import Alley
 
 LEFT, RIGHT = 11, 12
@@ -63,7 +64,7 @@ def test_differing_views_are_refused_and_mended_by_statements() -> None:
     alley = Alley({LEFT: [9], RIGHT: [3]}, {LEFT: [1], RIGHT: [2]}, seed=1)
     alley.run(0.2)
     alley.walker(LEFT).may_move_at_us = 1 << 60
-    mirror = alley.holons[RIGHT].mirror
+    mirror = way_mirror(alley.holons[RIGHT].mirror)
     alley.run(1)
     del mirror.order._ways[LEFT], mirror.itineraries[LEFT], mirror.plans[LEFT]
     alley.holons[RIGHT].tokens.wanted.clear()

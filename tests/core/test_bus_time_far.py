@@ -4,8 +4,8 @@ from bus_sim.sites import find_site
 from onboard.core.bus_time import BUS_TIME_MODULUS, FAR_US, MAX_SLEW_US, BusClock
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import BusTime
+from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 
 SITE = find_site("small")

@@ -3,7 +3,7 @@
 import pytest
 
 from onboard.core.codes import NOBODY, Reason
-from onboard.core.holding import QUIET_BEATS, STOP_LASTS_US, TWIN_BEATS, Hold, Holding, Outcome
+from onboard.holon.holding import QUIET_BEATS, STOP_LASTS_US, TWIN_BEATS, Hold, Holding, Outcome
 
 ME, OTHER = 11, 12
 BEAT_US = 1_000_000

@@ -2,15 +2,17 @@
 
 import pytest
 
-from onboard.core.authority import car_token, segment_token
+from onboard.core.authority import segment_token
 from onboard.core.codes import CONTRACT_VERSION, OUTSIDE, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Report, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import CarAt, Heartbeat, Reference, SyncRequest, TokenGrant, TokenHeld
-from onboard.core.mirror import MAX_GONE_CARS, Mirror
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
+from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
+from onboard.ways.cars import MAX_GONE_CARS
+from onboard.ways.mirror import WayMirror, way_mirror
+from onboard.ways.tokens import car_token
 from tests.core.walkers import Alley
 from tests.sites import one_floor
 
@@ -85,7 +87,7 @@ def test_a_steward_with_its_journal_goes_on_where_it_was() -> None:
 
 
 def test_one_version_of_a_cars_token_has_one_custodian() -> None:
-    mirror = Mirror(SITE, 1)
+    mirror = WayMirror(SITE, 1)
     car = Reference(1, 5)
     place, other = SITE.places[0].number, SITE.places[1].number
     assert mirror.on_car(CarAt(1, car, place, 3, 2500))
@@ -108,16 +110,18 @@ def test_cars_that_left_long_ago_leave_nothing_behind() -> None:
         machine.receive(CarAt(ROBOT, car, SITE.places[0].number, 2, 2500), 10)
         machine.receive(TokenGrant(ROBOT, TokenKind.CAR, car_token(*car).number, 3, STEWARD), 10)
         assert machine.tokens.holds(car_token(*car))
-        machine.mirror.on_car(CarAt(STEWARD, car, OUTSIDE, 3, 2500))
-    for table in (machine.mirror.cars, machine.tokens.seen, machine.tokens.held, machine.tokens.given):
+        way_mirror(machine.mirror).on_car(CarAt(STEWARD, car, OUTSIDE, 3, 2500))
+    for table in (way_mirror(machine.mirror).cars, machine.tokens.seen, machine.tokens.held, machine.tokens.given):
         assert len(table) <= MAX_GONE_CARS + 1
     first = Reference(STEWARD, 1)
     machine.tokens.create(car_token(*first))
-    assert machine.mirror.on_car(CarAt(STEWARD, first, SITE.places[0].number, 1, 2500)), "numbers come again"
+    assert way_mirror(machine.mirror).on_car(CarAt(STEWARD, first, SITE.places[0].number, 1, 2500)), (
+        "numbers come again"
+    )
 
 
 def test_cars_that_are_there_are_never_forgotten_however_many_have_left() -> None:
-    mirror = Mirror(SITE, 1)
+    mirror = WayMirror(SITE, 1)
     forgotten: list[Reference] = []
     mirror.on_forgotten.append(forgotten.append)
     for number in range(1, MAX_GONE_CARS):

@@ -7,15 +7,16 @@ import pytest
 
 from bus_sim.sites import find_site
 from onboard.core.authority import TokenBook, TokenKey, segment_token
-from onboard.core.behaviour import Fleet, NoEstimator, Plain
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode, LightColour, Reason
 from onboard.core.effects import Actuate, Effect, Halt, Tell
-from onboard.core.holon import Holon
 from onboard.core.messages import DriveOrder, EmergencyStop, LightOrder, SyncRequest
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import ALONE, MotionAuthority, Permit, authorised
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Segment, Site
+from onboard.holon.holon import Holon
+from onboard.work.plain import NoEstimator, Plain
 
 SITE = find_site("small")
 ME, PEER = sorted(SITE.machines)[-1], sorted(SITE.machines)[0]
@@ -38,7 +39,7 @@ class Eager(Plain):
         return asked(self) if asked is not None else []
 
 
-class EagerFactory:
+class EagerFactory(BehaviourFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         return NoEstimator()
 

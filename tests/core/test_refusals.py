@@ -1,14 +1,15 @@
 """Only who holds a token can refuse it; a word of anybody else keeps nobody from asking."""
 
 from onboard.core.authority import TokenBook, segment_token
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import Fleet
 from onboard.core.codes import Reason
 from onboard.core.messages import TokenRefusal
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation
-from onboard.core.rights import Rights
 from onboard.core.site import Segment
-from onboard.core.witness import Witness
+from onboard.holon.rights import Rights
+from onboard.holon.witness import Witness
+from onboard.work.plain import NoEstimator
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)

@@ -6,15 +6,16 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.behaviour import Fleet, NoEstimator, Plain
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
 from onboard.core.effects import Effect
-from onboard.core.holon import Holon
 from onboard.core.messages import Heartbeat, Message
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
+from onboard.holon.holon import Holon
+from onboard.work.plain import NoEstimator, Plain
 
 SITE = find_site("small")
 ME, PEER, OTHER = sorted(SITE.machines)[-1], sorted(SITE.machines)[0], sorted(SITE.machines)[1]
@@ -36,7 +37,7 @@ class Still(Plain):
         return self.looks
 
 
-class StillFactory:
+class StillFactory(BehaviourFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         return NoEstimator()
 

@@ -9,7 +9,7 @@ from onboard.core.messages import Message, SyncRequest, TokenGrant, TokenHeld, T
 from onboard.core.mirror import Mirror, Peer
 from onboard.core.recovery_messages import Halted, SyncDone, TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
-from onboard.core.witness import ANSWER_PERIOD_US, Witness
+from onboard.holon.witness import ANSWER_PERIOD_US, Witness
 from tests.core.token_words import said
 from tests.sites import one_floor
 

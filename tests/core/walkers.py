@@ -10,10 +10,9 @@ from dataclasses import dataclass, field
 
 from onboard.config.site import parse_site
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
 from onboard.core.effects import Effect, Halt, Record, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     DriveState,
     Itinerary,
@@ -28,9 +27,12 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Machine, Segment, Site
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.travel import ORDER_PATIENCE_US
 from onboard.systems.registry import factory_for
 from onboard.ways.all_or_none import AllOrNone
+from onboard.ways.mirror import WayFleet, way_fleet
+from onboard.work.plain import NoEstimator
 
 STEP_US = 20_000
 #: A walker needs this long for a segment.
@@ -67,7 +69,7 @@ home = "p(1,12)"
 class Walker:
     """Goes from home to ``turns[n]`` and back in round ``rounds[n]`` of its plan, a round lasting ``ROUND_US``."""
 
-    fleet: Fleet
+    fleet: WayFleet
     turns: Sequence[int]
     rounds: Sequence[int]
     log: list[tuple[Segment, int, int]]
@@ -203,7 +205,8 @@ def leg(action: LegAction, one: int, other: int, end_us: int) -> Leg:
 
 
 @dataclass
-class WalkerFactory:
+class WalkerFactory(BehaviourFactory):
+    fleet_type = WayFleet
     turns: Sequence[int]
     rounds: Sequence[int]
     log: list[tuple[Segment, int, int]]
@@ -212,7 +215,7 @@ class WalkerFactory:
         return NoEstimator()
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Walker:
-        return Walker(fleet, self.turns, self.rounds, self.log)
+        return Walker(way_fleet(fleet), self.turns, self.rounds, self.log)
 
 
 class Alley:

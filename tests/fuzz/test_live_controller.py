@@ -67,7 +67,7 @@ def test_an_exception_in_a_controller_is_seen(monkeypatch: pytest.MonkeyPatch) -
     def fall(*_: object) -> bool:
         raise RuntimeError("planted")
 
-    monkeypatch.setattr("onboard.core.mirror.Mirror.on_car", fall)
+    monkeypatch.setattr("onboard.ways.car_words.CarWords.hear", fall)
     assert "RuntimeError: planted" in fuzzer.run(2_000).errors
 
 

@@ -12,13 +12,13 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.core.codes import Reason, TaskPhase
 from onboard.core.effects import Actuate, Send
-from onboard.core.holon import Holon
 from onboard.core.journal_records import Entry
 from onboard.core.journal_state import JournalState
 from onboard.core.messages import CarAt, Message, Reference, TaskReport
 from onboard.core.records import next_boot
 from onboard.core.recovery_messages import TokenGiven
 from onboard.core.site import journal_owner
+from onboard.holon.holon import Holon
 from onboard.io.journal import FileJournal
 from onboard.systems.cell.messages import OrderAnswer
 from onboard.systems.graph.messages import VisitAnswer

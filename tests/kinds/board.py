@@ -13,7 +13,6 @@ from onboard.core.codes import (
     Side,
 )
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     BusTime,
     CallForProposals,
@@ -26,6 +25,7 @@ from onboard.core.messages import (
     ShuttleState,
 )
 from onboard.core.site import Station
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.program import Handling, Work
 from onboard.systems.car_park.recovery import award_record, handled_record
 from onboard.systems.registry import factory_for

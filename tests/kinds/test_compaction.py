@@ -18,14 +18,14 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.registry import simulated_of
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.compaction import NUMBERS_KEPT, compact
-from onboard.core.holon import Holon
 from onboard.core.journal_records import JournalRecord, by_name
 from onboard.core.records import CORE_RECORDS
 from onboard.core.site import Site
+from onboard.holon.holon import Holon
 from onboard.io.sealed import SLOTS_BYTES, read
 from onboard.ports.journal import Entry
 from onboard.systems.registry import compaction_for, factory_for, system_of
+from onboard.work.compaction import NUMBERS_KEPT, compact
 from tests.mapd.sites import drawn, made
 
 SITES = ("small", "cell", "graph", "mapd", "terminal", "turning")
@@ -171,7 +171,7 @@ def test_a_car_that_left_is_forgotten_with_all_that_was_about_it() -> None:
         {"record": "token_given", "kind": 2, "number": 65541, "version": 4, "holder": 11},
         {"record": "token_gone", "kind": 2, "number": 65541, "version": 4, "holder": 11},
     ]
-    left: Entry = {"record": "car_left", "kind": 2, "number": 65541, "car_origin": 1, "car": 5}
+    left: Entry = {"record": "retired", "kind": 2, "number": 65541, "load_origin": 1, "load": 5}
     assert kept([*about, left], "small") == []
     assert len(kept(about, "small")) == len(about) - 1
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from onboard.core.authority import car_token, station_token
+from onboard.core.authority import station_token
 from onboard.core.codes import (
     ANY_STATION,
     OUTSIDE,
@@ -21,7 +21,6 @@ from onboard.core.codes import (
     TokenKind,
 )
 from onboard.core.effects import Effect, Record, Send, Tell
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     BayState,
     BusTime,
@@ -43,8 +42,10 @@ from onboard.core.messages import (
 from onboard.core.negotiation.winners import LOST_AFTER_US
 from onboard.core.recovery_messages import Go
 from onboard.core.site import Station
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_memory import winner_record
 from onboard.systems.registry import factory_for
+from onboard.ways.tokens import car_token
 from tests.sites import one_floor
 
 SITE = one_floor()

@@ -6,18 +6,18 @@ from typing import NamedTuple
 import pytest
 
 from onboard.core.authority import TokenBook
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import KindCode, LegAction, TokenKind
 from onboard.core.messages import CallForProposals, Itinerary, Stamp, TokenGrant, TokenHeld
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation, Proposal
-from onboard.core.site import Axis, Machine, Segment, Site
+from onboard.core.site import Machine, Segment, Site
 from onboard.systems.car_park.giving_way import Answer, GivingWay
 from onboard.systems.car_park.program import Program, Step
+from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
-from tests.core.buildings import building
-from tests.core.lines import ALLEY, SPUR, line_site
+from onboard.ways.site import Axis, WaySite, way_site
+from tests.ways.buildings import building
+from tests.ways.lines import ALLEY, SPUR, line_site
 
 #: 10 mm a segment, 1 m/s, top speed after 5 mm and 10 ms: half-millimetre arithmetic by hand, all times in 5 ms.
 QUICK = Axis(1_000, 100_000)
@@ -41,7 +41,7 @@ class Nobody:
 class Robot(NamedTuple):
     """What giving way needs of one machine."""
 
-    fleet: Fleet
+    fleet: WayFleet
     program: Program
     giving_way: GivingWay
 
@@ -54,11 +54,11 @@ class Robot(NamedTuple):
         return self.giving_way.heed(itinerary.sender, now_us)
 
 
-def robot(site: Site, node: int, steps: list[Step], *, award_ms: int = 0) -> Robot:
+def robot(site: WaySite, node: int, steps: list[Step], *, award_ms: int = 0) -> Robot:
     machine = Machine(node, f"MR{node}", KindCode.ROBOT, Segment(ALLEY, 1))
-    mirror = Mirror(site, node)
+    mirror = WayMirror(site, node)
     negotiation = Negotiation(node, KindCode.ROBOT, site.timing, Nobody(), boot=1)
-    fleet = Fleet(site, machine, TokenBook(site, node), mirror, negotiation)
+    fleet = WayFleet(site, machine, TokenBook(site, node), mirror, negotiation)
     program = Program(site, standing=Segment(ALLEY, 1))
     program.replace(steps, Stamp(award_ms, node, 1))
     made = Robot(fleet, program, GivingWay(fleet, program))
@@ -182,15 +182,17 @@ def test_what_is_over_means_nothing() -> None:
 
 def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) -> list[Step] | None:
     """A route of one robot around all others': to work somewhere, and to stand on a floor of its own."""
-    mirror = Mirror(place, node)
+    mirror = WayMirror(way_site(place), node)
     for other in robots:
         mirror.on_itinerary(other.told(), 0)
-    length, home = place.tracks[1].length, node - 10
+    length, home = way_site(place).tracks[1].length, node - 10
     start = Segment(home, chance.randint(2, length - 1))
     goal = Segment(chance.randint(1, 3), chance.randint(2, length - 1))
     refuges = frozenset(Segment(home, index) for index in range(2, length))
     visits = (Visit(goal, 20 * MS),)
-    route = plan_route(place, mirror.reservations, node, start, chance.randrange(50) * MS, visits, refuges, 20_000)
+    route = plan_route(
+        way_site(place), mirror.reservations, node, start, chance.randrange(50) * MS, visits, refuges, 20_000
+    )
     if not isinstance(route, Route):
         return None
     return [Step(leg.action, leg.track, leg.from_index, leg.to_index, leg.begin_us, leg.end_us) for leg in route.legs]

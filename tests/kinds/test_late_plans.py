@@ -5,6 +5,7 @@ from onboard.core.codes import LegAction
 from onboard.core.messages import Stamp
 from onboard.core.site import Segment
 from onboard.systems.car_park.program import Program, Step
+from onboard.ways.site import way_site
 
 SECOND = 1_000_000
 
@@ -18,7 +19,7 @@ def times(program: Program) -> list[tuple[float, float]]:
 
 
 def planned(*steps: Step) -> Program:
-    program = Program(find_site("small"))
+    program = Program(way_site(find_site("small")))
     program.begin(Segment(1, 1), list(steps), Stamp(0, 1, 1))
     return program
 

@@ -14,7 +14,7 @@ from bus_sim.options import RunOptions
 from bus_sim.run import BusRun, buses_of
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.behaviour import Fleet, NoEstimator, Plain
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import Criterion, KindCode, Operation, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import NO_REFERENCE, Award, Bid, Message, Reference, TaskReport
@@ -23,6 +23,7 @@ from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.registry import add_system, remove_system
 from onboard.systems.system import System
+from onboard.work.plain import NoEstimator, Plain
 
 PAGE = Path(__file__).parents[2] / "docs" / "new-kind.md"
 DESK, OLD, NEW = 1, 21, 22
@@ -53,7 +54,7 @@ class Desk(Plain):
         return 10_000_000 + 2_000_000 * self.left[0] if self.left else None
 
 
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         return NoEstimator()
 

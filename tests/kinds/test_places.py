@@ -3,9 +3,9 @@
 from onboard.core.authority import station_token
 from onboard.core.codes import Grade, KindCode, LegAction, Reason, ShuttleMode
 from onboard.core.effects import Record
-from onboard.core.holon import Holon
 from onboard.core.messages import CarAt, Itinerary, Reference, Stamp
 from onboard.core.site import Station
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.program import Handling, Step, Work, to_itinerary
 from onboard.systems.car_park.recovery import Recovery
 from onboard.systems.registry import factory_for

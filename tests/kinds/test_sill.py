@@ -5,7 +5,6 @@ from onboard.core.authority import segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, Reason, ShuttleMode, Side, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     BusTime,
     DriveOrder,
@@ -22,12 +21,14 @@ from onboard.core.messages import (
     TokenRequest,
 )
 from onboard.core.site import Segment
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.lift import Lift
 from onboard.systems.car_park.robot import Robot
+from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
 from onboard.ways.lifts import gate, platform, says_standing, under_gate
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 BAY, LIFT, ROBOT, OTHER = 1, 5, 11, 12
 SHAFT = 128
 FLOOR = 2

@@ -1,14 +1,14 @@
 """A carriage before, in and after a turn: what it asks for, orders and tells (design, section 5)."""
 
 from onboard.core.authority import TokenBook, segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, KindCode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, TokenGrant, TokenRequest
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark
 from onboard.systems.car_park.travel import Carriage
+from onboard.ways.mirror import WayFleet, WayMirror
 from tests.kinds.test_giving_way import Nobody
 from tests.sites import one_floor
 
@@ -18,14 +18,14 @@ MOUTH_MM = 6 * PITCH_MM
 ROBOT, OTHER, STEWARD = 11, 12, 1
 
 
-def site() -> Site:
+def site() -> CarPark:
     return one_floor(2, extra='[[spurs]]\nat = "p(1,7)"\n')
 
 
 def carriage() -> Carriage:
     here = site()
     negotiation = Negotiation(ROBOT, KindCode.ROBOT, here.timing, Nobody(), boot=1)
-    fleet = Fleet(here, here.machines[ROBOT], TokenBook(here, ROBOT), Mirror(here, ROBOT), negotiation)
+    fleet = WayFleet(here, here.machines[ROBOT], TokenBook(here, ROBOT), WayMirror(here, ROBOT), negotiation)
     return Carriage(fleet, 1)
 
 
@@ -121,7 +121,7 @@ def test_turned_into_some_spur_that_nobody_remembers_it_is_nowhere_known() -> No
 
 
 def test_a_silent_machine_that_is_turned_in_a_mouth_stands_in_both_for_the_others() -> None:
-    mirror = Mirror(site(), ROBOT)
+    mirror = WayMirror(site(), ROBOT)
     mirror.on_progress(Progress(OTHER, 1, 0, 192, 0, 0, 0))
     mirror.set_aside(OTHER, frozenset((MOUTH, INSIDE)), Reason.NODE_SILENT, 0)
     assert {one.track for one in mirror.others_standing()} == {1, 192}

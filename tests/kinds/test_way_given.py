@@ -2,10 +2,12 @@
 
 from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
-from onboard.core.mirror import Mirror
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.generation import YIELDING_US, CarParkGeneration
 from onboard.systems.car_park.program import Program
+from onboard.systems.car_park.site import car_park
+from onboard.ways.mirror import WayMirror
+from onboard.ways.site import way_site
 from tests.system.test_giving_way import BUSY, IDLE, tower
 
 CAR = Reference(1, 7)
@@ -32,11 +34,11 @@ def fetch(from_index: int) -> CallForProposals:
 
 def robot_at(mine: Segment, others: Segment) -> CarParkGeneration:
     site = tower()
-    mirror = Mirror(site, BUSY)
+    mirror = WayMirror(way_site(site), BUSY)
     for node, place in ((IDLE, others), (BUSY, mine)):
         leg = Leg(LegAction.STAND, place.track, place.index, place.index, Side.NEAR, 1)
         mirror.on_itinerary(Itinerary(node, 1, Grade.FIRM, Stamp(0, node, 0), (leg,)), 0)
-    return CarParkGeneration(site, site.machines[BUSY], mirror, Program(site, standing=mine))
+    return CarParkGeneration(car_park(site), site.machines[BUSY], mirror, Program(way_site(site), standing=mine))
 
 
 def test_p38_a_way_around_is_taken_at_once_and_one_through_counts_on_time_to_give_way() -> None:

@@ -23,11 +23,12 @@ from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import Message, SyncRequest, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.mirror import Mirror, Peer
 from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
-from onboard.core.witness import Doubt, Witness
+from onboard.holon.witness import Doubt, Witness
+from onboard.systems.car_park.site import car_park
 from tests.core.token_words import hear
 from tests.models.table import Table
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 KEY = TokenKey(TokenKind.STATION, next(iter(SITE.compartments.values())).number)
 #: No machine of the site.
 GHOST = 240

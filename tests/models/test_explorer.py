@@ -8,7 +8,7 @@ import pytest
 from onboard.core.authority import TokenBook
 from onboard.core.belief import Belief, Beliefs
 from onboard.core.effects import Effect
-from onboard.core.witness import Witness
+from onboard.holon.witness import Witness
 from tests.models.explorer import Explorer, Found, Limits
 
 #: Limits of CPU time are for runs in which a bug is looked for; a clean run has to be complete.

@@ -4,22 +4,24 @@ from bus_sim.sites import find_site
 from onboard.core.authority import TokenBook
 from onboard.core.codes import ANY_STATION, MachineState, Reason
 from onboard.core.messages import CarAt, Reference
-from onboard.core.mirror import Mirror, Peer
-from onboard.core.presence import Presence
+from onboard.core.mirror import Peer
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
+from onboard.holon.presence import Presence
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
+from onboard.systems.car_park.site import car_park
+from onboard.ways.mirror import WayMirror
 from tests.operate.hand import beat
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 ME = min(SITE.machines)
 ROBOT = next(node for node, machine in SITE.machines.items() if machine.name == "MR1")
 NOW_US = 30_000_000
 
 
 def presence(*, with_car: bool) -> Presence:
-    mirror, tokens = Mirror(SITE, ME), TokenBook(SITE, ME)
+    mirror, tokens = WayMirror(SITE, ME), TokenBook(SITE, ME)
     mirror.peers[ROBOT] = Peer(SITE.machines[ROBOT].kind, MachineState.WORKING, 3, 0, NOW_US, 0, 0, NOW_US)
     mirror.set_aside(ROBOT, frozenset({Segment(1, 3)}), Reason.FALSE_STATEMENT, NOW_US)
     if with_car:

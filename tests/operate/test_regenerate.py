@@ -17,6 +17,7 @@ from onboard.core.recovery_messages import (
 from onboard.core.site import Segment
 from onboard.operate.names import OperateError
 from onboard.operate.wishes import Wish, maker_of
+from onboard.ways.site import way_site
 from tests.operate.hand import ALL, SECOND, SITE, Hand, beat, halted
 
 MR1, MR2 = SITE.machine("MR1").node_id, SITE.machine("MR2").node_id
@@ -195,7 +196,7 @@ def test_a_grant_on_its_way_to_who_lives_becomes_that_machines() -> None:
 
 def test_a_car_goes_to_who_keeps_its_place() -> None:
     car = Reference(1, 7)
-    place = next(place for place in SITE.places if place.track == 3)
+    place = next(place for place in way_site(SITE).places if place.track == 3)
     key = TokenKey(TokenKind.CAR, car.origin << 16 | car.number)
     hand, machines = started(
         *BODY,

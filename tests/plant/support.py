@@ -17,7 +17,9 @@ from bus_sim.systems.car_park.plant.world import World
 from onboard.config.site import parse_site
 from onboard.core.codes import DoorAction, DoorName, LightColour, ShuttleAction, Side
 from onboard.core.messages import DoorOrder, DriveOrder, LightOrder, Message, ShuttleOrder
-from onboard.core.site import Site, Station
+from onboard.core.site import Station
+from onboard.systems.car_park.site import CarPark, car_park
+from onboard.ways.site import WaySite
 from tests.sites import one_floor
 
 M = TypeVar("M", bound=Message)
@@ -60,9 +62,9 @@ home = "p(3,4)"
 """
 
 
-def three_floors(home: str = "p(1,2)", upper: int = 6) -> Site:
+def three_floors(home: str = "p(1,2)", upper: int = 6) -> CarPark:
     """Three alleys between two lifts; MR1 (node 11) at ``home``, MR2 at p(3,4); ``upper`` positions on floor 3."""
-    return parse_site(THREE_FLOORS.format(home=home, upper=upper), "test.toml", crowded=True)
+    return car_park(parse_site(THREE_FLOORS.format(home=home, upper=upper), "test.toml", crowded=True))
 
 
 @dataclass
@@ -133,7 +135,7 @@ class ListLink:
 class Bench:
     """A plant without controllers."""
 
-    site: Site = field(default_factory=one_floor)
+    site: WaySite = field(default_factory=one_floor)
     timers: HandTimers = field(default_factory=HandTimers)
 
     def __post_init__(self) -> None:

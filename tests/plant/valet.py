@@ -29,6 +29,7 @@ from onboard.core.messages import (
     ShuttleState,
 )
 from onboard.core.site import Station
+from onboard.systems.car_park.site import car_park
 from tests.plant.support import COMPARTMENT, ROBOT, Bench
 
 NO_CAR = Reference(0, 0)
@@ -149,7 +150,7 @@ class Valet:
         if not bay.load_kg:
             return
         self.light(LightColour.RED)
-        if bay.length_mm > self.bench.site.cars.max_length_mm or not self.free:
+        if bay.length_mm > car_park(self.bench.site).cars.max_length_mm or not self.free:
             self.desk(DeskText.CAR_TOO_LARGE if self.free else DeskText.FULL)
             yield self.is_empty
             return

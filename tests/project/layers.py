@@ -23,6 +23,8 @@ CORE_TYPES = (
     "onboard.core.remedies",
     "onboard.core.serial",
     "onboard.core.site",
+    "onboard.ways.site",
+    "onboard.work.timing",
 )
 
 FOLDER = Path(__file__).parents[2] / "onboard" / "systems"
@@ -58,6 +60,7 @@ ALL_OF_ONBOARD = (
     "onboard.controller",
     "onboard.core",
     "onboard.history",
+    "onboard.holon",
     "onboard.io",
     "onboard.ports",
     "onboard.systems",
@@ -117,15 +120,16 @@ FINDER = "onboard/systems/folders.py"
 
 #: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
-    # Until the mirror knows no way, it and what reads it lean on them.
     "onboard.contract": Layer(only_stdlib=PURE_STDLIB),
     # Writes the rest of it; runs where somebody changes a DBC, never on a board.
     "onboard.contract.generate": Layer(("onboard.wire.dbc_file", "dbc")),
-    "onboard.core": Layer(("onboard.ways",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.core": Layer(only_stdlib=PURE_STDLIB, pure=True),
+    # One machine put together of the core's parts; the core does not know it.
+    "onboard.holon": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
     "onboard.ways": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
     "onboard.work": Layer(("onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
     # It knows no system by name; a system's parts are found by the name of their folder.
-    "onboard.systems": Layer(("onboard.core",)),
+    "onboard.systems": Layer(("onboard.core", "onboard.work.compaction")),
     "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),
     **{layer: rule for system in SYSTEMS for layer, rule in _parts_of(system)},
     # The one fold of the bus: whoever shows, counts or publishes it is a view of this.
@@ -133,10 +137,12 @@ LAYERS: dict[str, Layer] = {
     "onboard.wire": Layer((*CORE_TYPES, "dbc"), ("cantools",), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.ports": Layer(CORE_TYPES, not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}),
     "onboard.config": Layer(
-        ("onboard.core", "onboard.systems", "onboard.ways"), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
+        ("onboard.core", "onboard.systems", "onboard.ways", "onboard.work.timing"),
+        not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"},
     ),
     "onboard.controller": Layer(
-        ("onboard.core", "onboard.wire", "onboard.ports"), not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"}
+        ("onboard.core", "onboard.holon", "onboard.wire", "onboard.ports"),
+        not_stdlib=CLOCK_AND_CHANCE | {"socket", "os", "pathlib"},
     ),
     "onboard.io": Layer(("onboard.ports", "onboard.core", "onboard.wire"), ("can", "aiomqtt")),
     "onboard.trace": Layer(
@@ -184,9 +190,11 @@ LAYERS: dict[str, Layer] = {
         (
             *CORE_TYPES,
             "onboard.config.problems",
-            *(f"onboard.core.{name}" for name in ("assignments", "authority", "holding", "regeneration")),
+            *(f"onboard.core.{name}" for name in ("assignments", "authority")),
+            *(f"onboard.holon.{name}" for name in ("holding", "regeneration")),
             "onboard.ways.lifts",
             "onboard.gateway.edge",
+            "onboard.ways.tokens",
             "onboard.gateway.pauses",
             "onboard.gateway.whereabouts",
             "onboard.ports",

@@ -12,7 +12,7 @@ from onboard.core.effects import Effect
 from onboard.core.messages import Message, TokenGrant
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Needs, Site
-from onboard.core.taking_part import TakingPart
+from onboard.holon.taking_part import TakingPart
 from onboard.systems.terminal.messages import MoveOrder
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.listener import Listener

@@ -20,16 +20,18 @@ from onboard.core.messages import (
     ShuttleState,
     TaskReport,
 )
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import car_park
 from onboard.trace.story.why import Why
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at
+from onboard.ways.site import TrackKind, WaySite
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
 from tests.system.test_spurs import alley
 
 PERSON = 254
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 #: The robot that wins the first task: on its way from 20 s, at the bay at 24 s, aboard the lift at 33 s, at the place
 #: at 51 s, back in a refuge after 70 s.
 FIRST, OTHER = 11, 12
@@ -43,7 +45,9 @@ def say(bus: SimulatedBus, order: ManualOrder) -> None:
         bus.send(frame)
 
 
-def held(orders: Orders, *faults: str, site: Site = SITE, cars: Sequence[tuple[float, float | None]] = CARS) -> Scene:
+def held(
+    orders: Orders, *faults: str, site: WaySite = SITE, cars: Sequence[tuple[float, float | None]] = CARS
+) -> Scene:
     """Three cars, and a person who gives these orders (s, robot, mode), each said once."""
 
     def before(simulation: Simulation) -> None:

@@ -18,6 +18,7 @@ from onboard.core.messages import (
     TokenGrant,
 )
 from onboard.ways.lifts import gate, platform
+from onboard.ways.site import way_site
 from tests.system.scene import Scene, play, stays
 
 
@@ -74,7 +75,7 @@ def test_p49_p02_lifts_compartments_and_robots_call_or_answer(entry: Scene) -> N
 
 def test_a_lift_never_moves_while_somebody_holds_its_gate(entry: Scene) -> None:
     site = entry.simulation.site
-    for track, lift in ((track, site.stewards[track]) for track in site.tracks if track >= 128):
+    for track, lift in ((track, site.stewards[track]) for track in way_site(site).tracks if track >= 128):
         holder = lift
         for said in entry.said:
             message = said.message

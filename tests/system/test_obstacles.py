@@ -10,13 +10,15 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.controller.shell import Controller
-from onboard.core import holon
 from onboard.core.authority import genesis_holder, segment_token, station_token
 from onboard.core.codes import SEEN_VERSION_BITS, CallResult, Grade, MachineState, Reason
 from onboard.core.messages import Award, Bid, Blocked, CallForProposals, Clear, Heartbeat, Itinerary, Progress
 from onboard.core.site import Segment
+from onboard.holon import holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.robot import Robot
+from onboard.systems.car_park.site import car_park
+from onboard.ways.mirror import way_mirror
 from tests.system.scene import Scene, play, stays
 
 #: The robots of the small site; the first one wins the first task and comes down by the left lift at 46 s.
@@ -76,7 +78,8 @@ def test_a_machine_that_starts_later_hears_of_a_blocked_segment() -> None:
     scene = scene_with("blocked:track=1,index=9,at_s=20,for_s=0", "crash:target=MR2,at_s=15,restart_s=10")
     assert_all_served(scene)
     blocked = {
-        node: controller.holon.mirror.obstacles.blocked for node, controller in scene.simulation.controllers.items()
+        node: way_mirror(controller.holon.mirror).obstacles.blocked
+        for node, controller in scene.simulation.controllers.items()
     }
     assert set(blocked) == {1, 5, 6, FIRST, OTHER}
     assert all(set(known) == {Segment(1, 9)} for known in blocked.values())
@@ -109,7 +112,7 @@ def test_a_machine_that_wakes_is_an_obstacle_until_it_is_admitted(name: str, at_
 def test_a_machine_with_another_site_or_contract_is_an_obstacle_and_never_bids(
     name: str, reason: Reason, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    stranger = find_site("small").machine(name).node_id
+    stranger = car_park(find_site("small")).machine(name).node_id
     heartbeat = holon.Holon._heartbeat
 
     def strange(one: holon.Holon) -> Heartbeat:
@@ -134,7 +137,7 @@ def test_a_machine_with_another_site_or_contract_is_an_obstacle_and_never_bids(
     }
     for node, controller in scene.simulation.controllers.items():
         assert controller.holon.drops[reason] > 0
-        assert (stranger in controller.holon.mirror.obstacles.machines) is (node != stranger)
+        assert (stranger in way_mirror(controller.holon.mirror).obstacles.machines) is (node != stranger)
 
 
 # --- counters that wrap ----------------------------------------------------------------------------------------
@@ -142,7 +145,7 @@ def test_a_machine_with_another_site_or_contract_is_an_obstacle_and_never_bids(
 
 def test_all_counters_may_wrap_in_the_middle_of_the_work() -> None:
     """Calls, tasks, cars and itineraries begin a few steps below their wraps, and what requests tell of versions."""
-    site = find_site("small")
+    site = car_park(find_site("small"))
     stations = [*site.places, *site.compartments.values()]
     slots = [
         Segment(track, index) for track, one in site.tracks.items() for index in (0, *range(1, one.length + 1), 255)

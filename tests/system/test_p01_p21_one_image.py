@@ -15,20 +15,22 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.codes import ANY_STATION, CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
-from onboard.core.holon import Holon
 from onboard.core.messages import Award, CallForProposals, Heartbeat, Reference, Stamp, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Site
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import Program, Step, to_itinerary
+from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
+from onboard.ways.mirror import WayMirror
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 #: All have found each other by then, and no customer has come, s.
 KILLED_S = 9.0
 
@@ -149,7 +151,7 @@ def test_p21_one_interface_two_kinds_of_cost_with_and_without_the_others_plans(
     machine = site.machines[node]
     costs = []
     for others in (False, True):
-        mirror = Mirror(site, node)
+        mirror = WayMirror(site, node)
         if others:
             foreseen(mirror)
         estimator: Estimator = factory_for(site, machine.kind).estimator(site, machine, mirror)

@@ -9,11 +9,12 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import DriveMode, KindCode, LegAction, ShuttleAction, ShuttleMode
 from onboard.core.messages import DriveState, Itinerary, PlatformState, Progress, ShuttleOrder, ShuttleState
-from onboard.core.site import Site
+from onboard.systems.car_park.site import car_park
+from onboard.ways.site import WaySite
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 TOLERANCE_MM = 5
 
 
@@ -39,7 +40,7 @@ def reaches(scene: Scene) -> Iterator[tuple[int, int, DriveState]]:
             known[message.sender] = message.sequence
 
 
-def off_mark_mm(site: Site, track: int, position_mm: float) -> float:
+def off_mark_mm(site: WaySite, track: int, position_mm: float) -> float:
     pitch_mm = site.tracks[track].pitch_mm
     return abs(position_mm - round(position_mm / pitch_mm) * pitch_mm)
 

@@ -10,11 +10,13 @@ from onboard.config.site import parse_site
 from onboard.core.codes import Grade, LegAction, MachineState, Operation, Side, TaskPhase
 from onboard.core.messages import CallForProposals, Heartbeat, Itinerary, TaskReport
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Site, Station
+from onboard.core.site import Station
+from onboard.systems.car_park.site import CarPark, car_park
+from onboard.ways.mirror import way_mirror
 from tests.config.support import ROOT, changed
 from tests.system.scene import Scene, play, stays
 
-SMALL = find_site("small")
+SMALL = car_park(find_site("small"))
 #: MR2 stands idle when its controller loses its power, and has it back a little later, s.
 OFF_S, ON_S = 150.0, 156.0
 
@@ -60,20 +62,20 @@ def test_p35_the_model_holds_cars_plans_and_where_all_machines_are(restarted: Sc
     assert len(standing) == 2
     for controller in restarted.simulation.controllers.values():
         mirror = controller.holon.mirror
-        assert {record.station for record in mirror.cars.values()} == standing
-        assert len(mirror.free_places()) == len(SMALL.places) - 2
+        assert {record.station for record in way_mirror(mirror).cars.values()} == standing
+        assert len(way_mirror(mirror).free_places()) == len(SMALL.places) - 2
         assert {node for node in SMALL.machines if node in mirror.itineraries} >= set(world.robots)
         for node in set(world.robots) - {controller.holon.node_id}:
             seen = mirror.progress[node]
             assert (seen.track, seen.index) == world.standing_position(node)
 
 
-def narrow() -> Site:
+def narrow() -> CarPark:
     """The small site with a second compartment beside the first; p(1,7) is the nearest place that both have left."""
     text = (ROOT / "bus_sim" / "sites" / "small.toml").read_text(encoding="utf-8")
     gone = "".join(f'"p(1,{index})", ' for index in range(1, 5))
     text = changed('sides = ["near", "far"]', f'sides = ["near"]\nwithout = [{gone}]', text)
-    return parse_site(text + '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n', "narrow.toml")
+    return car_park(parse_site(text + '[[compartments]]\nname = "IOC2"\nnode = 2\nat = "p(1,6)"\n', "narrow.toml"))
 
 
 def aims(itinerary: Itinerary) -> Station | None:

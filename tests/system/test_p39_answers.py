@@ -11,27 +11,29 @@ from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, S
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
 from onboard.systems.car_park.asking import TOLERANCE_US, AskingGeneration
 from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.lift_generation import LiftGeneration, Promise
 from onboard.systems.car_park.ride_calls import calls_after_winning, ride_terms, rides_of
 from onboard.systems.car_park.robot import RobotFactory
-from onboard.systems.car_park.site import RideCalls
+from onboard.systems.car_park.site import CarPark, RideCalls, car_park
 from onboard.ways.lift_uses import GATE_US, ride_us, run_up_us
+from onboard.ways.mirror import WayMirror
 from onboard.ways.sipp import Route, Visit, plan_route
+from onboard.ways.site import way_site
 
 NOW_US = 100_000_000
 CAR = Reference(1, 7)
 
 
-def site_with(rides: RideCalls) -> Site:
-    return dataclasses.replace(find_site("small"), rides=rides)
+def site_with(rides: RideCalls) -> CarPark:
+    return dataclasses.replace(car_park(find_site("small")), rides=rides)
 
 
 def park(number: int = 1) -> CallForProposals:
     """The compartment's call, a second before its deadline."""
-    source = find_site("small").compartments[1].number
+    source = car_park(find_site("small")).compartments[1].number
     deadline_ms = to_bus_ms(NOW_US + 1_000_000)
     return CallForProposals(
         1, number, CAR, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, 1, 0, deadline_ms, source, ANY_STATION,
@@ -43,7 +45,7 @@ def robot(node: int, rides: RideCalls = RideCalls.BEFORE, mirror: Mirror | None 
     """The task-generation function of a robot that stands at home."""
     site = site_with(rides)
     machine = site.machines[node]
-    generation = RobotFactory().estimator(site, machine, mirror or Mirror(site, node))
+    generation = RobotFactory().estimator(site, machine, mirror or WayMirror(site, node))
     generation.program.standing = machine.home
     return generation
 
@@ -64,7 +66,7 @@ def firm(node: int, number: int = 1) -> Itinerary:
 def lift() -> LiftGeneration:
     """The left lift of the small site, standing on the first floor, with an empty mirror."""
     site = site_with(RideCalls.BEFORE)
-    return LiftGeneration(site, site.machines[5], Mirror(site, 5))
+    return LiftGeneration(site, site.machines[5], WayMirror(site, 5))
 
 
 def ride_call(terms: CallTerms, sender: int, whole: int, call: int = 50) -> CallForProposals:
@@ -73,7 +75,7 @@ def ride_call(terms: CallTerms, sender: int, whole: int, call: int = 50) -> Call
     ready_ms = -(-max(0, terms.ready_us - deadline_us) // 100_000) * 100
     return CallForProposals(
         sender, call, terms.task, terms.operation, terms.kind, terms.criterion, 1, 1, to_bus_ms(deadline_us),
-        terms.from_station, terms.to_station, terms.car, terms.wheelbase_mm, Reference(1, whole), 1, ready_ms, 1_500,
+        terms.from_station, terms.to_station, terms.load, terms.load_mm, Reference(1, whole), 1, ready_ms, 1_500,
     )  # fmt: skip
 
 
@@ -138,7 +140,7 @@ def test_p39_a_firm_ride_of_another_is_kept_free_and_one_of_the_caller_is_not() 
 def test_p49_a_lift_answers_for_its_own_shaft_only() -> None:
     terms = first_ride(11)
     site = site_with(RideCalls.BEFORE)
-    right = LiftGeneration(site, site.machines[6], Mirror(site, 6))
+    right = LiftGeneration(site, site.machines[6], WayMirror(site, 6))
     assert right.lower_bound(ride_call(terms, 11, 1), NOW_US) is None
     assert lift().lower_bound(park(), NOW_US) is None
 
@@ -156,7 +158,7 @@ def answers_to(parts: tuple[CallTerms, ...], late_us: int = 0, winner: int = 5, 
 
 
 def _ride_of(terms: CallTerms) -> int:
-    site = find_site("small")
+    site = car_park(find_site("small"))
     floors = abs((terms.from_station >> 8) - (terms.to_station >> 8))
     return run_up_us(site, 128, floors) + GATE_US
 
@@ -187,7 +189,7 @@ def test_p39_a_lift_that_comes_later_makes_the_plan_and_the_bid_later() -> None:
     assert isinstance(bid, Proposal)
     (solution,) = bid.program
     assert isinstance(solution, Solution)
-    site = find_site("small")
+    site = car_park(find_site("small"))
     for step in rides_of(solution.steps):
         terms = ride_terms(site, park(), step)
         answer = [one for one in heard if one.terms.from_station == terms.from_station][-1]
@@ -210,7 +212,7 @@ def test_p39_where_no_lift_answers_the_ride_is_called_after_winning() -> None:
     assert isinstance(bid, Proposal)
     assert bid.parts == ()
     (solution,) = bid.program
-    after = calls_after_winning(find_site("small"), park(), solution.steps)
+    after = calls_after_winning(way_site(find_site("small")), park(), solution.steps)
     assert [terms.operation for terms in after] == [Operation.RIDE] * len(rides_of(solution.steps))
     assert {(terms.depth, terms.parent) for terms in after} == {(1, Reference(1, 1))}
 
@@ -220,8 +222,8 @@ def test_p39_confirmed_rides_are_not_called_again() -> None:
     bid = needs.combine(answers_to(needs.parts), NOW_US + 400_000)
     assert isinstance(bid, Proposal)
     (solution,) = bid.program
-    assert calls_after_winning(find_site("small"), park(), solution.steps, answers_to(needs.parts)) == []
-    (rest,) = calls_after_winning(find_site("small"), park(), solution.steps, answers_to(needs.parts)[:1])
+    assert calls_after_winning(way_site(find_site("small")), park(), solution.steps, answers_to(needs.parts)) == []
+    (rest,) = calls_after_winning(way_site(find_site("small")), park(), solution.steps, answers_to(needs.parts)[:1])
     assert rest.part == 2
 
 
@@ -241,7 +243,7 @@ def test_p39_what_was_promised_is_carried_out_while_it_holds() -> None:
 
 @pytest.mark.parametrize("locked", [False, True], ids=["planned on the mirror", "session lock"])
 def test_p39_a_session_begins_with_the_call_and_a_planned_ride_with_boarding(locked: bool) -> None:
-    mirror = Mirror(site_with(RideCalls.AFTER), 12)
+    mirror = WayMirror(site_with(RideCalls.AFTER), 12)
     if locked:
         mirror.reservations = SessionLocks(mirror)
     itinerary = firm(11)
@@ -268,7 +270,7 @@ def test_p39_nobody_rides_in_between_a_call_and_its_ride_under_a_session_lock() 
     planned = Itinerary(11, 1, Grade.FIRM, Stamp(to_bus_ms(NOW_US), 1, 1), legs)
     done_us = {}
     for locked in (False, True):
-        mirror = Mirror(site, 12)
+        mirror = WayMirror(site, 12)
         if locked:
             mirror.reservations = SessionLocks(mirror)
         mirror.on_itinerary(planned, NOW_US)

@@ -8,16 +8,16 @@ from bus_sim.sites import find_site
 from onboard.core.codes import CallResult, Grade, KindCode, LegAction, Operation
 from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Reference, TokenGrant
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Site
-from onboard.systems.car_park.site import RideCalls
+from onboard.systems.car_park.site import CarPark, RideCalls, car_park
 from onboard.ways.lifts import gate, platform
+from onboard.ways.site import way_site
 from tests.system.scene import Scene, play, stays
 
 CARS = 4
 
 
-def asking(name: str = "small") -> Site:
-    return dataclasses.replace(find_site(name), rides=RideCalls.BEFORE)
+def asking(name: str = "small") -> CarPark:
+    return dataclasses.replace(car_park(find_site(name)), rides=RideCalls.BEFORE)
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_p39_an_option_is_never_driven_for(scene: Scene) -> None:
         message = said.message
         if isinstance(message, Itinerary) and message.grade is Grade.FIRM:
             plans[message.sender] = message
-        for track in site.lifts:
+        for track in way_site(site).lifts:
             if not isinstance(message, TokenGrant) or message.sender != site.stewards[track] or message.token_kind:
                 continue
             if message.token in (platform(track).number, gate(track).number) and message.holder >= 11:
@@ -120,7 +120,7 @@ def test_p39_nothing_is_held_once_all_is_done(scene: Scene) -> None:
 @pytest.mark.parametrize("rides", list(RideCalls))
 def test_p04_five_cars_asked_for_in_the_same_seconds_are_all_fetched(rides: RideCalls) -> None:
     """Robots bid for several of them at once, each bid behind the ones before."""
-    site = dataclasses.replace(find_site("standard"), rides=rides)
+    site = dataclasses.replace(car_park(find_site("standard")), rides=rides)
     found = play(site, stays(*[(float(number), 400.0) for number in range(5)]), limit_s=1_500)
     found.assert_sound()
     summary = found.simulation.plant.street.summary()

@@ -15,7 +15,7 @@ from onboard.config.site import parse_site
 from onboard.core.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Side
 from onboard.core.messages import Bid, CallForProposals, Heartbeat, Itinerary, Leg, Message, Stamp
 from onboard.core.serial import from_bus_ms
-from onboard.core.site import Site
+from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.occupancy import itinerary_windows
 from onboard.ways.reservations import Reservations
 from onboard.wire.codec import fleet_codec
@@ -28,7 +28,7 @@ PLACES, PITCH_MM = 16, 2_400
 ALPHA_S = (5, 18, 28, 51, 75, 85, 100, 118, 125, 141)
 
 
-def park(clearance: int) -> Site:
+def park(clearance: int) -> CarPark:
     """The clearance is between two bodies, in places: each keeps half of what lies between their own places."""
     gone = ", ".join(
         f'"p({floor},{index})"' for floor in range(1, 6) for index in range(1, PLACES + 1) if (floor, index) != (5, 12)
@@ -44,7 +44,7 @@ def park(clearance: int) -> Site:
         {{name = "MRalpha", node = {ALPHA}, home = "p(2,6)"}},
     ]
     """
-    return parse_site(text, "figure.toml", crowded=True)
+    return car_park(parse_site(text, "figure.toml", crowded=True))
 
 
 def alpha_plan(deadline_ms: int) -> Itinerary:

@@ -32,6 +32,8 @@ from onboard.core.messages import (
     TaskReport,
     TokenGrant,
 )
+from onboard.ways.mirror import way_mirror
+from onboard.ways.site import way_site
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
@@ -44,7 +46,7 @@ def scene() -> Scene:
 
 
 def test_p50_the_steps_come_in_their_order(scene: Scene) -> None:
-    bay = scene.simulation.site.compartments[1]
+    bay = way_site(scene.simulation.site).compartments[1]
     left, _ = scene.first(BayState, lambda m: m.load_kg > 0)
     key, _ = scene.first(DeskEvent, lambda m: m.event is DeskInput.KEY)
     ticket, printed = scene.first(DeskOrder, lambda m: m.text is DeskText.TAKE_TICKET)
@@ -122,4 +124,4 @@ def test_p42_the_car_stands_where_the_itinerary_said_and_everybody_knows(scene: 
 def test_p35_every_machine_holds_the_same_model_of_the_park(scene: Scene) -> None:
     mirrors = [controller.holon.mirror for controller in scene.simulation.controllers.values()]
     assert len({mirror.digest() for mirror in mirrors}) == 1
-    assert mirrors[0].cars and mirrors[0].itineraries
+    assert way_mirror(mirrors[0]).cars and mirrors[0].itineraries

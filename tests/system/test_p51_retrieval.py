@@ -26,6 +26,8 @@ from onboard.core.messages import (
     TaskReport,
     TokenGrant,
 )
+from onboard.ways.mirror import way_mirror
+from onboard.ways.site import way_site
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays
 
@@ -38,7 +40,7 @@ def scene() -> Scene:
 
 
 def test_p51_a_ticket_brings_the_car_back(scene: Scene) -> None:
-    bay = scene.simulation.site.compartments[1]
+    bay = way_site(scene.simulation.site).compartments[1]
     ticket_us, ticket = scene.first(DeskEvent, lambda m: m.event is DeskInput.TICKET)
     waiting, _ = scene.first(DeskOrder, lambda m: m.text is DeskText.PLEASE_WAIT)
     red, _ = scene.first(DoorState, lambda m: m.light is LightColour.RED, after_us=ticket_us)
@@ -68,7 +70,7 @@ def test_p51_the_customer_is_served_and_the_park_is_empty(scene: Scene) -> None:
     assert (summary.parked, summary.served, summary.inside) == (1, 1, 0)
     assert set(scene.simulation.plant.world.where.values()) == {None}
     for controller in scene.simulation.controllers.values():
-        assert len(controller.holon.mirror.free_places()) == len(scene.simulation.site.places)
+        assert len(way_mirror(controller.holon.mirror).free_places()) == len(way_site(scene.simulation.site).places)
 
 
 def test_p32_p33_the_shuttle_sets_itself_to_the_cars_wheelbase(scene: Scene) -> None:

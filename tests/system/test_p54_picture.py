@@ -17,13 +17,14 @@ from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.codes import KindCode, MachineState
 from onboard.core.site import Station
+from onboard.systems.car_park.site import car_park
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.view import SiteView
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 from tests.system.scene import ORIGIN_US, stays
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 EPOCH_US = 1_563_926_400_000_000
 #: Pictures are compared at these times, s: a car is driven in, one is fetched, all stands still.
 LOOKS_S = (40, 90, 160, 300, 640, 1_100)

@@ -27,7 +27,6 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.frame import Frame
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     Award,
     BayState,
@@ -42,6 +41,7 @@ from onboard.core.messages import (
     Reference,
     TaskReport,
 )
+from onboard.holon.holon import Holon
 from onboard.io.open_bus import BusSettings, open_bus
 from onboard.ports.bus import Bus
 from onboard.systems.registry import factory_for

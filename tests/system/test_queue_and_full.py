@@ -10,6 +10,8 @@ from onboard.config.site import parse_site
 from onboard.core.codes import DeskText, Operation, TaskPhase
 from onboard.core.messages import CallForProposals, CarAt, DeskOrder, TaskReport
 from onboard.core.site import Site
+from onboard.systems.car_park.site import CarPark, car_park
+from onboard.ways.site import way_site
 from tests.sites import one_floor
 from tests.system.scene import ORIGIN_US, Scene, play, stays
 
@@ -32,8 +34,8 @@ home = "p(1,3)"
 
 
 @pytest.fixture(scope="module")
-def two_places() -> Site:
-    site = parse_site(TWO_PLACES, "two.toml", crowded=True)
+def two_places() -> CarPark:
+    site = car_park(parse_site(TWO_PLACES, "two.toml", crowded=True))
     assert len(site.places) == 2
     return site
 
@@ -50,8 +52,10 @@ def test_p53_the_third_car_of_a_park_with_two_places_is_told_full(two_places: Si
     summary = scene.simulation.plant.street.summary()
     assert (summary.parked, summary.inside, summary.refused_full, summary.queueing) == (2, 2, 1, 0)
     done = [report for _, report in scene.all(TaskReport) if report.phase is TaskPhase.DONE]
-    assert len(done) == 2 and {report.station for report in done} == {place.number for place in two_places.places}
-    assert scene.simulation.plant.world.cars_at(two_places.compartments[1]) == []
+    assert len(done) == 2 and {report.station for report in done} == {
+        place.number for place in way_site(two_places).places
+    }
+    assert scene.simulation.plant.world.cars_at(way_site(two_places).compartments[1]) == []
 
 
 def test_a_full_park_has_room_again_once_a_car_has_left(two_places: Site) -> None:
@@ -98,7 +102,7 @@ def test_p53_the_bay_takes_the_next_car_only_when_the_robot_has_taken_the_last(
     burst: tuple[Scene, list[int]],
 ) -> None:
     scene, _ = burst
-    bay = scene.simulation.site.compartments[1].number
+    bay = way_site(scene.simulation.site).compartments[1].number
     calls = [time_us for time_us, call in scene.all(CallForProposals) if call.operation is Operation.PARK]
     loaded = [time_us for time_us, report in scene.all(TaskReport) if report.phase is TaskPhase.LOADED]
     assert len(calls) == len(loaded) == 6

@@ -8,7 +8,7 @@ import pytest
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import (
     ANY_STATION,
     CallResult,
@@ -25,7 +25,6 @@ from onboard.core.codes import (
     TaskPhase,
 )
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.holon import Holon
 from onboard.core.messages import (
     Award,
     Bid,
@@ -45,10 +44,12 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Segment, Site, Station
+from onboard.holon.holon import Holon
 from onboard.systems.car_park.compartment import Compartment
 from onboard.systems.car_park.compartment_factory import CompartmentFactory
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.program import Handling, Program, Step, Work
+from onboard.ways.mirror import WayMirror
 from onboard.wire.codec import fleet_codec
 from tests.sites import one_floor
 from tests.system.scene import car, play, stays
@@ -71,7 +72,7 @@ def a_robot(standing: Segment, steps: list[Step] | None = None) -> CarParkGenera
     program = Program(SITE, standing)
     if steps:
         program.replace(steps, Stamp(0, 1, 1))
-    return CarParkGeneration(SITE, SITE.machines[11], Mirror(SITE, 11), program)
+    return CarParkGeneration(SITE, SITE.machines[11], WayMirror(SITE, 11), program)
 
 
 def test_p18_a_busy_robot_bids_later_on_the_bus_than_its_idle_twin() -> None:
@@ -339,7 +340,7 @@ class Crane:
 
 
 @dataclass
-class CraneFactory:
+class CraneFactory(BehaviourFactory):
     price: int
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:

@@ -15,8 +15,10 @@ from onboard.config.site import parse_site
 from onboard.core.authority import segment_token
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, TaskPhase
 from onboard.core.messages import CallForProposals, DriveOrder, DriveState, Itinerary, Progress, TaskReport, TokenGrant
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.view import SiteView
+from onboard.ways.site import WaySite, way_site
 from tests.sites import ONE_FLOOR
 from tests.system.scene import Scene, play, stays
 
@@ -25,7 +27,7 @@ SPUR, OTHER_SPUR = 192, 193
 
 
 @cache
-def alley(homes: tuple[str, ...], spurs: tuple[str, ...], without: tuple[str, ...] = ()) -> Site:
+def alley(homes: tuple[str, ...], spurs: tuple[str, ...], without: tuple[str, ...] = ()) -> CarPark:
     """One alley of 12 with the compartment at p(1,4), and no place at ``without``."""
     gone = ", ".join(f'"{place}"' for place in without)
     text = ONE_FLOOR.format(positions=f"12\nwithout = [{gone}]") + "".join(
@@ -33,7 +35,7 @@ def alley(homes: tuple[str, ...], spurs: tuple[str, ...], without: tuple[str, ..
     )
     for number, home in enumerate(homes, start=1):
         text += f'[[robots]]\nname = "MR{number}"\nnode = {10 + number}\nhome = "{home}"\n'
-    return parse_site(text, "alley.toml", crowded=True)
+    return car_park(parse_site(text, "alley.toml", crowded=True))
 
 
 def idle(simulation: Simulation) -> None:
@@ -51,7 +53,7 @@ def told(scene: Scene, node: int, from_us: int = 0) -> list[Segment]:
     return [Segment(m.track, m.index) for at, m in scene.all(Progress, "fleet") if m.sender == node and at >= from_us]
 
 
-def in_the_way() -> Site:
+def in_the_way() -> CarPark:
     """MR1 stands between MR2 and the compartment; the only place is at the other end, and the spur in between."""
     without = tuple(f"p(1,{index}){side}" for index in range(1, 13) for side in "NF")[1:]
     kept = tuple(place for place in without if place not in ("p(1,4)N", "p(1,6)F"))
@@ -84,7 +86,7 @@ def test_the_mouth_and_the_spur_are_held_before_the_drive_is_told_to_turn(passin
         given = [(at, m) for at, m in passing.all(TokenGrant, "fleet") if m.token == key.number and at < turn_us]
         assert given and given[-1][1].holder == MR1, slot
     turned_us, _ = passing.first(DriveState, lambda m: m.sender == MR1 and m.across)
-    assert turned_us - turn_us == pytest.approx(passing.simulation.site.carrier_turn_us, abs=5_000)
+    assert turned_us - turn_us == pytest.approx(way_site(passing.simulation.site).carrier_turn_us, abs=5_000)
     inside_us, _ = passing.first(DriveState, lambda m: (m.sender, m.across, m.position_mm) == (MR1, True, 0))
     mouth = segment_token(Segment(1, 6)).number
     left_us, _ = passing.first(TokenGrant, lambda m: (m.sender, m.token) == (MR1, mouth))
@@ -109,7 +111,7 @@ def test_with_a_spur_for_each_both_serve_one_alley_and_end_in_spurs() -> None:
 KILLED_S = (26.6, 28.0, 30.7, 30.95, 32.0, 33.85, 35.0, 85.0, 88.45, 90.0, 91.45, 92.0, 94.0, 96.0)
 
 
-def killed(site: Site, demand: Demand, at_s: float, before: Callable[[Simulation], None] | None = None) -> Scene:
+def killed(site: WaySite, demand: Demand, at_s: float, before: Callable[[Simulation], None] | None = None) -> Scene:
     """MR1 loses its controller and gets it back with the same journal."""
     outages: list[asyncio.Task[None]] = []
 

@@ -11,7 +11,7 @@ from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, 
 from onboard.systems.terminal.traffic import Node, Traffic
 
 A1, L3, C1, L2, A4, L11, A2, S2, S1 = 1, 2, 3, 4, 5, 6, 7, 8, 9
-TIMING = Timing(0, 0, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0)
+TIMING = Timing(0, 0, 1, 0, 1, 0, 0, 0, 0, 0)
 #: The fifteen elementary actions as printed: entity and [st et].
 PRINTED = [
     (Action.GOTO, A1, 10, 40), (Action.GOTO, L3, 40, 50), (Action.GOTO, C1, 50, 55), (Action.GOTO, L2, 55, 67),

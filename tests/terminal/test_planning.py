@@ -9,7 +9,6 @@ from bus_sim.sites import find_site
 from bus_sim.systems.terminal.table import plan_table
 from onboard.core.codes import Criterion, KindCode, Operation
 from onboard.core.messages import CallForProposals, Reference
-from onboard.core.mirror import Mirror
 from onboard.systems.terminal.generation import VehicleGeneration
 from onboard.systems.terminal.messages import Action, MissionKey, Verb
 from onboard.systems.terminal.mirror import TerminalMirror
@@ -19,6 +18,7 @@ from onboard.systems.terminal.search import Job, Search
 from onboard.systems.terminal.site import StationKind
 from onboard.systems.terminal.traffic import Traffic
 from onboard.systems.terminal.vehicle import terminal
+from onboard.ways.cars import CarMirror
 from onboard.work.order_life import OrderEvent
 from tests.terminal.fig3 import A1, PRINTED, S1, S2, fig3, plan_of
 
@@ -44,7 +44,7 @@ Unloading Task GOTO Area 4         Lane 11     [83 93]
 
 
 def mirror(node: int = 11) -> TerminalMirror:
-    return TerminalMirror(SITE, node, Mirror(SITE, node))
+    return TerminalMirror(SITE, node, CarMirror(SITE, node))
 
 
 def box(name: str) -> int:

@@ -12,6 +12,7 @@ from onboard.trace.chart.sequence import Chart, chart
 from onboard.trace.cli import main
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log
+from onboard.ways.site import way_site
 from onboard.wire.codec import codecs
 from tests.tools import require_tool
 from tests.trace.runs import SITE, SITE_FILE, fleet_of, run_log
@@ -57,7 +58,7 @@ def test_lines_are_where_the_machines_said_they_are() -> None:
     runs = _picture().runs
     for said in fleet_of(run_log()):
         if isinstance(said.message, Progress):
-            place = said.message.index - 1 + said.message.offset_mm / SITE.tracks[said.message.track].pitch_mm
+            place = said.message.index - 1 + said.message.offset_mm / way_site(SITE).tracks[said.message.track].pitch_mm
             assert any(
                 (node, track) == (said.message.sender, said.message.track) and (said.time_us, place) == point[:2]
                 for node, track, points in runs

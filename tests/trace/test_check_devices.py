@@ -32,6 +32,7 @@ from onboard.core.messages import (
     ShuttleState,
     Waiting,
 )
+from onboard.ways.site import way_site
 from tests.trace.checking import CAR, MR1, MR2, Tape, at, award, bid, call, car_at, one_alley, power_up, report
 
 OPEN, LOCKED, CLOSING = DoorPosition.OPEN, DoorPosition.LOCKED, DoorPosition.CLOSING
@@ -153,7 +154,7 @@ def test_a_ticket_that_leads_to_nothing_is_found() -> None:
 def test_full_means_full() -> None:
     assert Tape(one_alley()).say(1, word(DeskText.FULL)).broken() == {"full-means-full": 1}
     full = Tape(one_alley())
-    for number, place in enumerate(one_alley().places, start=1):
+    for number, place in enumerate(way_site(one_alley()).places, start=1):
         car = Reference(1, number)
         full.say(number, car_at(1, 0x0104, 1, car), car_at(MR1, ANY_STATION, 2, car), car_at(1, place.number, 3, car))
     full.say(100, word(DeskText.FULL))

@@ -5,17 +5,20 @@ import pytest
 from onboard.config.site import parse_site
 from onboard.core.codes import DriveMode
 from onboard.core.messages import DriveOrder, DriveState, Message
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
+from onboard.systems.car_park.site import CarPark, car_park
 from tests.sites import ONE_FLOOR
 from tests.trace.checking import MR1, MR2, Tape, at, grant
 
 MOUTH, INSIDE = Segment(1, 7), Segment(192, 1)
 
 
-def site() -> Site:
+def site() -> CarPark:
     """One alley of 12 with a spur at p(1,7), robots at home on p(1,12) and p(1,11)."""
     robots = "".join(f'[[robots]]\nname = "MR{n}"\nnode = {10 + n}\nhome = "p(1,{13 - n})"\n' for n in (1, 2))
-    return parse_site(ONE_FLOOR.format(positions=12) + '[[spurs]]\nat = "p(1,7)"\n' + robots, "t.toml", crowded=True)
+    return car_park(
+        parse_site(ONE_FLOOR.format(positions=12) + '[[spurs]]\nat = "p(1,7)"\n' + robots, "t.toml", crowded=True)
+    )
 
 
 def state(position_mm: int, *, across: bool) -> DriveState:

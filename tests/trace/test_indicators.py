@@ -32,10 +32,11 @@ from onboard.core.messages import (
     TaskReport,
     Waiting,
 )
+from onboard.systems.car_park.site import car_park
 from onboard.trace.durations import Durations, percentile
 from onboard.trace.indicators import FleetIndicators, Indicators, Utilisation
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 BAY, ROBOT, OTHER, LIFT = 1, 11, 12, 5
 LIFT_TRACK = next(track for track in SITE.lifts if SITE.stewards[track] == LIFT)
 TASK = Reference(BAY, 1)

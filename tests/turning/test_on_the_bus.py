@@ -15,8 +15,8 @@ from bus_sim.systems.turning.nc import ProgramError, run_program
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
 from onboard.core.codes import Criterion, KindCode, Operation
-from onboard.core.holon import Holon
 from onboard.core.messages import Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.holon.holon import Holon
 from onboard.systems.turning.checks import RULES
 from onboard.systems.turning.generation import LatheGeneration
 from onboard.systems.turning.lathe import Job, LatheState

@@ -10,10 +10,11 @@ from bus_sim.sites import find_site
 from onboard.core.codes import ANY_STATION, OUTSIDE, TaskPhase
 from onboard.core.messages import Award, Bid, CallForProposals, CarAt, Progress, Reference, TaskReport
 from onboard.core.site import Segment
+from onboard.systems.car_park.site import car_park
 from tests.web.browser import drawn, rows, served
 from tests.web.logs import SITE_FILES, film_of, log_of, said_in
 
-SITE = find_site("small")
+SITE = car_park(find_site("small"))
 #: Shares of the log's length, in thousandths: a car comes, is parked, asked for, fetched; and back to an earlier one.
 MOMENTS = (120, 300, 480, 620, 800, 990, 300)
 ROBOTS = {11: "MR1", 12: "MR2"}

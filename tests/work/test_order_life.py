@@ -8,8 +8,8 @@ import pytest
 from bus_sim.sites import find_site
 from onboard.core.codes import KindCode
 from onboard.core.effects import Record
-from onboard.core.holon import Holon
 from onboard.core.messages import Reference
+from onboard.holon.holon import Holon
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.desk import Order as GoalOrder
 from onboard.systems.cell.geometry import Point

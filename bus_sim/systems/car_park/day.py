@@ -8,6 +8,7 @@ from pathlib import Path
 from bus_sim.demand import DemandError
 from bus_sim.systems.car_park.demand import LEVEL1_DAY, WHOLE_DAY, Demand
 from onboard.core.site import Site
+from onboard.ways.site import way_site
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ def choose_demand(day: Day, site: Site | None = None, seed: int = 1) -> Demand:
     if day.random_s is not None:
         return Demand.by_mean(*day.random_s, seed, count=day.cars)
     first, last = _days(day.day)
-    shipped = WHOLE_DAY if site is not None and len(site.compartments) > 1 else LEVEL1_DAY
+    shipped = WHOLE_DAY if site is not None and len(way_site(site).compartments) > 1 else LEVEL1_DAY
     return Demand.from_sessions(day.sessions, stations=day.stalls, day=first, until=last, shipped=shipped, seed=seed)
 
 

@@ -12,8 +12,9 @@ from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.web.run_source import Arguments, RunSource
 from onboard.core.codes import Reason
 from onboard.core.messages import Blocked, Clear
-from onboard.core.site import Segment, TrackKind
+from onboard.core.site import Segment
 from onboard.ports.bus import Bus
+from onboard.ways.site import TrackKind, way_site
 from onboard.web.app import CommandError, number
 from onboard.wire.codec import fleet_codec
 
@@ -81,7 +82,7 @@ class CarParkSource(RunSource):
         place = arguments.get("place")
         match = re.fullmatch(r"p\((\d{1,3}),(\d{1,3})\)", place.replace(" ", "")) if isinstance(place, str) else None
         segment = Segment(*map(int, match.groups())) if match is not None else None
-        track = self._simulation.site.tracks.get(segment.track) if segment is not None else None
+        track = way_site(self._simulation.site).tracks.get(segment.track) if segment is not None else None
         if segment is None or track is None or track.kind is TrackKind.LIFT or not 1 <= segment.index <= track.length:
             raise CommandError(f"{place}: no segment of this site; write one such as p(1,3), or click on it")
         return segment

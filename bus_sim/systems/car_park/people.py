@@ -9,6 +9,7 @@ from bus_sim.systems.car_park.plant.customer import Customer, Event
 from bus_sim.systems.car_park.plant.motion import standing
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import DoorName, DoorPosition
+from onboard.ways.site import way_site
 
 #: Somebody who waits for the right moment looks again after this, us (ours).
 LOOK_US = 200_000
@@ -75,7 +76,7 @@ def moved(simulation: Simulation, injection: Injection) -> None:
         return
     now_us = simulation.loop.now_us()
     robot = world.robots[node_id]
-    track = simulation.site.tracks[robot.track]
+    track = way_site(simulation.site).tracks[robot.track]
     if (
         not world.stands(node_id)
         or robot.is_out(now_us)
@@ -86,7 +87,7 @@ def moved(simulation: Simulation, injection: Injection) -> None:
         return
     here_mm = robot.motion.final_mm
     low_mm, high_mm = 0.0, float((track.length - 1) * track.pitch_mm)
-    length_mm = simulation.site.carrier_length_mm
+    length_mm = way_site(simulation.site).carrier_length_mm
     for other, body in world.robots.items():
         if other != node_id and body.track == robot.track:
             there_mm = body.motion.at(now_us)[0]

@@ -11,9 +11,10 @@ from rich.live import Live
 from rich.text import Text
 
 from onboard.core.codes import KindCode, MachineState, Side
-from onboard.core.site import Segment, Site, Station, TrackKind
+from onboard.core.site import Segment, Station
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at, lift_tracks, sill
+from onboard.ways.site import TrackKind, WaySite
 
 #: Pictures a second at most; more only costs the simulation time.
 PICTURES_S = 15
@@ -58,7 +59,7 @@ class Clock:
 CELLS = (5, 3, 2, 1)
 
 
-def cell_width(site: Site, width: int) -> int:
+def cell_width(site: WaySite, width: int) -> int:
     """Columns for one position, so that the longest alley fits in ``width`` columns if any does."""
     length = max(track.length for track in site.tracks.values() if track.kind is TrackKind.ALLEY)
     return next(
@@ -66,7 +67,7 @@ def cell_width(site: Site, width: int) -> int:
     )
 
 
-def draw_floor(site: Site, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
+def draw_floor(site: WaySite, view: SiteView, track: int, cell: int = CELLS[0]) -> list[Text]:
     """Three lines: far places, alley with machines, near places and compartments; ``cell`` columns a position.
 
     A spur is drawn in round brackets beside its mouth, with whoever stands in it.
@@ -118,7 +119,7 @@ def _boxed(text: str, box: str, cell: int) -> str:
     return f"{text[-cell:] or '-':^{cell}}"
 
 
-def _alley(site: Site, view: SiteView, track: int, cell: int) -> Text:
+def _alley(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
     row = Text(" " * _LABEL, no_wrap=True, overflow="crop")
     row.append_text(_shaft(site, view, track, 0, cell))
     here: dict[int, list[int]] = {}
@@ -141,17 +142,17 @@ def _alley(site: Site, view: SiteView, track: int, cell: int) -> Text:
     return row
 
 
-def _is_turning(site: Site, at: Segment) -> bool:
+def _is_turning(site: WaySite, at: Segment) -> bool:
     track = site.tracks.get(at.track)
     return track is not None and track.kind is TrackKind.SPUR and at.index == 0
 
 
-def _shaft_width(site: Site, cell: int) -> int:
+def _shaft_width(site: WaySite, cell: int) -> int:
     """Room for the lifts at the left end, where the site has any."""
     return min(7, cell + 2) if lift_tracks(site) else 0
 
 
-def _shaft(site: Site, view: SiteView, track: int, index: int, cell: int) -> Text:
+def _shaft(site: WaySite, view: SiteView, track: int, index: int, cell: int) -> Text:
     """A lift at one end of an alley: its platform with whoever stands on it, or the empty shaft."""
     width = _shaft_width(site, cell)
     lift = lift_at(site, Segment(track, index))
@@ -165,7 +166,7 @@ def _shaft(site: Site, view: SiteView, track: int, index: int, cell: int) -> Tex
     return Text(f"[{aboard[0][-(width - 2) :] if aboard else '=':^{width - 2}}]", style="bold yellow")
 
 
-def _alley_line(site: Site, view: SiteView, track: int, cell: int) -> Text:
+def _alley_line(site: WaySite, view: SiteView, track: int, cell: int) -> Text:
     """A floor in one line, where there is no room for three: where nobody is, its cars as marks above and below."""
     row = _alley(site, view, track, cell)
     taken, desks = view.places_taken(), set(site.compartments.values())
@@ -206,7 +207,7 @@ def _headed(text: str, width: int) -> Text:
     return _line(f"-- {text} ".ljust(width, "-"), "bold")
 
 
-def _floors(site: Site, view: SiteView, width: int, room: int, events: int) -> list[Text]:
+def _floors(site: WaySite, view: SiteView, width: int, room: int, events: int) -> list[Text]:
     """All floors, the highest first, so that ``events`` of ``room`` lines are left.
 
     Each has three lines, or one where that is too much; what has no room even so are the highest.
@@ -219,7 +220,7 @@ def _floors(site: Site, view: SiteView, width: int, room: int, events: int) -> l
 
 
 def draw(
-    site: Site,
+    site: WaySite,
     view: SiteView,
     clock: Clock,
     line: str,
@@ -252,7 +253,9 @@ def draw(
 class TerminalShow:
     """A live picture where output is a terminal, else one plain line each simulated hour, or oftener."""
 
-    def __init__(self, site: Site, view: SiteView, clock: Clock, figures: Callable[[], str], console: Console) -> None:
+    def __init__(
+        self, site: WaySite, view: SiteView, clock: Clock, figures: Callable[[], str], console: Console
+    ) -> None:
         self._site = site
         self._view = view
         self._clock = clock

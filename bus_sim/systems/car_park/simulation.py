@@ -10,6 +10,7 @@ from bus_sim.systems.car_park.plant.plant import Plant
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.site import Site
 from onboard.trace.view import SiteView
+from onboard.ways.site import way_site
 
 
 @dataclass
@@ -28,5 +29,5 @@ def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
     """All parts of a run of a car park, connected but not switched on."""
     fleet, devices = buses_of(site, frame_faults(options.faults, site), loop)
     links = links_of(site, devices)
-    plant = Plant(site, LoopTimers(loop), links, options.seed)
+    plant = Plant(way_site(site), LoopTimers(loop), links, options.seed)
     return Simulation(site, options, loop, fleet, devices, plant, links)

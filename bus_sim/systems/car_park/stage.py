@@ -20,6 +20,7 @@ from bus_sim.systems.stage import Ended, Hand, Show, Stage, Tally
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.durations import Durations
 from onboard.trace.indicators import Indicators
+from onboard.ways.site import way_site
 
 if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource
@@ -176,7 +177,7 @@ class CarParkStage(Stage[Plant]):
 
     def show(self, console: Console) -> Show:
         """See ``Stage``."""
-        self._show = TerminalShow(self.run.site, self.run.view, self._clock, self._line, console)
+        self._show = TerminalShow(way_site(self.run.site), self.run.view, self._clock, self._line, console)
         return self._show
 
     def _line(self) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from bus_sim.systems.stranger import Stranger
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet, Plain
+from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.codes import Grade, KindCode, LegAction, MachineState, Operation, Reason, Side, TaskPhase
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Progress, Stamp, TaskReport
@@ -19,7 +19,11 @@ from onboard.core.site import Machine, Site
 from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.robot import RobotFactory
+from onboard.systems.car_park.site import car_park
 from onboard.systems.registry import factory_for
+from onboard.ways.mirror import way_mirror
+from onboard.ways.site import way_site
+from onboard.work.plain import Plain
 
 #: What it says that its first run takes, ms.
 RUN_MS = 10_000
@@ -98,19 +102,22 @@ class _Standing(Plain):
 
 
 @dataclass
-class _Factory:
+class _Factory(BehaviourFactory):
     """Makes robots, one of which is the stranger."""
 
     target: int
     how: Stranger
     robots: RobotFactory = field(default_factory=RobotFactory)
 
+    def __post_init__(self) -> None:
+        self.fleet_type = self.robots.fleet_type
+
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """What it bids."""
         if machine.node_id != self.target:
             return self.robots.estimator(site, machine, mirror)
         bids = _LeastBid if self.how is Stranger.LIAR else _EmptyBid
-        return bids(site, machine, mirror, Program(site))
+        return bids(car_park(site), machine, way_mirror(mirror), Program(way_site(site)))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Behaviour:
         """What it does."""

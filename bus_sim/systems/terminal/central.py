@@ -22,6 +22,7 @@ from onboard.systems.terminal.messages import Assignment, TaskTerms
 from onboard.systems.terminal.missions import Transport
 from onboard.systems.terminal.search import Job, Search, remaining
 from onboard.systems.terminal.site import Terminal
+from onboard.ways.cars import car_fleet
 from onboard.work.order_life import OrderEvent
 
 #: An assignment that is in no plan yet is said again after this, us.
@@ -82,7 +83,7 @@ class CentralDeskFactory(DeskFactory):
         """A desk that plans centrally. Raises ``TypeError`` for an estimator without the desk's picture."""
         if not isinstance(estimator, DeskGeneration):
             raise TypeError("a desk needs its own picture")
-        return CentralDesk(fleet, estimator)
+        return CentralDesk(car_fleet(fleet), estimator)
 
 
 def central_factory(site: Site, kind: KindCode) -> BehaviourFactory:

@@ -7,10 +7,10 @@ from bus_sim.run import BusRun
 from bus_sim.systems.terminal.deliveries import Delivery, deliveries, ordered
 from bus_sim.systems.terminal.plant import TerminalPlant
 from onboard.core.messages import CarAt, Message
-from onboard.core.mirror import Mirror
 from onboard.systems.terminal.desk import Desk
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.vehicle import Vehicle
+from onboard.ways.cars import CarMirror
 
 
 @dataclass
@@ -22,7 +22,7 @@ class TerminalRun(BusRun[TerminalPlant]):
     def __post_init__(self) -> None:
         super().__post_init__()
         site, listener = self.plant.site, min(self.site.machines)
-        self.spectator = TerminalMirror(site, listener, Mirror(site, listener))
+        self.spectator = TerminalMirror(site, listener, CarMirror(site, listener))
         self.observers.append(self._listen)
 
     def _listen(self, message: Message, time_us: int) -> None:

@@ -39,6 +39,7 @@ class CallTerms:
     ``ready_us`` (bus time) is when a part can begin at the earliest, 0 for at once. The negotiation numbers the parts
     of a bid itself: ``parent``, ``part`` and ``depth`` are for calls that a machine opens after winning. ``detail`` is
     what a system's tasks need beyond a call's fields: said right before the call, each time that it is opened.
+    ``load`` is what the task is about, and ``load_mm`` the one length of it that who carries it must know, 0 for none.
     """
 
     task: Reference
@@ -47,8 +48,8 @@ class CallTerms:
     criterion: Criterion
     from_station: int
     to_station: int
-    car: Reference
-    wheelbase_mm: int
+    load: Reference
+    load_mm: int
     task_version: int = 1
     depth: int = 0
     parent: Reference = NO_REFERENCE

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from onboard.core.codes import NOBODY, CallResult, Criterion, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Reference
+from onboard.core.mirror import Obstacle
 from onboard.core.negotiation.events import NegotiationEvent
 from onboard.core.negotiation.negotiation import Negotiation
-from onboard.ways.obstacles import Obstacle
 
 #: A winner that is an obstacle for so long is lost, us: a restart takes some seconds, and its task is in its journal.
 #: Ours.

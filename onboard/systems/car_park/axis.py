@@ -4,8 +4,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
-from onboard.core.site import Segment, Site, Track, TrackKind
+from onboard.core.site import Segment
 from onboard.ways.lifts import gate, lift_at, platform
+from onboard.ways.site import Track, TrackKind, WaySite
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class TrackAxis:
     pitch before index 1: a body there is turned, or turning, and needs both slots.
     """
 
-    site: Site
+    site: WaySite
     number: int
     #: Worked out of the site, which never changes: rights by index before and index entered, slots by a body's ends.
     _rights: dict[tuple[int, int], list[Segment]] = field(default_factory=dict, init=False, repr=False, compare=False)

@@ -9,8 +9,8 @@ from onboard.core.codes import Criterion, Operation
 from onboard.core.messages import CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.core.site import Machine, Site
-from onboard.systems.car_park.site import car_park
+from onboard.core.site import Machine
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
 
 #: A driver gets in and drives out within this, us: 10 to 30 s (constants of the SimPy study in the systems list).
@@ -32,7 +32,7 @@ PROGRAM = (
 class BayGeneration:
     """Estimates for calls of operation RECEIVE. ``is_free`` and ``queue`` are kept up to date by the compartment."""
 
-    site: Site
+    site: CarPark
     machine: Machine
     is_free: bool = False
     queue: int = 0
@@ -56,6 +56,6 @@ class BayGeneration:
 
     def _cycle_us(self) -> int:
         """One customer served: both doors twice, the shuttle's stroke twice, grip, and the driver."""
-        park = car_park(self.site)
+        park = self.site
         stroke_us = run_duration_us(park.shuttle_reach_mm, park.shuttle)
         return 4 * self.site.timing.door_us + 2 * stroke_us + self.site.timing.grip_us + DRIVER_US

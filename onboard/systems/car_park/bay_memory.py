@@ -8,13 +8,12 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey
 from onboard.core.codes import OUTSIDE, Operation
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
 from onboard.core.messages import CarAt, Reference
-from onboard.core.records import CarLeftRecord, TokenGivenRecord
+from onboard.core.records import RetiredRecord, TokenGivenRecord
 from onboard.core.serial import successor
 from onboard.systems.car_park.bay_task import queue_ticket
 from onboard.systems.car_park.records import (
@@ -25,6 +24,8 @@ from onboard.systems.car_park.records import (
     TicketRecord,
     WinnerRecord,
 )
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
 
 
 def car_record(statement: CarAt) -> Record:
@@ -34,7 +35,7 @@ def car_record(statement: CarAt) -> Record:
 
 def cars_at(node_id: int, entries: Iterable[Entry]) -> dict[Reference, CarAt]:
     """What node ``node_id`` has last journalled of each car, as it told it."""
-    return BayMemory(node_id).take_up(records_in(entries, CarAtRecord, CarLeftRecord)).cars
+    return BayMemory(node_id).take_up(records_in(entries, CarAtRecord, RetiredRecord)).cars
 
 
 def winner_record(car: Reference, winner: int, task: Reference, version: int) -> Record:
@@ -57,7 +58,7 @@ def job_over_record() -> Record:
     return Record(BayFreeRecord())
 
 
-def _next_reference(last: int, fleet: Fleet) -> Reference:
+def _next_reference(last: int, fleet: WayFleet) -> Reference:
     """The next number of a car or task of this node; one under which a token was ever heard of is passed over.
 
     It goes to the journal before its token: whatever happens between the two writes, it is never used again.
@@ -72,7 +73,7 @@ def _next_reference(last: int, fleet: Fleet) -> Reference:
 _READ = (
     CarAtRecord,
     WinnerRecord,
-    CarLeftRecord,
+    RetiredRecord,
     TicketRecord,
     BayJobRecord,
     BayFreeRecord,
@@ -118,8 +119,8 @@ class BayMemory:
                     self.tickets.remove(car)
             case WinnerRecord():
                 self._take_winner(record)
-            case CarLeftRecord():
-                self._forget(record.car)
+            case RetiredRecord():
+                self._forget(record.load)
             case TicketRecord():
                 queue_ticket(self.tickets, record.car, urgent=record.urgent)
             case _:
@@ -138,7 +139,7 @@ class BayMemory:
             case TokenGivenRecord() if self.bay == (record.kind, record.number):
                 self.was_granted = True
 
-    def next_reference(self, fleet: Fleet) -> tuple[Reference, Record]:
+    def next_reference(self, fleet: WayFleet) -> tuple[Reference, Record]:
         """The name of the next car or task of this node, and what is to be written before it is used."""
         name = _next_reference(self.number, fleet)
         self.number = name.number

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from onboard.core.authority import TokenKey, car_token
+from onboard.core.authority import TokenKey
 from onboard.core.codes import (
     OUTSIDE,
     CallResult,
@@ -20,9 +20,10 @@ from onboard.core.codes import (
 )
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, BayState, CallForProposals, Reference, TaskReport, TokenRefusal
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms
 from onboard.systems.car_park.site import CarLimits
+from onboard.ways.mirror import WayMirror
+from onboard.ways.tokens import car_token
 
 #: A call that nobody could serve is made again after this, us, and each further time after twice as long, up to the
 #: second: a fleet that is off costs five calls a minute, and one that is back is asked within the minute promised.
@@ -97,13 +98,13 @@ class BayTask:
             criterion=Criterion.FINISH_TIME,
             from_station=source,
             to_station=sink,
-            car=self.car,
-            wheelbase_mm=self.wheelbase_mm,
+            load=self.car,
+            load_mm=self.wheelbase_mm,
             task_version=self.version,
             floor=floor,
         )
 
-    def is_unknown_to(self, refusal: TokenRefusal, mirror: Mirror) -> bool:
+    def is_unknown_to(self, refusal: TokenRefusal, mirror: WayMirror) -> bool:
         """Whether the car's custodian refuses it to the task's winner: it was off when the task was called, or won."""
         record, wanted = mirror.cars.get(self.car), TokenKey(refusal.token_kind, refusal.token)
         is_its_word = record is not None and record.custodian == refusal.sender and wanted == car_token(*self.car)
@@ -153,19 +154,19 @@ def fits(bay: BayState, limits: CarLimits) -> bool:
     return small and grips and bay.load_kg <= limits.max_load_kg
 
 
-def forget_tickets(tickets: deque[Reference], mirror: Mirror) -> None:
+def forget_tickets(tickets: deque[Reference], mirror: WayMirror) -> None:
     """Drop those of cars that have left, here or elsewhere: nobody can fetch them, and others wait behind them."""
     for car in [car for car in tickets if car in mirror.cars and mirror.cars[car].station == OUTSIDE]:
         tickets.remove(car)
 
 
-def turned_away(bay: BayState, limits: CarLimits, mirror: Mirror) -> DeskText | None:
+def turned_away(bay: BayState, limits: CarLimits, mirror: WayMirror) -> DeskText | None:
     """What the driver of a car is told that the park does not take; None for one that it takes."""
     if not fits(bay, limits):
         return DeskText.CAR_TOO_LARGE
     return None if mirror.free_places() else DeskText.FULL
 
 
-def refusal_text(mirror: Mirror) -> DeskText:
+def refusal_text(mirror: WayMirror) -> DeskText:
     """What a customer is told whom nobody can serve; that nobody can although there is room is not called full."""
     return DeskText.OUT_OF_ORDER if mirror.free_places() else DeskText.FULL

@@ -8,8 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token, station_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey, station_token
 from onboard.core.codes import (
     ANY_STATION,
     NOBODY,
@@ -60,13 +59,15 @@ from onboard.systems.car_park.outputs import BayOutputs
 from onboard.systems.car_park.program import Program
 from onboard.systems.car_park.site import car_park
 from onboard.systems.car_park.stewardship import Stewardship
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
 
 
 @dataclass
 class Compartment:
     """One compartment. At most one task uses its bay; tickets wait in the order in which they came."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: BayGeneration
     kind: KindCode = KindCode.COMPARTMENT
     phase: BayPhase = BayPhase.STARTING
@@ -84,7 +85,7 @@ class Compartment:
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
         self.outputs = BayOutputs(self.fleet.node_id, self.fleet.motion, station_token(self.station))
-        site, machine = self.fleet.site, self.fleet.machine
+        site, machine = car_park(self.fleet.site), self.fleet.machine
         self._robots = CarParkGeneration(site, machine, self.fleet.mirror, Program(site))
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)
         self.stewardship.replay(self.memory)

@@ -2,24 +2,28 @@
 
 from dataclasses import dataclass
 
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
 from onboard.systems.car_park.bay_generation import BayGeneration
 from onboard.systems.car_park.compartment import Compartment
+from onboard.systems.car_park.site import car_park
+from onboard.ways.mirror import WayFleet, way_fleet
 
 
 @dataclass(frozen=True)
-class CompartmentFactory:
+class CompartmentFactory(BehaviourFactory):
     """Makes compartments."""
+
+    fleet_type = WayFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
         """The compartment's task-generation function."""
-        return BayGeneration(site, machine)
+        return BayGeneration(car_park(site), machine)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:
         """The compartment's steps; ``estimator`` is the one made above."""
         if not isinstance(estimator, BayGeneration):
             raise TypeError("a compartment needs its own task-generation function")
-        return Compartment(fleet, estimator)
+        return Compartment(way_fleet(fleet), estimator)

@@ -8,8 +8,8 @@ are plausible, and measured nowhere.
 from dataclasses import dataclass
 
 from onboard.config.reader import Table
-from onboard.core.site import Axis
 from onboard.systems.car_park.site import CarLimits
+from onboard.ways.site import Axis
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,17 +9,18 @@ knows the token.
 
 from collections.abc import Container, Iterable
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey
 from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CarAt, Reference, TokenGrant
-from onboard.core.mirror import Mirror
-from onboard.core.site import Site, Station
+from onboard.core.site import Station
 from onboard.systems.car_park.bay_memory import car_record
+from onboard.ways.mirror import WayFleet, WayMirror
+from onboard.ways.site import WaySite
+from onboard.ways.tokens import car_token
 
 
-def keeper(site: Site, station: Station) -> int:
+def keeper(site: WaySite, station: Station) -> int:
     """Node that keeps a station's token and its car: the compartment itself, else the track's steward."""
     for node_id, bay in site.compartments.items():
         if bay == station:
@@ -32,7 +33,7 @@ def car_of(grant: TokenGrant) -> Reference:
     return Reference(grant.token >> 16, grant.token & 0xFFFF)
 
 
-def state(fleet: Fleet, car: Reference, station: int, wheelbase_mm: int) -> list[Effect]:
+def state(fleet: WayFleet, car: Reference, station: int, wheelbase_mm: int) -> list[Effect]:
     """Journal and say where a car in my custody is; what somebody else holds is its custodian's to say: nothing."""
     key = car_token(*car)
     if not fleet.tokens.holds(key):
@@ -42,18 +43,18 @@ def state(fleet: Fleet, car: Reference, station: int, wheelbase_mm: int) -> list
     return [car_record(said), Send(said)]
 
 
-def place_of(fleet: Fleet, car: Reference) -> Station | None:
+def place_of(fleet: WayFleet, car: Reference) -> Station | None:
     """The place that a car stands in; None while it is in a bay or aboard: its entry is still under way."""
     station = fleet.mirror.car_station(car)
     return station if station not in fleet.site.compartments.values() else None
 
 
-def others_in(mirror: Mirror, station: Station, car: Reference | None = None) -> list[Reference]:
+def others_in(mirror: WayMirror, station: Station, car: Reference | None = None) -> list[Reference]:
     """Cars that stand in a station by their custodians' word, other than ``car``."""
     return [one for one, record in mirror.cars.items() if record.station == station.number and one != car]
 
 
-def replay(fleet: Fleet, said: Iterable[CarAt]) -> None:
+def replay(fleet: WayFleet, said: Iterable[CarAt]) -> None:
     """Take up what the journal tells of cars in my custody, and of those whose new custodian was not heard yet.
 
     What was said under an older version is no knowledge of the place: the car has been elsewhere since.
@@ -67,7 +68,7 @@ def replay(fleet: Fleet, said: Iterable[CarAt]) -> None:
             fleet.mirror.on_car(one)
 
 
-def statements(fleet: Fleet) -> list[Effect]:
+def statements(fleet: WayFleet) -> list[Effect]:
     """Where each car in my custody is that has not left."""
     return [
         Send(CarAt(fleet.node_id, car, record.station, record.version, record.wheelbase_mm))
@@ -76,7 +77,7 @@ def statements(fleet: Fleet) -> list[Effect]:
     ]
 
 
-def before_grant(fleet: Fleet, grant: TokenGrant) -> list[Effect]:
+def before_grant(fleet: WayFleet, grant: TokenGrant) -> list[Effect]:
     """Where the car stood when I gave its token away, as long as nobody has said anything newer."""
     record = fleet.mirror.cars.get(car_of(grant)) if grant.token_kind is TokenKind.CAR else None
     if record is None or record.custodian != fleet.node_id or record.version + 1 != grant.version:
@@ -84,7 +85,7 @@ def before_grant(fleet: Fleet, grant: TokenGrant) -> list[Effect]:
     return [Send(CarAt(fleet.node_id, car_of(grant), record.station, record.version, record.wheelbase_mm))]
 
 
-def before_taking(fleet: Fleet, grant: TokenGrant) -> list[Effect] | None:
+def before_taking(fleet: WayFleet, grant: TokenGrant) -> list[Effect] | None:
     """What a keeper of stations journals before it becomes a car's custodian; None while its place is not known."""
     if grant.token_kind is not TokenKind.CAR:
         return []
@@ -102,7 +103,7 @@ def before_taking(fleet: Fleet, grant: TokenGrant) -> list[Effect] | None:
     return [car_record(said)]
 
 
-def give_back(fleet: Fleet, needed: Container[TokenKey], now_us: int) -> list[Effect]:
+def give_back(fleet: WayFleet, needed: Container[TokenKey], now_us: int) -> list[Effect]:
     """Return rights to stations and cars that no work of mine needs: their grants came after the work was dropped.
 
     A car goes with the word where it stands; one that is aboard, or that nobody has told of, is kept.
@@ -120,7 +121,7 @@ def give_back(fleet: Fleet, needed: Container[TokenKey], now_us: int) -> list[Ef
     return effects
 
 
-def is_mine(fleet: Fleet, car: Reference) -> bool:
+def is_mine(fleet: WayFleet, car: Reference) -> bool:
     """Whether a car is in my custody: by the mirror, and by its token."""
     record = fleet.mirror.cars.get(car)
     is_custodian = record is not None and record.custodian == fleet.node_id

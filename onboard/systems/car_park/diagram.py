@@ -16,6 +16,7 @@ from onboard.core.site import Segment, Site
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis
 from onboard.trace.chart.svg import Drawing, colour, dashes
 from onboard.trace.listener import Said
+from onboard.ways.site import way_site
 
 #: Height of a segment's row, and of a lift's floor, pixels.
 _ROW, _MOST_HEIGHT = 14.0, 260.0
@@ -101,7 +102,7 @@ class Watcher:
         return self.picture
 
     def _on_progress(self, progress: Progress, time_us: int) -> None:
-        track = self._site.tracks.get(progress.track)
+        track = way_site(self._site).tracks.get(progress.track)
         if track is None:
             return
         place = progress.index - 1 + progress.offset_mm / track.pitch_mm
@@ -123,16 +124,16 @@ class Watcher:
         for leg in plan.legs:
             until_us = self._moment_us(leg.end_ms, told_us)
             band = _cut(_band(node, leg, begin_us, until_us), told_us, end_us)
-            if band is not None and leg.track in self._site.tracks and leg.action is not LegAction.RIDE:
+            if band is not None and leg.track in way_site(self._site).tracks and leg.action is not LegAction.RIDE:
                 self.picture.reservations.append(band)
             begin_us = until_us
 
     def _hold(self, token: int, node: int, time_us: int) -> None:
         segment = _segment(token)
         machine = self._site.machines.get(node)
-        if machine is None or machine.kind not in MOBILE_KINDS or segment.track not in self._site.tracks:
+        if machine is None or machine.kind not in MOBILE_KINDS or segment.track not in way_site(self._site).tracks:
             return
-        if segment.track in self._site.lifts or self._held.get(segment, (0, 0))[0] == node:
+        if segment.track in way_site(self._site).lifts or self._held.get(segment, (0, 0))[0] == node:
             return
         self._let_go(segment, time_us)
         self._held[segment] = node, time_us
@@ -183,7 +184,8 @@ def watch(site: Site, said: Iterable[Said], from_us: int | None = None, until_us
 
 def draw(site: Site, picture: Picture, start_us: int) -> Drawing:
     """The diagram: a panel for each floor, lift and spur; seconds since ``start_us`` along the top."""
-    tracks = list(site.tracks.values())
+    ways = way_site(site)
+    tracks = list(ways.tracks.values())
     heights = [min(_MOST_HEIGHT, _ROW * max(3, track.length + 2)) for track in tracks]
     drawing = Drawing(WIDTH, TOP + sum(heights) + GAP * len(tracks) + BOTTOM, f"{site.name}: time and space")
     numbers = {node: number for number, node in enumerate(sorted(site.machines))}
@@ -194,12 +196,12 @@ def draw(site: Site, picture: Picture, start_us: int) -> Drawing:
     scale = (WIDTH - LEFT - RIGHT) / span_us
     top = float(TOP)
     for track, height in zip(tracks, heights, strict=True):
-        is_lift = track.number in site.lifts
+        is_lift = track.number in ways.lifts
         name = f"lift {site.machines[site.stewards[track.number]].name}" if is_lift else f"track {track.number}"
         drawing.area([(LEFT, top), (WIDTH - RIGHT, top), (WIDTH - RIGHT, top + height), (LEFT, top + height)],
                      "#f3f3f3", opacity=1)  # fmt: skip
         drawing.text(8, top + 12, name)
-        speed_mm_s = (site.lift if is_lift else site.carrier).speed_mm_s
+        speed_mm_s = (ways.lift if is_lift else ways.carrier).speed_mm_s
         panel = _Panel(
             drawing, picture, track.number, top, height, track.length, scale, track.pitch_mm, max(1, speed_mm_s)
         )

@@ -8,13 +8,13 @@ from typing import Any
 
 from onboard.core.codes import ANY_STATION, OUTSIDE, Operation, OperatorAction
 from onboard.core.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
-from onboard.core.site import Site
 from onboard.gateway.dialect import Json
 from onboard.gateway.edge import Body, Edge
 from onboard.gateway.order import Order, Wish
 from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
+from onboard.ways.site import WaySite, way_site
 
 #: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
 TICKET_AGAIN_US = 30_000_000
@@ -25,7 +25,7 @@ KEY_PATIENCE_US = 20_000_000
 class ParkWishes(NoWishes):
     """A robotized car park; ``view`` is what was heard of it."""
 
-    def __init__(self, site: Site, view: SiteView, place: Callable[[int], str | None]) -> None:
+    def __init__(self, site: WaySite, view: SiteView, place: Callable[[int], str | None]) -> None:
         super().__init__(site)
         self._view, self._place = view, place
         self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
@@ -71,7 +71,7 @@ class ParkWishes(NoWishes):
             return False
         if order.wish.car is not None:
             return message.car == order.wish.car and message.station == OUTSIDE
-        bays = {station.number for station in self._site.compartments.values()}
+        bays = {station.number for station in way_site(self._site).compartments.values()}
         return message.car == order.task and message.station not in (*bays, ANY_STATION, OUTSIDE)
 
     def _desk(self, name: str, path: str) -> int:

@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 from onboard.core.codes import ANY_STATION, Criterion, Grade, LegAction, Operation
 from onboard.core.messages import CallForProposals, Stamp
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.core.site import Machine, Segment, Site, Station
+from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.program import MAX_STEPS, STAMP_AHEAD_US, Handling, Program, Step, Work, to_itinerary
-from onboard.systems.car_park.site import car_park
+from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us
+from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses
 from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
@@ -82,9 +82,9 @@ class Solution(NamedTuple):
 class CarParkGeneration:
     """Estimates and operating sequences for one robot. Implements the negotiation's ``Estimator``."""
 
-    site: Site
+    site: CarPark
     machine: Machine
-    mirror: Mirror
+    mirror: WayMirror
     program: Program
     tentative: dict[tuple[int, int], Solution] = field(default_factory=dict)
     #: A person has a hand in (row M38): no new tasks.
@@ -105,7 +105,7 @@ class CarParkGeneration:
             return None
         if self.is_held or len(self.program.remaining) + 4 > MAX_STEPS:
             return None
-        limits = car_park(self.site).cars
+        limits = self.site.cars
         # On the bus a wheelbase is rounded down to 10 mm; the desk has measured it to the millimetre.
         if not limits.min_wheelbase_mm - 9 <= call.wheelbase_mm <= limits.max_wheelbase_mm:
             return None
@@ -330,7 +330,7 @@ class CarParkGeneration:
 
     def handling_us(self, station: Station) -> int:
         """Reach, grip or release, retract; at a compartment its output door opens first."""
-        park = car_park(self.site)
+        park = self.site
         stroke_us = run_duration_us(park.shuttle_reach_mm, park.shuttle)
         door_us = self.site.timing.door_us if station in self.site.compartments.values() else 0
         return door_us + 2 * stroke_us + self.site.timing.grip_us + HANDLING_OVERHEAD_US

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 from enum import Enum
 
 from onboard.core.authority import segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import LegAction
 from onboard.core.serial import ranks_before
-from onboard.core.site import Site
 from onboard.systems.car_park.program import Program, Step
 from onboard.ways.kinematics import run_duration_us
+from onboard.ways.mirror import WayFleet
 from onboard.ways.passing import TOLERANCE_US
 from onboard.ways.passing_order import Meeting
 from onboard.ways.reservations import FOREVER
+from onboard.ways.site import WaySite
 
 
 class Answer(Enum):
@@ -36,7 +36,7 @@ class Answer(Enum):
 class GivingWay:
     """Looks at each plan that is heard and changes the program's times where it has to. The way is the robot's part."""
 
-    fleet: Fleet
+    fleet: WayFleet
     program: Program
 
     def heed(self, sender: int, now_us: int) -> Answer:
@@ -105,7 +105,7 @@ def _to_come(steps: list[Step], number: int) -> int:
     return len(_moving(steps[number + 1 :]))
 
 
-def _slack_us(site: Site, step: Step) -> int:
+def _slack_us(site: WaySite, step: Step) -> int:
     """How much later than at once a run in hand may still enter what lies ahead, by its planned end."""
     if step.action is not LegAction.TRAVEL:
         return 0

@@ -8,8 +8,7 @@ for anew by their initiators. A task whose car is aboard is never given back: it
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from onboard.core.authority import car_token, segment_token, station_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import segment_token, station_token
 from onboard.core.codes import NOBODY, Grade, LegAction, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
@@ -23,9 +22,10 @@ from onboard.systems.car_park.recovery import forfeited_record, sink_record
 from onboard.systems.car_park.standoff import Standoff
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lifts import gate, lift_at
-from onboard.ways.obstacles import holder_in
+from onboard.ways.mirror import WayFleet
 from onboard.ways.occupancy import itinerary_windows
 from onboard.ways.reservations import FOREVER, Window
+from onboard.ways.tokens import car_token
 
 #: A plan that finds no way is tried again after this, us. Ours.
 RETRY_US = 3_000_000
@@ -43,7 +43,7 @@ SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
 class GoingAround:
     """One robot's way around obstacles. ``take_up(kept, steps, works, now)`` makes a new program the robot's own."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: CarParkGeneration
     carriage: Carriage
     shuttle: ShuttleWork
@@ -283,7 +283,7 @@ class GoingAround:
         kept, origin, start_us = self._turning((), now_us)
         if kept or other in mirror.obstacles.machines:
             return []
-        slots = mirror.obstacles.slots_of(machine, mirror.progress.get(other), holder_in(self.fleet.tokens.holder_of))
+        slots = mirror.slots_of(machine, self.fleet.tokens.holder_of)
         works = self.program.works()
         mirror.set_aside(other, slots, Reason.NOT_AUTHORISED, now_us)
         steps = self.generation.reroute(origin, start_us, works, now_us)

@@ -7,8 +7,7 @@ to the actuator.
 
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token, station_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey, station_token
 from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
 from onboard.core.effects import Effect, Record
 from onboard.core.messages import ShuttleOrder, ShuttleState
@@ -20,6 +19,8 @@ from onboard.systems.car_park.records import StepRecord
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.travel import Carriage
 from onboard.systems.car_park.unheard import Unheard
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
 
 #: (phase, handling) -> (shuttle's order on leaving the phase, or None, and the next phase).
 #: CLAMP grips when a car is taken and releases when it is left.
@@ -45,7 +46,7 @@ ENDS = {Phase.REACH: ShuttleMode.REACHED, Phase.CLAMP: ShuttleMode.REACHED, Phas
 class ShuttleWork:
     """One robot's shuttle and the handling in hand."""
 
-    fleet: Fleet
+    fleet: WayFleet
     work: Work | None = None
     phase: Phase = Phase.DONE
     sequence: int = 0

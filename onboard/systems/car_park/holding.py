@@ -7,15 +7,15 @@ begun. Let go, it plans the same work anew from where it stands.
 
 from dataclasses import dataclass, field
 
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, LegAction, TaskPhase
 from onboard.core.effects import Effect
 from onboard.core.messages import ManualOrder, Message, Reference, TaskReport
-from onboard.core.site import TrackKind
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import Phase
 from onboard.systems.car_park.travel import Carriage
+from onboard.ways.mirror import WayFleet
+from onboard.ways.site import TrackKind
 from onboard.work.manual import Manual
 
 
@@ -23,7 +23,7 @@ from onboard.work.manual import Manual
 class Holding:
     """One robot's mode. The order is kept by its journal, so a robot that was held is held after a restart."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: CarParkGeneration
     carriage: Carriage
     shuttle: ShuttleWork

@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from onboard.config.reader import Table, type_name
 from onboard.config.toml_lines import path_text
 from onboard.core.codes import Side
-from onboard.core.site import Segment, Station, Track, TrackKind
+from onboard.core.site import Segment, Station
+from onboard.ways.site import Track, TrackKind
 
 SIDES = {"near": Side.NEAR, "far": Side.FAR}
 _PLACES = re.compile(r"p\(\s*(\*|\d{1,3})\s*,\s*(\d{1,3})\s*\)([NF]?)")

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import records_in
@@ -34,6 +33,7 @@ from onboard.systems.car_park.records import RideOverRecord, RideRecord
 from onboard.systems.car_park.stall import Stall
 from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
+from onboard.ways.mirror import WayFleet
 
 #: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
 OFF_LIMIT_MM = 20_000
@@ -63,7 +63,7 @@ class Ride:
 class Lift:
     """One elevator. ``ride`` is the ride in hand, from the grant of the platform until it is back."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: LiftGeneration
     kind: KindCode = KindCode.LIFT
     phase: LiftPhase = LiftPhase.STARTING

@@ -9,15 +9,16 @@ from dataclasses import dataclass, field
 
 from onboard.core.codes import Criterion, LegAction, Operation
 from onboard.core.messages import CallForProposals, Reference
-from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
-from onboard.core.site import Machine, Site
+from onboard.core.site import Machine
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import lift_gaps, ride_us, run_up_us
 from onboard.ways.lifts import sill
+from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import leg_sweeps
 from onboard.ways.reservations import Use
+from onboard.ways.site import WaySite
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +36,9 @@ class LiftGeneration:
     ``index`` is where the platform stands, kept up to date by the lift; ``promises`` are its options, by call.
     """
 
-    site: Site
+    site: WaySite
     machine: Machine
-    mirror: Mirror
+    mirror: WayMirror
     index: int = 1
     promises: dict[CallKey, Promise] = field(default_factory=dict)
 

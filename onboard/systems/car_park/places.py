@@ -8,7 +8,6 @@ lower stamp; the other leaves its car elsewhere. A place in which a car stands i
 from dataclasses import dataclass
 
 from onboard.core.authority import station_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, LegAction
 from onboard.core.messages import Itinerary
 from onboard.core.site import Station
@@ -16,13 +15,14 @@ from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import Handling, Phase, Work
+from onboard.ways.mirror import WayFleet
 
 
 @dataclass
 class Places:
     """Which places are one robot's to put a car into, and what it does when another has promised the same."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: CarParkGeneration
     shuttle: ShuttleWork
 

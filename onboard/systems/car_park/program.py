@@ -12,8 +12,9 @@ from typing import NamedTuple
 from onboard.core.codes import Grade, LegAction, Side
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
-from onboard.core.site import Segment, Site, Station
+from onboard.core.site import Segment, Station
 from onboard.ways.lifts import lift_at, platform_on, sill
+from onboard.ways.site import WaySite
 
 #: Most steps that fit in an itinerary: the leg number has 5 bits.
 MAX_STEPS = 31
@@ -94,7 +95,7 @@ class Program:
     to which no way leads at present. ``version`` is the firm itinerary's 8-bit version, 0 before the first.
     """
 
-    site: Site
+    site: WaySite
     standing: Segment | None = None
     steps: list[Step] = field(default_factory=list)
     unplanned: list[Work] = field(default_factory=list)
@@ -236,7 +237,7 @@ def standing_itinerary(sender: int, version: int, stamp: Stamp, place: Segment, 
     return to_itinerary(sender, version, Grade.FIRM, stamp._replace(award_ms=to_bus_ms(now_us)), steps)
 
 
-def ends_at(site: Site, step: Step) -> Segment:
+def ends_at(site: WaySite, step: Step) -> Segment:
     """Where a carrier is after a step; after a ride on the platform, as a position of the floor's alley."""
     if step.action is not LegAction.RIDE:
         return step.destination

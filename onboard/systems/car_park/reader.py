@@ -6,12 +6,12 @@ from onboard.config.fleet import Fleet
 from onboard.config.reader import Common, Table
 from onboard.config.timing import read_timing
 from onboard.core.codes import KindCode
-from onboard.core.site import TrackKind
 from onboard.systems.car_park.constants import read_constants
 from onboard.systems.car_park.layout import Layout, read_layout
 from onboard.systems.car_park.machines import read_fleet, read_stewards
 from onboard.systems.car_park.room import check_room
 from onboard.systems.car_park.site import CarPark, RideCalls
+from onboard.ways.site import TrackKind
 
 
 def read(root: Table, common: Common) -> CarPark:

@@ -111,7 +111,7 @@ class FloorRecord(JournalRecord):
     track: int
 
 
-# --- custody of cars, and the bay's own task: bay_memory.py. The core's ``car_left`` ends what is about a car ---
+# --- custody of cars, and the bay's own task: bay_memory.py. The core's ``retired`` ends what is about a car ---
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,7 @@ class CarAtRecord(CarRecord):
     """Where a car in this node's custody stands, as it is told. In the order in which cars first came."""
 
     NAME = "car_at"
-    RULES = (Keep("car_at", _CAR, Which.FIRST_AND_NEWEST),)
+    RULES = (Keep("stands", _CAR, Which.FIRST_AND_NEWEST),)
 
     station: int
     version: int

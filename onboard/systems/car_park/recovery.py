@@ -8,7 +8,6 @@ say that the carrier stands (design, section 5).
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import (
     TASK_VERSION_BITS,
     CallResult,
@@ -34,6 +33,7 @@ from onboard.systems.car_park.records import (
     SinkRecord,
     StepRecord,
 )
+from onboard.ways.mirror import WayFleet
 from onboard.work.undertaking import gives_back
 
 
@@ -200,7 +200,7 @@ class Recovery:
         return [one.call.task for one in self.works if one.handling is Handling.TAKE and one.call.task != begun]
 
     def forfeit_unknown(
-        self, fleet: Fleet, award: Award, known: Iterable[Work], done: Collection[Reference]
+        self, fleet: WayFleet, award: Award, known: Iterable[Work], done: Collection[Reference]
     ) -> list[Effect]:
         """An award for a bid of my life before: the bid is not in the journal, so the task is given back at once."""
         mine = award.winner == fleet.node_id and award.result is CallResult.AWARDED

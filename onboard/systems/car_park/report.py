@@ -1,9 +1,10 @@
 """What a car park is, in lines for a person: size, machines, refuges, and what the loss of a lift strands."""
 
 from onboard.core.codes import KindCode
-from onboard.core.site import Machine, Segment, Site, Station, TrackKind
+from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.room import ranges_text, robots_of, robots_text, room_text
 from onboard.ways.reach import hidden_by, reached, stranded_by
+from onboard.ways.site import TrackKind, WaySite
 
 _KINDS = (
     (KindCode.COMPARTMENT, "compartment"),
@@ -12,7 +13,7 @@ _KINDS = (
 )
 
 
-def lines(site: Site) -> list[str]:
+def lines(site: WaySite) -> list[str]:
     """One line each on floors, places, machines and refuges, then one on each lift."""
     lifts = [machine for machine in site.machines.values() if machine.kind is KindCode.LIFT]
     return [
@@ -24,7 +25,7 @@ def lines(site: Site) -> list[str]:
     ]
 
 
-def _floors_line(site: Site) -> str:
+def _floors_line(site: WaySite) -> str:
     lengths = {track.length for track in site.tracks.values() if track.kind is TrackKind.ALLEY}
     count = sum(1 for track in site.tracks.values() if track.kind is TrackKind.ALLEY)
     spurs = sum(1 for track in site.tracks.values() if track.kind is TrackKind.SPUR)
@@ -33,12 +34,12 @@ def _floors_line(site: Site) -> str:
     return f"floors: {count} of {span} positions{beside}"
 
 
-def _machine_words(site: Site, kind: KindCode, word: str) -> str:
+def _machine_words(site: WaySite, kind: KindCode, word: str) -> str:
     names = _named(site, kind)
     return f"{_counted(len(names), word)} ({', '.join(names)})"
 
 
-def _named(site: Site, kind: KindCode) -> list[str]:
+def _named(site: WaySite, kind: KindCode) -> list[str]:
     return [machine.name for machine in site.machines.values() if machine.kind is kind]
 
 
@@ -46,7 +47,7 @@ def _counted(count: int, word: str) -> str:
     return f"{count} {word}{'' if count == 1 else 's'}"
 
 
-def _loss_line(site: Site, lift: Machine) -> str:
+def _loss_line(site: WaySite, lift: Machine) -> str:
     """What stays possible when a lift is lost while every robot stands at its home."""
     track = lift.home.track
     stranded = stranded_by(site, track)
@@ -60,7 +61,7 @@ def _loss_line(site: Site, lift: Machine) -> str:
     return f"without {lift.name} (floors {served}): {'; '.join(parts)}"
 
 
-def _stranded_words(site: Site, lost: int, stranded: tuple[Station, ...]) -> str:
+def _stranded_words(site: WaySite, lost: int, stranded: tuple[Station, ...]) -> str:
     floors = sorted({place.track for place in stranded})
     found = {segment.track for segment in reached(site, lost=(lost,))}
     robots = [one for one in site.machines.values() if one.kind is KindCode.ROBOT]
@@ -73,7 +74,7 @@ def _stranded_words(site: Site, lost: int, stranded: tuple[Station, ...]) -> str
     return words
 
 
-def _alley(site: Site, home: Segment) -> int:
+def _alley(site: WaySite, home: Segment) -> int:
     """The alley at which a home is, a spur's by its mouth."""
     track = site.tracks[home.track]
     return track.joins[0].track if track.kind is TrackKind.SPUR else track.number

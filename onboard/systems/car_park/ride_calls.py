@@ -3,14 +3,14 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import Criterion, KindCode, LegAction, Operation
 from onboard.core.effects import Effect
 from onboard.core.messages import CallForProposals, Reference
 from onboard.core.negotiation import Answer, CallTerms
-from onboard.core.site import Site
 from onboard.systems.car_park.program import Step
 from onboard.ways.lifts import sill
+from onboard.ways.mirror import WayFleet
+from onboard.ways.site import WaySite
 
 
 def rides_of(steps: Iterable[Step]) -> list[Step]:
@@ -18,7 +18,7 @@ def rides_of(steps: Iterable[Step]) -> list[Step]:
     return [step for step in steps if step.action is LegAction.RIDE]
 
 
-def ride_terms(site: Site, call: CallForProposals, step: Step) -> CallTerms:
+def ride_terms(site: WaySite, call: CallForProposals, step: Step) -> CallTerms:
     """The call for one ride of a plan for ``call``, wanted when the plan has the carrier stand aboard."""
     return CallTerms(
         task=call.task,
@@ -27,14 +27,14 @@ def ride_terms(site: Site, call: CallForProposals, step: Step) -> CallTerms:
         criterion=Criterion.FINISH_TIME,
         from_station=sill(site, step.track, step.from_index).number,
         to_station=sill(site, step.track, step.to_index).number,
-        car=call.car,
-        wheelbase_mm=call.wheelbase_mm,
+        load=call.car,
+        load_mm=call.wheelbase_mm,
         ready_us=step.begin_us,
     )
 
 
 def calls_after_winning(
-    site: Site, call: CallForProposals, steps: Iterable[Step], confirmed: tuple[Answer, ...] = ()
+    site: WaySite, call: CallForProposals, steps: Iterable[Step], confirmed: tuple[Answer, ...] = ()
 ) -> list[CallTerms]:
     """A call for each ride of a plan for the task won by ``call``, but for those that a confirmed option answers."""
     parent = Reference(call.sender, call.call)
@@ -49,7 +49,7 @@ def calls_after_winning(
 
 
 def call_lifts(
-    fleet: Fleet, call: CallForProposals, steps: Iterable[Step], now_us: int, confirmed: tuple[Answer, ...] = ()
+    fleet: WayFleet, call: CallForProposals, steps: Iterable[Step], now_us: int, confirmed: tuple[Answer, ...] = ()
 ) -> list[Effect]:
     """Each ride is a call, made after winning (step 15) where no lift has promised it before (row P39)."""
     effects: list[Effect] = []

@@ -3,17 +3,17 @@
 from dataclasses import dataclass, field
 
 from onboard.core.authority import segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect
 from onboard.systems.car_park.sill import SillProof
 from onboard.ways.lifts import gate, platform
+from onboard.ways.mirror import WayFleet
 
 
 @dataclass
 class Riding:
     """One ride in hand: on ``lift_track`` to its index ``leave``. ``done`` once the gate is held at that floor."""
 
-    fleet: Fleet
+    fleet: WayFleet
     lift_track: int = 0
     leave: int = 0
     done: bool = True

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import (
     CallResult,
     Grade,
@@ -32,7 +32,7 @@ from onboard.core.messages import (
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.site import Machine, Site, TrackKind
+from onboard.core.site import Machine, Site
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.asking import AskingGeneration
 from onboard.systems.car_park.generation import CarParkGeneration, Solution, weighed
@@ -49,6 +49,8 @@ from onboard.systems.car_park.starting import Body, Stage, Starting
 from onboard.systems.car_park.travel import Carriage
 from onboard.systems.car_park.way import way_to_refuge
 from onboard.ways.lifts import sill
+from onboard.ways.mirror import WayFleet, way_fleet, way_mirror
+from onboard.ways.site import TrackKind
 
 #: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
 REPLAN_TOLERANCE_US = 500_000
@@ -57,26 +59,29 @@ OVERDUE_US = 2_000_000
 
 
 @dataclass(frozen=True)
-class RobotFactory:
+class RobotFactory(BehaviourFactory):
     """Makes mobile robots."""
+
+    fleet_type = WayFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
         """The robot's task-generation function."""
-        generation = AskingGeneration if car_park(site).rides is RideCalls.BEFORE else CarParkGeneration
-        return generation(site, machine, mirror, Program(site))
+        park = car_park(site)
+        generation = AskingGeneration if park.rides is RideCalls.BEFORE else CarParkGeneration
+        return generation(park, machine, way_mirror(mirror), Program(park))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Robot":
         """The robot's steps; ``estimator`` is the one made above."""
         if not isinstance(estimator, CarParkGeneration):
             raise TypeError("a robot needs the car park's task-generation function")
-        return Robot(fleet, estimator)
+        return Robot(way_fleet(fleet), estimator)
 
 
 @dataclass
 class Robot:
     """One mobile robot: waits for awards, drives, handles cars, and stands in a refuge in between."""
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: CarParkGeneration
     kind: KindCode = KindCode.ROBOT
     carriage: Carriage = field(init=False)

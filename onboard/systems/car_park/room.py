@@ -10,17 +10,18 @@ from itertools import groupby
 from onboard.config.fleet import Fleet
 from onboard.config.reader import Table
 from onboard.core.codes import KindCode
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment
 from onboard.ways.reach import passages
 from onboard.ways.refuges import open_refuges
+from onboard.ways.site import TrackKind, WaySite
 
 
-def robots_of(site: Site) -> int:
+def robots_of(site: WaySite) -> int:
     """Number of carriers."""
     return sum(1 for machine in site.machines.values() if machine.kind is KindCode.ROBOT)
 
 
-def refuge_tracks(site: Site, robots: int) -> list[int]:
+def refuge_tracks(site: WaySite, robots: int) -> list[int]:
     """Alleys and spurs, by track number, in each of which one of ``robots`` carriers may stand for ever."""
     found = {segment.track for segment in open_refuges(site, ())}
     if robots > 1:
@@ -29,7 +30,7 @@ def refuge_tracks(site: Site, robots: int) -> list[int]:
     return sorted(found)
 
 
-def check_room(root: Table, site: Site, fleet: Fleet) -> None:
+def check_room(root: Table, site: WaySite, fleet: Fleet) -> None:
     """Note too few refuges as one problem, else each home where a robot may not stand for ever."""
     robots = robots_of(site)
     tracks = refuge_tracks(site, robots)
@@ -60,7 +61,7 @@ def robots_text(robots: int) -> str:
     return "1 robot" if robots == 1 else f"{robots} robots"
 
 
-def room_text(site: Site, robots: int) -> str:
+def room_text(site: WaySite, robots: int) -> str:
     """How many carriers can stand for ever, and where, on a site that has ``robots``."""
     tracks = refuge_tracks(site, robots)
     if tracks:
@@ -68,7 +69,7 @@ def room_text(site: Site, robots: int) -> str:
     return "refuges for a lone one only" if refuge_tracks(site, 1) else "no refuge"
 
 
-def tracks_text(site: Site, tracks: list[int]) -> str:
+def tracks_text(site: WaySite, tracks: list[int]) -> str:
     """Alleys and spurs in words, such as ``floors 2 to 5, spur 192``; ``tracks`` rise and are not empty."""
     parts = []
     for kind, word in ((TrackKind.ALLEY, "floor"), (TrackKind.SPUR, "spur")):

@@ -10,15 +10,16 @@ from onboard.core.messages import (
     Progress,
     ShuttleState,
 )
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment
 from onboard.trace.scene.scene import Json
 from onboard.trace.view import SiteView
+from onboard.ways.site import TrackKind, WaySite
 
 
 class CarParkScene:
     """Fed beside ``view``, which knows where machines and cars are."""
 
-    def __init__(self, site: Site, view: SiteView) -> None:
+    def __init__(self, site: WaySite, view: SiteView) -> None:
         self.site = site
         self.view = view
         self.words = view.words

@@ -8,12 +8,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.authority import segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Progress, SyncRequest
 from onboard.core.site import Segment
 from onboard.ways.lifts import GATE_INDEX, gate, lift_index_of, platform, says_standing
+from onboard.ways.mirror import WayFleet
 
 #: Who holds a gate and has not heard where its lift stands asks for it after so long, and again, us. Ours.
 ASK_AGAIN_US = 1_000_000
@@ -23,7 +23,7 @@ ASK_AGAIN_US = 1_000_000
 class SillProof:
     """What one robot knows of the platforms whose gates it holds."""
 
-    fleet: Fleet
+    fleet: WayFleet
     _ask_at_us: dict[int, int] = field(default_factory=dict)
 
     def word(self, lift_track: int) -> Progress | None:

@@ -5,7 +5,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from onboard.core.site import Axis, Needs, Site
+from onboard.core.site import Needs, Site
+from onboard.ways.site import Axis, WaySite
+from onboard.work.timing import DeviceTiming
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +32,7 @@ class RideCalls(Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class CarPark(Site):
+class CarPark(WaySite):
     """A robotized car park (rows P30 to P33)."""
 
     system: ClassVar[str] = "car-park"
@@ -41,6 +43,7 @@ class CarPark(Site):
         "DoorOrder": Needs.PLACE,
     }
 
+    timing: DeviceTiming
     shuttle: Axis
     shuttle_reach_mm: int
     cars: CarLimits

@@ -8,10 +8,10 @@ that I am in. The time that this may last decides nothing but how soon somebody 
 from dataclasses import dataclass
 
 from onboard.core.authority import segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import NOBODY, KindCode
 from onboard.core.serial import ranks_before
 from onboard.systems.car_park.travel import Carriage
+from onboard.ways.mirror import WayFleet
 
 #: Whoever ranks behind looks for another way after so long, and again after twice that; who ranks before, after twice
 #: that, us. Ours: longer than tokens take on a bus in trouble, and than a mirror takes to catch up.
@@ -22,7 +22,7 @@ PATIENCE_US = 8_000_000
 class Standoff:
     """One robot's look at who stands in its way because it stands in theirs."""
 
-    fleet: Fleet
+    fleet: WayFleet
     carriage: Carriage
     due_us: int | None = None
     _with: int = NOBODY

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Final, NamedTuple
 
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, LegAction, ShuttleMode
 from onboard.core.effects import Effect, Report, Send
 from onboard.core.messages import CallForProposals, Stamp
@@ -24,6 +23,7 @@ from onboard.systems.car_park.recovery import Recovery, floor_record
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lift_uses import ride_us
+from onboard.ways.mirror import WayFleet
 
 #: From the first known position after a restart until plans are made: the others say meanwhile what they plan. Ours.
 SETTLING_US = 2_000_000
@@ -77,7 +77,7 @@ class Starting:
     ``planned`` are the steps behind what was in hand, None where there was no way; ``calls`` are those of the tasks.
     """
 
-    fleet: Fleet
+    fleet: WayFleet
     generation: CarParkGeneration
     body: Body
     recovery: Recovery

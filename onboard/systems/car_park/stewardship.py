@@ -7,18 +7,19 @@ winner, journals that, and then says FORFEITED; whoever wants the task done call
 
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token, station_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey, station_token
 from onboard.core.codes import NOBODY, OUTSIDE, TASK_VERSION_BITS, CallResult, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
+from onboard.core.mirror import Obstacle
 from onboard.core.negotiation.winners import patience_us
 from onboard.core.petitions import UNORDERED
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.bay_memory import BayMemory, winner_record
-from onboard.ways.obstacles import Obstacle
+from onboard.ways.mirror import WayFleet
+from onboard.ways.tokens import car_token
 
 #: Calls remembered to know which car an award is about; older ones are long closed.
 MAX_CALLS = 64
@@ -35,7 +36,7 @@ SAY_AGAIN_US = 2_000_000
 class Stewardship:
     """Grant rules and custody of one steward. ``winners`` names the machine that may fetch a car."""
 
-    fleet: Fleet
+    fleet: WayFleet
     winners: dict[Reference, int] = field(default_factory=dict)
     #: The task that each car's winner has won and its version.
     tasks: dict[Reference, tuple[Reference, int]] = field(default_factory=dict)
@@ -116,7 +117,7 @@ class Stewardship:
             self._admissions, self._since_us = self.fleet.admissions, now_us
             self._unheard_us = dict.fromkeys(self._unheard_us, now_us)
         obstacles, forgetful = self.fleet.mirror.obstacles.machines, self.fleet.forgetful
-        if not (obstacles or forgetful or self._unheard_us or self.fleet.cars_told or self._say_at_us):
+        if not (obstacles or forgetful or self._unheard_us or self.fleet.mirror.told or self._say_at_us):
             return effects
         lost = {winner for winner in obstacles if self._is_lost(winner, now_us)} | (forgetful - set(obstacles))
         deaf = {car for car, since_us in self._unheard_us.items() if now_us - since_us >= UNHEARD_AFTER_US}
@@ -127,9 +128,9 @@ class Stewardship:
                 effects += self.won(car, NOBODY, task, version)
                 self._say_at_us[car] = now_us
         forgetful &= set(obstacles)
-        for car, told in list(self.fleet.cars_told.items()):
+        for car, told in list(self.fleet.mirror.told.items()):
             if self.fleet.tokens.holds(car_token(*car)):
-                del self.fleet.cars_told[car]
+                del self.fleet.mirror.told[car]
                 effects += custody.state(self.fleet, car, told.station, told.wheelbase_mm)
                 own = self.fleet.site.compartments.get(self.fleet.node_id)
                 self.left = told if own is not None and told.station == own.number else self.left

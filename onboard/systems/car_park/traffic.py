@@ -14,6 +14,7 @@ from onboard.core.codes import KindCode
 from onboard.core.site import Site
 from onboard.trace.frame_length import longest_frame_bits
 from onboard.trace.response import ANYBODY, Stream
+from onboard.ways.site import way_site
 from onboard.wire.dbc_file import MessageLayout, fleet_layouts
 
 _SECOND_US = 1_000_000
@@ -161,11 +162,12 @@ _POWER_UP = (
 
 def numbers_of(site: Site) -> Numbers:
     """A site's numbers; the lookahead is that of the shortest segments."""
+    ways = way_site(site)
     kinds = [machine.kind for machine in site.machines.values()]
-    carrier = site.carrier
+    carrier = ways.carrier
     braking_mm = carrier.speed_mm_s**2 // (2 * carrier.acceleration_mm_s2)
     ahead_mm = braking_mm + carrier.speed_mm_s * _LOOKAHEAD_US // _SECOND_US
-    shortest_mm = min(track.pitch_mm for number, track in site.tracks.items() if number not in site.lifts)
+    shortest_mm = min(track.pitch_mm for number, track in ways.tracks.items() if number not in ways.lifts)
     return Numbers(
         len(kinds),
         kinds.count(KindCode.ROBOT),

@@ -12,19 +12,20 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.serial import successor
-from onboard.core.site import Segment, TrackKind
+from onboard.core.site import Segment
 from onboard.systems.car_park.axis import TrackAxis
 from onboard.systems.car_park.sill import SillProof
 from onboard.systems.car_park.stall import Stall
 from onboard.ways.all_or_none import AllOrNone
 from onboard.ways.lifts import GATE_INDEX, MARK_TOLERANCE_MM, gate, platform
+from onboard.ways.mirror import WayFleet
 from onboard.ways.refuges import refuges
+from onboard.ways.site import TrackKind
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
 #: journal writes and frames. Ours.
@@ -39,7 +40,7 @@ OFF_LIMIT_MM = 20_000
 class Carriage:
     """The carrier of one robot: its sensed position, its drive orders and the segments around it."""
 
-    fleet: Fleet
+    fleet: WayFleet
     track: int
     #: As last told by the drive, its position on the axis in hand.
     sensed: DriveState | None = None

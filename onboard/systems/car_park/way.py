@@ -3,13 +3,14 @@
 from collections.abc import Iterable
 
 from onboard.core.codes import LegAction
-from onboard.core.site import Segment, Site
+from onboard.core.site import Segment
 from onboard.systems.car_park.program import Step
 from onboard.ways.lifts import lift_at, platform
 from onboard.ways.refuges import refuges
+from onboard.ways.site import WaySite
 
 
-def way_to_refuge(site: Site, steps: Iterable[Step]) -> list[Segment]:
+def way_to_refuge(site: WaySite, steps: Iterable[Step]) -> list[Segment]:
     """Slots of ``steps`` in their order up to the first refuge, that included.
 
     A ride is the platform, then the sill beyond and the way onward: whoever boards can leave the platform again.
@@ -25,7 +26,7 @@ def way_to_refuge(site: Site, steps: Iterable[Step]) -> list[Segment]:
     return way
 
 
-def _slots(site: Site, step: Step) -> list[Segment]:
+def _slots(site: WaySite, step: Step) -> list[Segment]:
     if step.action is LegAction.RIDE:
         return [platform(step.track)]
     along = 1 if step.to_index >= step.from_index else -1

@@ -2,8 +2,8 @@
 
 from onboard.core.codes import Operation, TaskPhase
 from onboard.core.messages import Reference
-from onboard.core.site import Site
 from onboard.systems.words import SiteWords
+from onboard.ways.site import WaySite
 
 
 class CarParkWords(SiteWords):
@@ -11,7 +11,7 @@ class CarParkWords(SiteWords):
 
     noun = "car"
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: WaySite) -> None:
         super().__init__(site)
         self._bays = {station.number: node for node, station in site.compartments.items()}
 

@@ -3,13 +3,20 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.core.codes import TokenKind
 from onboard.core.messages import Reference
 from onboard.core.serial import ms_after
+from onboard.core.token_keys import TokenKey
 from onboard.systems.cell.geometry import Area, Point, shortest_way, way_length_m
 from onboard.systems.cell.offers import OFFERS, OfferRule, via_points
 
 #: A goal without a time limit.
 NO_LIMIT = 0
+
+
+def part_token(part: Reference) -> TokenKey:
+    """The token of one part: its holder may touch it."""
+    return TokenKey(TokenKind.CAR, part.origin << 16 | part.number)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
@@ -18,7 +18,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
-from onboard.systems.cell.contracts import Goal
+from onboard.systems.cell.contracts import Goal, part_token
 from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import Hearsay
@@ -26,6 +26,7 @@ from onboard.systems.cell.messages import ArmProgress, OrderAnswer, OrderFrom, O
 from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderState, WorkOrder
+from onboard.work.plain import NoEstimator
 
 
 @dataclass
@@ -37,7 +38,7 @@ class Order(WorkOrder):
 
 
 @dataclass(frozen=True)
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes goal managers."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
@@ -98,7 +99,7 @@ class GoalManager(OrderDesk[Order]):
         """Parts in my custody, and tokens."""
         effects: list[Effect] = []
         for order in self.orders.values():
-            if self.fleet.tokens.holds(car_token(*order.goal.part)):
+            if self.fleet.tokens.holds(part_token(order.goal.part)):
                 place = order.goal.end if order.state is OrderState.DONE else order.goal.start
                 effects.append(Send(PartAt(self.fleet.node_id, order.goal.part, *place, False)))
         return effects + self.fleet.tokens.statements()
@@ -125,7 +126,7 @@ class GoalManager(OrderDesk[Order]):
 
     def may_take_back(self, order: Order) -> bool:
         """While the part has never left my custody; one that has come back lies where it was wanted."""
-        key = car_token(*order.goal.part)
+        key = part_token(order.goal.part)
         return self.fleet.tokens.holds(key) and key not in self.fleet.tokens.given
 
     def may_be_given_back(self, order: Order) -> bool:

@@ -8,8 +8,8 @@ them is ``active``, the most urgent whose part this robot may take (row C15).
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
@@ -18,7 +18,7 @@ from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.records import last_boot
 from onboard.core.site import Machine, Site
-from onboard.systems.cell.contracts import Contract
+from onboard.systems.cell.contracts import Contract, part_token
 from onboard.systems.cell.generation import ArmGeneration, call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import contract_messages
@@ -51,7 +51,7 @@ GRIP_AGAIN_US = 1_000_000
 
 
 @dataclass(frozen=True)
-class ArmFactory:
+class ArmFactory(BehaviourFactory):
     """Makes robots of a cell."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> ArmGeneration:
@@ -338,7 +338,7 @@ class ArmRobot:
 
     def _take_back(self, one: Undertaking, now_us: int) -> list[Effect]:
         """A sub-contractor that is lost while its part is in my custody: the rest is called for anew, without it."""
-        if one.sub_goal is None or not self.fleet.tokens.holds(car_token(*one.sub_goal.part)):
+        if one.sub_goal is None or not self.fleet.tokens.holds(part_token(one.sub_goal.part)):
             return []
         reason = self.fleet.winners.lost(one.sub_goal.task, now_us)
         # Before the part lies where it is to be taken it has nothing to do but to wait.
@@ -400,7 +400,7 @@ class ArmRobot:
 
     def _when_going_there(self, one: Undertaking, now_us: int) -> list[Effect]:
         if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, car_token(*one.contract.goal.part), now_us)
+            return self.driver.go(one.contract.goal.start, part_token(one.contract.goal.part), now_us)
         one.stage = Stage.TAKEN
         self._engage()
         return [*self.driver.rest(), stage_record(one), *self._to(ArmPhase.TAKING, now_us)]
@@ -418,12 +418,12 @@ class ArmRobot:
         if self.driver.stands_at(one.contract.move.via) and self._lies_here():
             return self._put(one, now_us)
         if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, car_token(*one.contract.goal.part), now_us)
+            return self.driver.go(one.contract.goal.start, part_token(one.contract.goal.part), now_us)
         return self._order(GripAction.TAKE, part, now_us)
 
     def _when_carrying(self, one: Undertaking, now_us: int) -> list[Effect]:
         if not self.driver.stands_at(one.contract.move.via):
-            return self.driver.go(one.contract.move.via, car_token(*one.contract.goal.part), now_us)
+            return self.driver.go(one.contract.move.via, part_token(one.contract.goal.part), now_us)
         return [*self.driver.rest(), *self._to(ArmPhase.PUTTING, now_us)]
 
     def _when_putting(self, one: Undertaking, now_us: int) -> list[Effect]:
@@ -452,7 +452,7 @@ class ArmRobot:
         """Said again while it is not obeyed; a grip at nothing is tried anew."""
         assert self.grip is not None
         failed = self.grip.grip_mode is GripMode.NOTHING_THERE and self.gripper.is_obeyed(self.grip.sequence)
-        permit = authorised(self.fleet.motion, [car_token(*part)])
+        permit = authorised(self.fleet.motion, [part_token(part)])
         return self.gripper.order((action, part), permit, now_us, anew=failed)
 
     # --- words -------------------------------------------------------------------------------------------------
@@ -479,4 +479,4 @@ class ArmRobot:
 
 
 def _part_token(one: Undertaking) -> TokenKey:
-    return car_token(*one.contract.goal.part)
+    return part_token(one.contract.goal.part)

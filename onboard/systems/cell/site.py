@@ -9,6 +9,7 @@ from onboard.core.codes import KindCode
 from onboard.core.site import Needs, Site
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
+from onboard.work.timing import DeviceTiming
 
 __all__ = ["Area", "Arm", "Cell", "Point", "Wish"]
 
@@ -34,6 +35,7 @@ class Cell(Site):
     demand: ClassVar[frozenset[str]] = frozenset({"wishes"})
     moved_by: ClassVar[Mapping[str, Needs]] = {"ArmOrder": Needs.RIGHT, "GripOrder": Needs.RIGHT}
 
+    timing: DeviceTiming
     arms: dict[int, Arm]
     obstacles: tuple[Area, ...] = ()
     wishes: tuple[Wish, ...] = ()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from zlib import crc32
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Heartbeat, Message, TokenGrant
@@ -27,6 +27,7 @@ from onboard.systems.graph.network import NOWHERE, Edge, edge
 from onboard.systems.graph.rights import edge_token, keeper, slot_token
 from onboard.systems.graph.rules import Heading, Rules, are_head_on, kept_edge, may_enter, other_edges
 from onboard.systems.graph.site import FactoryGraph
+from onboard.work.plain import NoEstimator
 
 #: A promise that its robot has not redeemed so long after it was made is void, us: the signal comes again. Ours.
 PROMISE_US = 3_000_000
@@ -35,7 +36,7 @@ WAITING_US = 6_000_000
 
 
 @dataclass(frozen=True)
-class HostFactory:
+class HostFactory(BehaviourFactory):
     """Makes hosts of node agents."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

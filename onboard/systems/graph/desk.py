@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import NOBODY, KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
@@ -28,6 +28,7 @@ from onboard.systems.graph.records import VisitRecord
 from onboard.systems.graph.site import FactoryGraph
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderEvent, OrderState, WorkOrder
+from onboard.work.plain import NoEstimator
 
 #: An order by name is said again after this while its robot is not heard, us. Ours.
 LIST_AGAIN_US = 1_000_000
@@ -52,7 +53,7 @@ class Visits(WorkOrder):
 
 
 @dataclass(frozen=True)
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes order desks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

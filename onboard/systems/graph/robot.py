@@ -7,7 +7,7 @@ asked for before the edge, so that nobody who holds an edge waits for anything b
 from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Heartbeat, ManualOrder, Message, Reference, TaskReport
@@ -49,7 +49,7 @@ TOLD_US = 2_000_000
 
 
 @dataclass(frozen=True)
-class RobotFactory:
+class RobotFactory(BehaviourFactory):
     """Makes robots of a factory graph."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> RobotPlanning:

@@ -9,11 +9,11 @@ As both sides order by the same cost, that ends in the one stable outcome whatev
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from onboard.core.behaviour import NoEstimator
 from onboard.core.messages import Bid, CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.site import Timing
 from onboard.systems.mapd.calls import task_of
+from onboard.work.plain import NoEstimator
 
 #: Half of the longest delay is owed by a bid of 30 steps, us: most pick-ups in a warehouse are nearer.
 HALF_US = 3_000_000

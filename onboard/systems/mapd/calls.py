@@ -36,8 +36,8 @@ def call_of(desk: int, task: Task, until_us: int) -> CallForProposals:
         to_bus_ms(until_us),
         terms.from_station,
         terms.to_station,
-        terms.car,
-        terms.wheelbase_mm,
+        terms.load,
+        terms.load_mm,
     )
 
 

@@ -8,7 +8,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Plain
 from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry, records_in
@@ -33,6 +32,7 @@ from onboard.systems.mapd.messages import (
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
 from onboard.systems.mapd.rights import resource_of
 from onboard.systems.mapd.site import Mapd
+from onboard.work.plain import Plain
 
 #: Robots that are missed are asked this long after the step could have begun, and again after as long, us. Ours.
 ASK_US = 500_000

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
@@ -10,10 +10,11 @@ from onboard.systems.mapd.bidding import UnitGeneration
 from onboard.systems.mapd.desk import OrderDesk
 from onboard.systems.mapd.robot import UnitRobot
 from onboard.systems.mapd.site import Mapd
+from onboard.work.plain import NoEstimator
 
 
 @dataclass(frozen=True)
-class UnitRobotFactory:
+class UnitRobotFactory(BehaviourFactory):
     """Makes robots."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> UnitGeneration:
@@ -30,7 +31,7 @@ class UnitRobotFactory:
 
 
 @dataclass(frozen=True)
-class OrderDeskFactory:
+class OrderDeskFactory(BehaviourFactory):
     """Makes the desk."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Plain
 from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, SyncRequest, TaskReport, TokenGrant
@@ -37,6 +36,7 @@ from onboard.systems.mapd.paths import Path
 from onboard.systems.mapd.search import find_path
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.mapd.turns import Turns
+from onboard.work.plain import Plain
 
 #: Whoever is missed is asked this long after everything else was there, and again after as long, us. Ours.
 ASK_US = 500_000

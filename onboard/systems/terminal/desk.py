@@ -7,8 +7,8 @@ whoever plans to carry it.
 from dataclasses import dataclass, field
 from functools import partial
 
-from onboard.core.authority import TokenKey, car_token
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import (
     CallResult,
     Criterion,
@@ -53,7 +53,10 @@ from onboard.systems.terminal.missions import Orders, Transport
 from onboard.systems.terminal.routes import least_end_ms
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.vehicle import terminal
+from onboard.ways.cars import CarFleet, car_fleet, car_mirror
+from onboard.ways.tokens import car_token
 from onboard.work.order_life import OrderEvent
+from onboard.work.plain import NoEstimator
 
 #: After a refusal, and while no robot is about to be free, the desk looks again after this, us. Ours.
 LOOK_US = 5_000_000
@@ -73,25 +76,27 @@ class DeskGeneration(NoEstimator):
 
 
 @dataclass(frozen=True)
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes desks."""
+
+    fleet_type = CarFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> DeskGeneration:
         """The desk's picture."""
-        return DeskGeneration(TerminalMirror(terminal(site), machine.node_id, mirror))
+        return DeskGeneration(TerminalMirror(terminal(site), machine.node_id, car_mirror(mirror)))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Desk":
         """The desk's steps; ``estimator`` is the one made above."""
         if not isinstance(estimator, DeskGeneration):
             raise TypeError("a desk needs its own picture")
-        return Desk(fleet, estimator)
+        return Desk(car_fleet(fleet), estimator)
 
 
 @dataclass
 class Desk:
     """One desk. ``calls`` are the terms of its open calls by task; ``taken`` boxes that another desk calls for."""
 
-    fleet: Fleet
+    fleet: CarFleet
     generation: DeskGeneration
     kind: KindCode = KindCode.DESK
     orders: Orders = field(init=False)
@@ -345,8 +350,8 @@ class Desk:
             criterion=Criterion.FINISH_TIME,
             from_station=self.mirror.station_of(transport.box),
             to_station=transport.target,
-            car=self.site.box(transport.box),
-            wheelbase_mm=0,
+            load=self.site.box(transport.box),
+            load_mm=0,
             detail=(date,),
             floor=partial(least_end_ms, self.site),
         )

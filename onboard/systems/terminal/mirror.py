@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from onboard.core.codes import ANY_STATION, Grade
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import CarAt, Heartbeat, Message, SyncRequest
-from onboard.core.mirror import Mirror
 from onboard.core.serial import from_bus_ms, is_newer
 from onboard.systems.terminal.messages import LaneState, PlanHead, PlanStep, PlanTask, StepReport, StepResult, TaskTerms
 from onboard.systems.terminal.plan import Plan, PlanReader
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 from onboard.systems.terminal.traffic import Traffic
+from onboard.ways.cars import CarMirror
 
 #: Dates remembered at most: of the newest tasks.
 MOST_DATES = 512
@@ -23,7 +23,7 @@ class TerminalMirror:
 
     site: Terminal
     node_id: int
-    fleet: Mirror
+    fleet: CarMirror
     traffic: Traffic = field(init=False)
     where: dict[int, int] = field(default_factory=dict)
     #: Boxes at each station, the lowest, or first, first.

@@ -7,8 +7,8 @@ section 5), so a wrong mirror costs time and nothing else. In an area every vehi
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, car_token, segment_token
-from onboard.core.behaviour import Fleet
+from onboard.core.authority import TokenKey, segment_token
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
@@ -35,6 +35,8 @@ from onboard.systems.terminal.planner import Planner
 from onboard.systems.terminal.records import StepOverRecord
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.terminal.traffic import Owned
+from onboard.ways.cars import CarFleet, car_fleet, car_mirror
+from onboard.ways.tokens import car_token
 
 #: A failed action of the handler is tried again after this, us. Ours.
 RETRY_US = 5_000_000
@@ -50,26 +52,28 @@ def terminal(site: Site) -> Terminal:
 
 
 @dataclass(frozen=True)
-class VehicleFactory:
+class VehicleFactory(BehaviourFactory):
     """Makes vehicles."""
+
+    fleet_type = CarFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> VehicleGeneration:
         """The vehicle's task-generation function, with the picture that it looks at."""
         place = terminal(site)
-        return VehicleGeneration(place, machine, TerminalMirror(place, machine.node_id, mirror))
+        return VehicleGeneration(place, machine, TerminalMirror(place, machine.node_id, car_mirror(mirror)))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> "Vehicle":
         """The vehicle's steps; ``estimator`` is the one made above."""
         if not isinstance(estimator, VehicleGeneration):
             raise TypeError("a vehicle needs its own task-generation function")
-        return Vehicle(fleet, estimator)
+        return Vehicle(car_fleet(fleet), estimator)
 
 
 @dataclass
 class Vehicle:
     """One vehicle: its devices, its plan, and what it does next."""
 
-    fleet: Fleet
+    fleet: CarFleet
     generation: VehicleGeneration
     kind: KindCode = KindCode.VEHICLE
     body: Body = field(init=False)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
-from onboard.core.behaviour import Fleet, NoEstimator
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode
 from onboard.core.effects import Effect
 from onboard.core.journal_records import records_in
@@ -25,6 +25,7 @@ from onboard.systems.turning.messages import (
 from onboard.systems.turning.records import JobOrderRecord, JobOrderStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import WorkOrder
+from onboard.work.plain import NoEstimator
 
 
 @dataclass
@@ -36,7 +37,7 @@ class Order(WorkOrder):
 
 
 @dataclass(frozen=True)
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes order desks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from onboard.core.authority import TokenKey
-from onboard.core.behaviour import Fleet
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord, records_in
@@ -87,7 +87,7 @@ class Batch:
 
 
 @dataclass(frozen=True)
-class LatheFactory:
+class LatheFactory(BehaviourFactory):
     """Makes lathes."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LatheGeneration:

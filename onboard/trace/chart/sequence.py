@@ -41,6 +41,7 @@ from onboard.history.calls import BidMade, CallAnswered, CallFact, CallOpened, C
 from onboard.trace.chart.svg import Drawing
 from onboard.trace.listener import Said
 from onboard.trace.words import Words
+from onboard.ways.site import way_site
 
 #: The lane for what concerns everybody, and that of the devices and the customer.
 ALL = 0
@@ -73,6 +74,7 @@ class _Story:
     """Picks the messages of one task."""
 
     def __init__(self, site: Site, task: Reference, words: Words) -> None:
+        ways = way_site(site)
         self.task = task
         self.car: Reference | None = None
         self.owner = 0
@@ -80,8 +82,8 @@ class _Story:
         self.calls: set[tuple[int, int]] = set()
         self._history = Calls()
         self.offers: set[tuple[int, int]] = set()
-        self._lifts = {site.stewards[track]: track for track in site.lifts}
-        self._platforms = set(site.platforms)
+        self._lifts = {site.stewards[track]: track for track in ways.lifts}
+        self._platforms = set(ways.platforms)
         self._words = words
         self._seen: dict[object, object] = {}
         self._desk_event: DeskEvent | None = None

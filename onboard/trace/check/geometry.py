@@ -10,8 +10,9 @@ from itertools import pairwise
 
 from onboard.core.codes import TokenKind
 from onboard.core.messages import Progress
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment, Site
 from onboard.trace.check.tokens_seen import Token
+from onboard.ways.site import TrackKind, way_site
 
 PLATFORM_INDEX = 0
 GATE_INDEX = 255
@@ -38,7 +39,7 @@ class Body:
 
 def body_of(site: Site, progress: Progress, time_us: int) -> Body | None:
     """The body that a message tells of; None where the site has no such track."""
-    track = site.tracks.get(progress.track)
+    track = way_site(site).tracks.get(progress.track)
     if track is None:
         return None
     position_mm = (progress.index - 1) * track.pitch_mm + progress.offset_mm
@@ -47,14 +48,15 @@ def body_of(site: Site, progress: Progress, time_us: int) -> Body | None:
 
 def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segment]:
     """Slots that a robot's body from ``low_mm`` to ``high_mm`` is in, gates of the sills that it is over included."""
-    line = site.tracks[track]
-    lowest = 0 if Segment(track, 0) in site.platforms else 1
-    highest = line.length + (1 if Segment(track, line.length + 1) in site.platforms else 0)
+    ways = way_site(site)
+    line = ways.tracks[track]
+    lowest = 0 if Segment(track, 0) in ways.platforms else 1
+    highest = line.length + (1 if Segment(track, line.length + 1) in ways.platforms else 0)
     first, last = (_index_at(mm, line.pitch_mm) for mm in (low_mm + TOLERANCE_MM, high_mm - TOLERANCE_MM))
     indices = range(max(lowest, first), min(highest, last) + 1)
     slots = [slot_at(site, Segment(track, index)) for index in indices]
     for one, other in pairwise(indices):
-        lift = site.platforms.get(Segment(track, one), site.platforms.get(Segment(track, other)))
+        lift = ways.platforms.get(Segment(track, one), ways.platforms.get(Segment(track, other)))
         if lift is not None:
             slots.append(Segment(lift, GATE_INDEX))
     return slots
@@ -62,36 +64,38 @@ def slots_of(site: Site, track: int, low_mm: float, high_mm: float) -> list[Segm
 
 def spur_slots(site: Site, spur: int, low_mm: float) -> list[Segment]:
     """Slots of a body that reaches down to ``low_mm`` on a spur's axis: with the mouth where it is over the border."""
-    track = site.tracks[spur]
+    track = way_site(site).tracks[spur]
     inside = Segment(spur, 1)
     return [track.joins[0], inside] if low_mm + TOLERANCE_MM < -track.pitch_mm / 2 else [inside]
 
 
 def occupied(site: Site, body: Body) -> list[Segment]:
     """Slots that a robot's body is in."""
-    if site.tracks[body.track].kind is TrackKind.SPUR:
-        return spur_slots(site, body.track, body.position_mm - site.carrier_length_mm / 2)
-    if site.tracks[body.track].kind is not TrackKind.ALLEY:
+    ways = way_site(site)
+    if ways.tracks[body.track].kind is TrackKind.SPUR:
+        return spur_slots(site, body.track, body.position_mm - ways.carrier_length_mm / 2)
+    if ways.tracks[body.track].kind is not TrackKind.ALLEY:
         return [Segment(body.track, body.index)]
-    half_mm = site.carrier_length_mm / 2
+    half_mm = ways.carrier_length_mm / 2
     return slots_of(site, body.track, body.position_mm - half_mm, body.position_mm + half_mm)
 
 
 def swept(site: Site, body: Body, until_mm: float) -> list[Segment]:
     """Slots that a robot's body is in and comes through until its centre is at ``until_mm`` on the same track."""
-    if site.tracks[body.track].kind is TrackKind.SPUR:
+    ways = way_site(site)
+    if ways.tracks[body.track].kind is TrackKind.SPUR:
         low_mm = min(float(body.position_mm), until_mm)
-        return spur_slots(site, body.track, low_mm - site.carrier_length_mm / 2)
-    if site.tracks[body.track].kind is not TrackKind.ALLEY:
+        return spur_slots(site, body.track, low_mm - ways.carrier_length_mm / 2)
+    if ways.tracks[body.track].kind is not TrackKind.ALLEY:
         return [Segment(body.track, body.index)]
-    half_mm = site.carrier_length_mm / 2
+    half_mm = ways.carrier_length_mm / 2
     low_mm, high_mm = sorted((float(body.position_mm), until_mm))
     return slots_of(site, body.track, low_mm - half_mm, high_mm + half_mm)
 
 
 def slot_at(site: Site, position: Segment) -> Segment:
     """The slot of a position on an alley: itself, or the platform that is meant by the index before or behind it."""
-    lift = site.platforms.get(position)
+    lift = way_site(site).platforms.get(position)
     return position if lift is None else Segment(lift, PLATFORM_INDEX)
 
 
@@ -101,7 +105,7 @@ def lifts_under(site: Site, body: Body) -> set[int]:
     A body is told of when its centre enters a segment, starts or stops: of one that goes away from a platform the last
     word is older than where it is now, so it counts for nothing here.
     """
-    track = site.tracks[body.track]
+    track = way_site(site).tracks[body.track]
     if track.kind is not TrackKind.ALLEY:
         return set()
     low_end = 2 * body.position_mm < (track.length - 1) * track.pitch_mm
@@ -117,7 +121,7 @@ def token_of(slot: Segment) -> Token:
 
 def floor_of(site: Site, lift: Body) -> int:
     """The alley at which a lift's platform is, by the nearest mark."""
-    joins = site.tracks[lift.track].joins
+    joins = way_site(site).tracks[lift.track].joins
     return joins[min(len(joins), max(1, lift.index)) - 1].track
 
 

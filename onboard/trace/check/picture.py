@@ -11,6 +11,7 @@ from onboard.core.site import Segment, Site
 from onboard.trace.check.event import Event
 from onboard.trace.check.geometry import Body, body_of, floor_of
 from onboard.trace.check.tokens_seen import TokensSeen
+from onboard.ways.site import way_site
 
 #: A machine that was not heard for so long counts as silent, us: three missing heartbeats (dbc/fleet.dbc).
 SILENT_US = 7_000_000
@@ -90,7 +91,7 @@ class Picture:
 
     def on_floor(self, body: Body) -> Body:
         """A carrier on a platform is at the floor where its lift is, which it tells only when it moves on."""
-        lift_track = self.site.platforms.get(Segment(body.track, body.index))
+        lift_track = way_site(self.site).platforms.get(Segment(body.track, body.index))
         lift = self.bodies.get(self.site.stewards[lift_track]) if lift_track is not None else None
         return body if lift is None else replace(body, track=floor_of(self.site, lift))
 

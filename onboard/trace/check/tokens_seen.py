@@ -15,7 +15,7 @@ VERSION_BITS = 28
 MEMORY = 8
 #: Most tokens remembered: all of the largest site, and the cars of many days. The one longest silent is forgotten.
 MOST_TOKENS = 20_000
-#: A freeze that is not said again for so long is over, us (onboard/core/regeneration.py).
+#: A freeze that is not said again for so long is over, us (onboard/holon/regeneration.py).
 FORGOTTEN_US = 10_000_000
 #: A frame may overtake another of its own sender, whose identifier is larger, by some bursts on a busy bus, us.
 OVERTAKING_US = 100_000

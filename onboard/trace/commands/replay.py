@@ -6,9 +6,9 @@ from pathlib import Path
 
 from onboard.config.site import load_site
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.holon import Holon
 from onboard.core.messages import Heartbeat
 from onboard.core.site import Machine, Site
+from onboard.holon.holon import Holon
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import factory_for
 from onboard.trace.commands.common import Commands, TraceError, add_command, add_log, open_log, tell_faults

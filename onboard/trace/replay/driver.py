@@ -13,12 +13,12 @@ from typing import NamedTuple
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send, Tell
 from onboard.core.frame import Frame
-from onboard.core.holon import Holon
 from onboard.core.messages import CallForProposals
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.negotiation.events import Needs, Proposal
 from onboard.core.site import Machine, Site
+from onboard.holon.holon import Holon
 from onboard.trace.candump import format_frame
 from onboard.trace.frame_bits import INTERMISSION_BITS, frame_bits
 from onboard.trace.raw import RawFrame
@@ -63,11 +63,12 @@ class Recording:
     has_devices: bool = False
 
 
-class RaisedCosts:
+class RaisedCosts(BehaviourFactory):
     """A factory whose machines bid more than their own computation says: a change that must show in a replay."""
 
     def __init__(self, inner: BehaviourFactory, by: int) -> None:
         self._inner, self._by = inner, by
+        self.fleet_type = inner.fleet_type
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Estimator:
         """The machine's own, with the costs of its bids raised."""

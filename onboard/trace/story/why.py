@@ -26,6 +26,7 @@ from onboard.core.site import Segment, Site, Station
 from onboard.history.calls import CallAnswered, CallOpened, Calls, is_task
 from onboard.systems.words import plain
 from onboard.trace.words import Words
+from onboard.ways.site import way_site
 
 #: Heartbeats missed in a row after which a machine counts as silent.
 MISSED_BEATS = 2
@@ -218,7 +219,7 @@ class Why:
         if before is not None:
             return Cause(f"still busy with task {self._words.reference(before.task)}", story.owner)
         body = self._body(story.owner)
-        if not self._site.tracks:
+        if not way_site(self._site).tracks:
             # Machines of other systems tell no place that this fold knows; what they do is in their system's words.
             phase = max(story.phases, default=TaskPhase.AWARDED)
             return Cause(body.deed or f"has the task, {plain(phase.name)}", story.owner)
@@ -244,7 +245,7 @@ class Why:
 
     def _lift_under(self, body: _Body) -> int | None:
         """Lift track of the platform on which a robot stands."""
-        return self._site.platforms.get(body.at) if body.at is not None else None
+        return way_site(self._site).platforms.get(body.at) if body.at is not None else None
 
     def _ride(self, story: TaskStory, body: _Body, lift: int, now_us: int) -> Cause:
         node = self._site.stewards[lift]
@@ -263,7 +264,7 @@ class Why:
 
     def _standing(self, story: TaskStory, body: _Body, now_us: int) -> Cause:
         if body.wait is not None:
-            if body.wait.track in self._site.lifts:
+            if body.wait.track in way_site(self._site).lifts:
                 return self._lift_awaited(self._site.stewards[body.wait.track], now_us)
             at, why = self._words.system.slot(body.wait.track, body.wait.index), plain(body.wait.reason.name)
             return Cause(f"in the way at {at}: {why}", body.wait.blocker or story.owner)
@@ -302,7 +303,7 @@ class Why:
         if body.refusal is None or now_us - body.refusal[0] > _REFUSAL_US:
             return None
         refusal = body.refusal[1]
-        if refusal.token_kind is TokenKind.SEGMENT and refusal.token >> 8 in self._site.lifts:
+        if refusal.token_kind is TokenKind.SEGMENT and refusal.token >> 8 in way_site(self._site).lifts:
             # Platform and gate are asked for in turn: to the customer it is one wait.
             return self._lift_awaited(refusal.sender, now_us)
         why = self._words.system.reason(refusal.reason)

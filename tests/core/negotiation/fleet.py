@@ -48,8 +48,6 @@ TIMING = Timing(
     token_repeat_us=200_000,
     heartbeat_us=2_000_000,
     bus_time_us=5_000_000,
-    door_us=3_000_000,
-    grip_us=2_000_000,
     drive_refresh_us=200_000,
 )
 
@@ -61,7 +59,7 @@ def terms(number: int = 1, **changes: int) -> CallTerms:
     station, goal, wheelbase_mm = values.pop("from_station"), values.pop("to_station"), values.pop("wheelbase_mm")
     assert not values, "only these three may be changed here"
     return CallTerms(
-        car, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, station, goal, car=car, wheelbase_mm=wheelbase_mm
+        car, Operation.PARK, KindCode.ROBOT, Criterion.FINISH_TIME, station, goal, load=car, load_mm=wheelbase_mm
     )
 
 
@@ -80,8 +78,8 @@ def a_call(call: int = 1, deadline_us: int = START_US + 1_000_000, **changes: ob
         "deadline_ms": deadline_us // 1_000 % BUS_MS_MODULUS,
         "from_station": t.from_station,
         "to_station": t.to_station,
-        "car": t.car,
-        "wheelbase_mm": t.wheelbase_mm,
+        "car": t.load,
+        "wheelbase_mm": t.load_mm,
     }
     return CallForProposals(**(values | changes))  # type: ignore[arg-type]  # each value has its field's type
 

@@ -76,8 +76,8 @@ def goods(good: int, call: CallForProposals, ready_us: int = 0) -> CallTerms:
         Criterion.FINISH_TIME,
         from_station=good,
         to_station=ANY_STATION,
-        car=call.car,
-        wheelbase_mm=call.wheelbase_mm,
+        load=call.car,
+        load_mm=call.wheelbase_mm,
         ready_us=ready_us,
     )
 

@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, field, replace
 
-from onboard.core.behaviour import NoEstimator
 from onboard.core.codes import CallResult, Criterion, KindCode, Reason, TaskPhase
 from onboard.core.effects import Send
 from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
 from onboard.core.negotiation import Negotiation, NegotiationEvent, Proposal, Released
 from onboard.core.negotiation.negotiation import Outcome
+from onboard.work.plain import NoEstimator
 from tests.core.negotiation.fleet import CALLER, START_US, TIMING, a_call, terms
 
 ME, OTHER = 11, 12

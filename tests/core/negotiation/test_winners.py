@@ -1,13 +1,13 @@
 """Who has lost a task, by the one rule that all initiators share."""
 
-from onboard.core.behaviour import NoEstimator
 from onboard.core.codes import NOBODY, CallResult, Criterion, KindCode, Operation, Reason
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Bid, LeftOut, Message, Reference
+from onboard.core.mirror import Obstacle
 from onboard.core.negotiation import CallTerms, Negotiation
 from onboard.core.negotiation.initiator import ACCEPT_WITHIN_US
 from onboard.core.negotiation.winners import LOST_AFTER_US, STANDS_AFTER_US, Winners
-from onboard.ways.obstacles import Obstacle
+from onboard.work.plain import NoEstimator
 from tests.sites import one_floor
 
 SITE = one_floor(robots=2)

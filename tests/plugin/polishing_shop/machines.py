@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.behaviour import Fleet, NoEstimator, Plain
+from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import Criterion, KindCode, MachineState, Operation, Reason, TaskPhase
 from onboard.core.effects import Effect, Send, Tell
 from onboard.core.messages import NO_REFERENCE, CallForProposals, Message, Reference, TaskReport
@@ -10,6 +10,7 @@ from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import ALONE, authorised
 from onboard.core.negotiation import Awarded, CallTerms, Closed, Estimator, NegotiationEvent, Proposal
 from onboard.core.site import Machine, Site
+from onboard.work.plain import NoEstimator, Plain
 from polishing_shop.frames import PartIn, PartOut, Polish, Polished
 from polishing_shop.site import Shop
 
@@ -77,7 +78,7 @@ class Polisher(Plain):
         return Send(TaskReport(self.fleet.node_id, call.task, phase, call.from_station, Reason.NONE))
 
 
-class PolisherFactory:
+class PolisherFactory(BehaviourFactory):
     """Makes polishers."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> Bench:
@@ -120,7 +121,7 @@ class Desk(Plain):
         return [Tell(PartOut(self.fleet.node_id, message.task.number))]
 
 
-class DeskFactory:
+class DeskFactory(BehaviourFactory):
     """Makes desks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:

@@ -112,8 +112,8 @@ class ContractNetInitiator:
             to_bus_ms(now_us + self.timing.call_window_us),
             terms.from_station,
             terms.to_station,
-            terms.car,
-            terms.wheelbase_mm,
+            terms.load,
+            terms.load_mm,
         )
         self.deadline_us = from_bus_ms(self.call.deadline_ms, now_us)
         return [Send(self.call)]

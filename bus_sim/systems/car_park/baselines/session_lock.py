@@ -18,6 +18,7 @@ from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.robot import RobotFactory
 from onboard.systems.registry import factory_for
 from onboard.ways.lifts import platform
+from onboard.ways.mirror import way_mirror
 from onboard.ways.reservations import Reservations, Use, Window
 
 
@@ -64,7 +65,7 @@ class LockingRobotFactory(RobotFactory):
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> CarParkGeneration:
         """The robot's task-generation function, around sessions."""
-        mirror.reservations = SessionLocks(mirror)
+        way_mirror(mirror).reservations = SessionLocks(mirror)
         return super().estimator(site, machine, mirror)
 
 

@@ -13,6 +13,7 @@ from onboard.core.codes import NOBODY, CallResult, Grade, MachineState, Reason, 
 from onboard.core.messages import Award, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.negotiation import CallKey
 from onboard.systems.car_park.robot import Robot
+from onboard.ways.site import way_site
 from onboard.wire.codec import fleet_codec
 
 #: Everybody has read a frame so long after it was heard, us. Ours.
@@ -144,7 +145,7 @@ class Dispatcher:
                 self._say(call, NOBODY)
 
     def _bays(self) -> set[int]:
-        return {station.number for station in self._simulation.site.compartments.values()}
+        return {station.number for station in way_site(self._simulation.site).compartments.values()}
 
     def _say(self, call: CallForProposals, winner: int) -> None:
         result = CallResult.AWARDED if winner else CallResult.REFUSED

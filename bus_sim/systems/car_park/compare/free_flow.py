@@ -45,14 +45,14 @@ class FreeFlow:
     @classmethod
     def of(cls, site: Site) -> "FreeFlow":
         """The least times of a site."""
-        roads = roads_of(site)
         park = car_park(site)
-        fronts = frozenset(station.segment for station in site.compartments.values())
+        roads = roads_of(park)
+        fronts = frozenset(station.segment for station in park.compartments.values())
         return cls(
-            close_us=site.timing.door_us + BOLT_US,
-            open_us=site.timing.door_us,
-            handle_us=2 * run_duration_us(park.shuttle_reach_mm, park.shuttle) + site.timing.grip_us,
-            way_us=min(roads.nearest_us(place.segment, fronts) for place in site.places),
+            close_us=park.timing.door_us + BOLT_US,
+            open_us=park.timing.door_us,
+            handle_us=2 * run_duration_us(park.shuttle_reach_mm, park.shuttle) + park.timing.grip_us,
+            way_us=min(roads.nearest_us(place.segment, fronts) for place in park.places),
         )
 
     def in_us(self, acts: Acts) -> int:

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 
 from onboard.core.codes import Grade, LegAction, Operation
 from onboard.core.messages import CallForProposals, Stamp
-from onboard.core.mirror import Mirror
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.generation import CarParkGeneration, Solution
 from onboard.systems.car_park.program import Program, to_itinerary
+from onboard.ways.mirror import WayMirror
 from onboard.ways.occupancy import itinerary_windows, lift_uses
 from onboard.ways.reservations import FOREVER
 from onboard.ways.roads import roads_of
@@ -56,7 +56,7 @@ class Prospect:
     def _program(self, node: int) -> Program:
         return self.programs.get(node) or self.planners[node].program
 
-    def _mirror(self, node: int) -> Mirror:
+    def _mirror(self, node: int) -> WayMirror:
         """The robot's own mirror, with what the others would plan."""
         others = {other: program for other, program in self.programs.items() if other != node}
         mirror = self.planners[node].mirror

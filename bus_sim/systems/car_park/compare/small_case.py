@@ -16,6 +16,7 @@ from bus_sim.systems.car_park.plant.customer import REACTION_US
 from onboard.core.codes import KindCode
 from onboard.core.site import Segment, Site, Station
 from onboard.ways.roads import roads_of
+from onboard.ways.site import way_site
 
 #: Places kept for each car, those nearest to the bay: on both sides of it more than the cars need, and all ways to and
 #: from a farther one on the same side are longer.
@@ -52,12 +53,13 @@ class Case:
     @classmethod
     def of(cls, site: Site, demand: Demand, seed: int) -> "Case":
         """The case of a demand on a site with one compartment. Raises ``ValueError`` where it has several."""
-        if len(site.compartments) != 1:
-            raise ValueError(f"site {site.name} has {len(site.compartments)} compartments; a small case has one")
-        (station,) = site.compartments.values()
+        ways = way_site(site)
+        if len(ways.compartments) != 1:
+            raise ValueError(f"site {site.name} has {len(ways.compartments)} compartments; a small case has one")
+        (station,) = ways.compartments.values()
         homes = [machine.home for machine in site.machines.values() if machine.kind is KindCode.ROBOT]
-        roads, least = roads_of(site), FreeFlow.of(site)
-        places = sorted(site.places, key=lambda place: roads.shortest_us(station.segment, place.segment))
+        roads, least = roads_of(ways), FreeFlow.of(site)
+        places = sorted(ways.places, key=lambda place: roads.shortest_us(station.segment, place.segment))
         places = places[: PLACES_A_CAR * len(demand.stays)]
         positions: list[Segment] = [place.segment for place in places]
         positions += [station.segment, *homes]

@@ -11,7 +11,8 @@ from bus_sim.systems.car_park.plant.world import Change, RobotBody, World
 from onboard.core.codes import DriveMode
 from onboard.core.messages import DriveOrder, DriveState, Message
 from onboard.core.serial import is_newer
-from onboard.core.site import Axis, Segment, Site, TrackKind
+from onboard.core.site import Segment
+from onboard.ways.site import Axis, TrackKind, WaySite
 
 #: A moving drive that has heard no order for this long brakes to a stand (dbc/device.dbc).
 DRIVE_TIMEOUT_US = 500_000
@@ -41,7 +42,7 @@ class Carrier:
     def __init__(
         self,
         node_id: int,
-        site: Site,
+        site: WaySite,
         world: World,
         timers: Timers,
         link: DeviceLink,

@@ -23,7 +23,8 @@ from onboard.core.messages import (
     Reference,
 )
 from onboard.core.serial import successor
-from onboard.core.site import Site
+from onboard.systems.car_park.site import car_park
+from onboard.ways.site import WaySite
 
 #: DoorState and BayState are repeated this often where nothing changes (dbc/device.dbc).
 REPEAT_US = 10_000_000
@@ -41,7 +42,7 @@ class Compartment:
     car's number; TAKE_TICKET prints a ticket of that number. A DeskOrder like the last one is not shown again.
     """
 
-    def __init__(self, node_id: int, site: Site, world: World, timers: Timers, link: DeviceLink) -> None:
+    def __init__(self, node_id: int, site: WaySite, world: World, timers: Timers, link: DeviceLink) -> None:
         self.node_id = node_id
         self.light = LightColour.RED
         self.text = DeskText.WELCOME
@@ -55,7 +56,7 @@ class Compartment:
         self._told: BayState | None = None
         self._watchers: list[Callable[[], None]] = []
         self._desk_watchers: list[Callable[[DeskText, Reference], None]] = []
-        travel_us = site.timing.door_us
+        travel_us = car_park(site).timing.door_us
         self.doors = {
             DoorName.INPUT: Door(
                 timers,

@@ -7,7 +7,7 @@ from bus_sim.systems.car_park.plant.motion import Motion
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
 from bus_sim.systems.car_park.plant.world import Change, World, is_at_mark
 from onboard.core.messages import DriveOrder, PlatformState
-from onboard.core.site import Axis, Site
+from onboard.ways.site import Axis, WaySite
 
 #: PlatformState is repeated at least this often (dbc/device.dbc).
 REPEAT_US = 10_000_000
@@ -23,7 +23,7 @@ class LiftDrive(Carrier):
     otherwise.
     """
 
-    def __init__(self, node_id: int, site: Site, world: World, timers: Timers, link: DeviceLink) -> None:
+    def __init__(self, node_id: int, site: WaySite, world: World, timers: Timers, link: DeviceLink) -> None:
         super().__init__(node_id, site, world, timers, link, lambda: True)
         self._told: PlatformState | None = None
         self._platform_timer: Timer | None = None

@@ -15,7 +15,8 @@ from bus_sim.systems.car_park.plant.shaft_rules import ShaftRules
 from bus_sim.systems.car_park.plant.spur_rules import SpurRules
 from bus_sim.systems.car_park.plant.world import BayBody, Change, RobotBody, World
 from onboard.core.codes import DoorName, DoorPosition
-from onboard.core.site import Station, TrackKind
+from onboard.core.site import Station
+from onboard.ways.site import TrackKind
 
 
 class Oracle:

@@ -11,13 +11,13 @@ from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
 from bus_sim.systems.car_park.plant.world import World
 from onboard.core.codes import KindCode
-from onboard.core.site import Site
+from onboard.ways.site import WaySite
 
 
 class Plant:
     """Everything that is not a controller. ``links`` has the end of each machine's device bus, by node-ID."""
 
-    def __init__(self, site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> None:
+    def __init__(self, site: WaySite, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> None:
         self.timers = timers
         self.world = World(site, self.timers)
         self.oracle = Oracle(self.world)

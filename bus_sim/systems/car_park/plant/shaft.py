@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bus_sim.systems.car_park.plant.motion import Motion
-from onboard.core.site import Site
+from onboard.ways.site import WaySite
 
 
 class Sill(NamedTuple):
@@ -36,12 +36,12 @@ class PlatformBody:
     axis: int = 0
 
 
-def sills_of(site: Site, lift_track: int) -> dict[int, Sill]:
+def sills_of(site: WaySite, lift_track: int) -> dict[int, Sill]:
     """The sills of one lift by floor."""
     return {segment.track: _sill(site, segment.track, segment.index) for segment in site.tracks[lift_track].joins}
 
 
-def _sill(site: Site, floor: int, index: int) -> Sill:
+def _sill(site: WaySite, floor: int, index: int) -> Sill:
     pitch_mm = site.tracks[floor].pitch_mm
     towards = -1 if index == 1 else 1
     middle_mm = (index - 1) * pitch_mm

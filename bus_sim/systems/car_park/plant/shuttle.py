@@ -6,8 +6,9 @@ from bus_sim.systems.car_park.plant.motion import driving
 from bus_sim.systems.car_park.plant.world import RobotBody, World
 from onboard.core.codes import ShuttleAction, ShuttleMode, Side
 from onboard.core.messages import Message, ShuttleOrder, ShuttleState
-from onboard.core.site import Site, Station
+from onboard.core.site import Station
 from onboard.systems.car_park.site import car_park
+from onboard.ways.site import WaySite
 
 #: The grippers hold a car whose wheelbase differs from the shuttle's by at most this, mm (ours).
 WHEELBASE_TOLERANCE_MM = 50
@@ -35,7 +36,7 @@ class Shuttle:
     until RETRACT; ``fault`` says why in words. ``busy_refusals`` counts orders that came during an action.
     """
 
-    def __init__(self, node_id: int, site: Site, world: World, timers: Timers, link: DeviceLink) -> None:
+    def __init__(self, node_id: int, site: WaySite, world: World, timers: Timers, link: DeviceLink) -> None:
         self.node_id = node_id
         self.mode = ShuttleMode.HOME
         self.fault = ""

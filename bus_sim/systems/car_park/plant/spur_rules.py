@@ -11,13 +11,14 @@ from itertools import pairwise
 from bus_sim.systems.car_park.plant.motion import Motion
 from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Span, Violation
 from bus_sim.systems.car_park.plant.world import MARK_TOLERANCE_MM
-from onboard.core.site import Segment, Site, TrackKind
+from onboard.core.site import Segment
+from onboard.ways.site import TrackKind, WaySite
 
 
 class SpurRules:
     """Judges carriers pair by pair by the spans of their motions, which the oracle keeps."""
 
-    def __init__(self, site: Site) -> None:
+    def __init__(self, site: WaySite) -> None:
         self._site = site
 
     def judge_pair(self, nodes: tuple[int, int], one: Span, two: Span, now_us: int) -> Iterator[Violation]:

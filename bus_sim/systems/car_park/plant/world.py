@@ -15,7 +15,8 @@ from bus_sim.systems.car_park.plant.motion import Motion, standing
 from bus_sim.systems.car_park.plant.rules import Rule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody, Sill, sills_of
 from onboard.core.codes import DoorName, DoorPosition, KindCode, Side
-from onboard.core.site import Segment, Site, Station, TrackKind
+from onboard.core.site import Segment, Station
+from onboard.ways.site import TrackKind, WaySite
 
 #: Tolerance of the fine position sensor opposite a station, mm (row P34).
 MARK_TOLERANCE_MM = 5.0
@@ -75,7 +76,7 @@ class BayBody:
 class World:
     """The site's bodies, cars, doors and people. Robots start standing at home, compartments empty and locked."""
 
-    def __init__(self, site: Site, timers: Timers) -> None:
+    def __init__(self, site: WaySite, timers: Timers) -> None:
         self.site = site
         self.timers = timers
         self.robots: dict[int, RobotBody] = {}

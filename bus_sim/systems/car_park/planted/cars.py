@@ -9,12 +9,12 @@ from typing import Any
 from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.planted.tools import in_behaviour, replace, saying
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.authority import car_token
 from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, ShuttleAction, TokenKind
 from onboard.core.effects import Send
 from onboard.core.messages import CarAt, Message, ShuttleOrder, TokenGrant
 from onboard.systems.car_park.program import Phase
 from onboard.systems.car_park.site import car_park
+from onboard.ways.tokens import car_token
 
 
 def _all_in_one_place(simulation: Simulation) -> None:

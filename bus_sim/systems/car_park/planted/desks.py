@@ -21,6 +21,7 @@ from onboard.core.messages import (
     Message,
     TaskReport,
 )
+from onboard.ways.mirror import way_mirror
 
 _TASK_WORDS = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE)
 
@@ -84,7 +85,7 @@ def _full_too_soon(simulation: Simulation) -> None:
     """A park counts as full with one car in it."""
 
     def plant(controller: Controller) -> None:
-        mirror = controller.holon.mirror
+        mirror = way_mirror(controller.holon.mirror)
 
         def make(old: Callable[..., list[Any]]) -> Callable[..., list[Any]]:
             return lambda *arguments, **named: [] if mirror.cars else old(*arguments, **named)

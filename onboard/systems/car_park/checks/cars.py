@@ -12,6 +12,7 @@ from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.trace.check.tokens_seen import Token
+from onboard.ways.site import way_site
 
 #: Bits by which versions of cars' statements compare (``CarAt`` in dbc/fleet.dbc).
 VERSION_BITS = 16
@@ -66,7 +67,7 @@ class CarsConserved(Rule):
             return ""
         if not self.picture.has_site:
             return ""
-        bay = self.picture.site.compartments.get(said.sender)
+        bay = way_site(self.picture.site).compartments.get(said.sender)
         if bay is None or said.station != bay.number or said.car.origin != said.sender:
             return f"is {_where(said.station)} and never came in"
         return ""
@@ -114,7 +115,7 @@ class CarsConserved(Rule):
     def _is_bay(self, station: int) -> bool:
         if not self.picture.has_site:
             return station != ANY_STATION
-        return any(bay.number == station for bay in self.picture.site.compartments.values())
+        return any(bay.number == station for bay in way_site(self.picture.site).compartments.values())
 
 
 class OneCustodian(Rule):

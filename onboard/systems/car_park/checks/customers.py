@@ -17,6 +17,7 @@ from onboard.core.messages import (
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
+from onboard.ways.site import way_site
 
 #: A customer who pressed the key before a car in the bay gets a word within this, us. Ours.
 WORD_WITHIN_US = 60_000_000
@@ -154,7 +155,7 @@ class FullMeansFull(Rule):
         (self._inside.discard if event.message.station == OUTSIDE else self._inside.add)(event.message.car)
 
     def _on_word(self, event: Event[DeskOrder]) -> None:
-        places = len(self.picture.site.places)
+        places = len(way_site(self.picture.site).places)
         if event.message.text is not DeskText.FULL or not self.picture.tokens.from_start:
             return
         # A car that is on its way out keeps its place until it is fetched, one on its way in has one already.

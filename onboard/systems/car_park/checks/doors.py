@@ -7,6 +7,7 @@ from onboard.core.messages import BayState, DoorOrder, DoorState, ShuttleState
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
+from onboard.ways.site import way_site
 
 _Seen = Event[DoorState] | Event[BayState] | Event[ShuttleState]
 
@@ -76,15 +77,15 @@ class Doors(Rule):
     def _on_shuttle(self, event: Event[ShuttleState]) -> None:
         self._shuttles[event.message.sender] = event.message
         if self.picture.has_site:
-            for node in self.picture.site.compartments:
+            for node in way_site(self.picture.site).compartments:
                 self._judge_shuttles(event, node)
 
     def _judge_shuttles(self, event: _Seen, node: int) -> None:
         """No shuttle is in a bay whose output door is not open."""
         doors = self._doors.get(node)
-        if doors is None or not self.picture.has_site or node not in self.picture.site.compartments:
+        if doors is None or not self.picture.has_site or node not in way_site(self.picture.site).compartments:
             return
-        bay = self.picture.site.compartments[node]
+        bay = way_site(self.picture.site).compartments[node]
         for robot, state in self._shuttles.items():
             body = self.picture.bodies.get(robot)
             out = state.extension_mm > 0 or state.mode not in (ShuttleMode.HOME, ShuttleMode.FAULT)

@@ -5,12 +5,13 @@ from math import sqrt
 
 from onboard.core.codes import CallResult, KindCode, Operation, TaskPhase
 from onboard.core.messages import Award, CallForProposals, CarAt, Message, Progress, Reference, TaskReport, Waiting
-from onboard.core.site import Axis, Site
+from onboard.core.site import Site
 from onboard.systems.car_park.site import car_park
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.geometry import body_of
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
+from onboard.ways.site import Axis
 
 #: Something happens within this, beyond the longest single motion, while there is an open task, us (issue 4, point 1).
 IDLE_WITHIN_US = 60_000_000
@@ -29,10 +30,14 @@ def run_us(length_mm: float, axis: Axis) -> int:
 
 def longest_motion_us(site: Site) -> int:
     """The longest single motion of a site: a whole alley, a whole shaft, or one stroke of a shuttle or door."""
-    shuttle = car_park(site)
-    times = [run_us(shuttle.shuttle_reach_mm, shuttle.shuttle), site.timing.door_us, site.timing.grip_us]
-    for track in site.tracks.values():
-        axis = site.lift if track.number in site.lifts else site.carrier
+    park = car_park(site)
+    times = [
+        run_us(park.shuttle_reach_mm, park.shuttle),
+        park.timing.door_us,
+        park.timing.grip_us,
+    ]
+    for track in park.tracks.values():
+        axis = park.lift if track.number in park.lifts else park.carrier
         times.append(run_us((track.length + 1) * track.pitch_mm, axis))
     return max(times)
 
@@ -42,9 +47,9 @@ def longest_task_us(site: Site) -> int:
 
     Six runs and four rides (to the car, to its place, to a refuge), four doors and two handlings.
     """
-    shuttle = car_park(site)
-    handling_us = 2 * run_us(shuttle.shuttle_reach_mm, shuttle.shuttle) + site.timing.grip_us
-    return 10 * longest_motion_us(site) + 4 * site.timing.door_us + 2 * handling_us
+    park = car_park(site)
+    handling_us = 2 * run_us(park.shuttle_reach_mm, park.shuttle) + park.timing.grip_us
+    return 10 * longest_motion_us(site) + 4 * park.timing.door_us + 2 * handling_us
 
 
 def patience_us(site: Site) -> int:

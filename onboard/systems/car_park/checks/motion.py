@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from onboard.core.codes import KindCode
 from onboard.core.messages import DriveOrder, DriveState, Progress
-from onboard.core.site import Segment, TrackKind
+from onboard.core.site import Segment
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.geometry import (
     TOLERANCE_MM,
@@ -20,6 +20,7 @@ from onboard.trace.check.geometry import (
 )
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
+from onboard.ways.site import TrackKind, way_site
 
 #: Who was pushed by hand has so long to get the rights to where it is, us: it may have to start first, and to listen
 #: until it is admitted (seen: 30 s). Ours.
@@ -52,7 +53,7 @@ class InsideAuthority(Rule):
         body = body_of(self.picture.site, event.message, event.time_us)
         if body is None or self.picture.kind(body.node) is not KindCode.ROBOT:
             return
-        deceleration = self.picture.site.carrier.acceleration_mm_s2
+        deceleration = way_site(self.picture.site).carrier.acceleration_mm_s2
         was_pushed = self._was_pushed(body)
         self._pushed.pop(body.node, None)
         if was_pushed:
@@ -87,14 +88,14 @@ class InsideAuthority(Rule):
             return
         site = self.picture.site
         body = replace(self.picture.on_floor(body), position_mm=sensed_mm)
-        kind = site.tracks[body.track].kind
+        kind = way_site(site).tracks[body.track].kind
         if kind is TrackKind.LIFT:
             return
         if event.message.across is (kind is TrackKind.SPUR):
             slots = swept(site, body, event.message.target_mm)
         else:
             # Sent to turn where it is: into the spur of this mouth, or out of this one.
-            spur = site.spurs.get(Segment(body.track, body.index)) if event.message.across else body.track
+            spur = way_site(site).spurs.get(Segment(body.track, body.index)) if event.message.across else body.track
             slots = spur_slots(site, spur, -math.inf) if spur is not None else [Segment(body.track, body.index)]
         self._judge(event, body, slots, "is sent through")
 
@@ -139,7 +140,7 @@ class OneBody(Rule):
             if other.node == body.node or self.picture.kind(other.node) is not KindCode.ROBOT:
                 continue
             apart_mm = abs(other.position_mm - body.position_mm)
-            if other.track == body.track and apart_mm < site.carrier_length_mm - TOLERANCE_MM:
+            if other.track == body.track and apart_mm < way_site(site).carrier_length_mm - TOLERANCE_MM:
                 self.find(event, (body.node, other.node), f"{apart_mm} mm apart on track {body.track}")
             for lift in sorted(lifts & lifts_under(site, other)):
                 self.find(event, (body.node, other.node), f"both on the platform of lift {lift}")
@@ -150,8 +151,8 @@ class OneBody(Rule):
     def _is_in_mouth_of(self, one: Body, two: Body) -> bool:
         """Whether a body on an alley is where another turns into a spur, or comes out of it."""
         site = self.picture.site
-        if site.tracks[two.track].kind is not TrackKind.SPUR or len(occupied(site, two)) < 2:
+        if way_site(site).tracks[two.track].kind is not TrackKind.SPUR or len(occupied(site, two)) < 2:
             return False
-        mouth = site.tracks[two.track].joins[0]
-        apart_mm = abs(one.position_mm - site.position_mm(mouth))
-        return one.track == mouth.track and apart_mm < site.carrier_length_mm - TOLERANCE_MM
+        mouth = way_site(site).tracks[two.track].joins[0]
+        apart_mm = abs(one.position_mm - way_site(site).position_mm(mouth))
+        return one.track == mouth.track and apart_mm < way_site(site).carrier_length_mm - TOLERANCE_MM

@@ -13,6 +13,7 @@ from onboard.core.site import Segment, Station
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
+from onboard.ways.site import way_site
 
 #: Wheelbases are told in steps of 10 mm, rounded down, and gripped within a tolerance of the telescope, mm.
 WHEELBASE_TOLERANCE_MM = 40
@@ -134,6 +135,6 @@ class TornCar(Rule):
         body = self.picture.bodies.get(node)
         if body is None or self.picture.kind(node) is not KindCode.ROBOT:
             return None
-        if Segment(body.track, body.index) in self.picture.site.platforms:
+        if Segment(body.track, body.index) in way_site(self.picture.site).platforms:
             return None
         return Station(body.track, body.index, state.side)

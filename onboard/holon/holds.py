@@ -1,0 +1,112 @@
+"""What a machine says and does about its holds (holon/holding.py): words, journal, and the way back."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from onboard.core.codes import Reason, TaskPhase
+from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.journal_state import RIGHTS_LOST
+from onboard.core.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    EmergencyStop,
+    Heartbeat,
+    Itinerary,
+    LeftOut,
+    Message,
+    TaskReport,
+    TokenGrant,
+    TokenHeld,
+    TokenRequest,
+)
+from onboard.core.records import BootRecord
+from onboard.core.recovery_messages import Go, Halted, TokenDispute, TokenGiven
+from onboard.holon.holding import Hold, Holding, Outcome
+from onboard.holon.own_number import OwnNumber
+from onboard.holon.presence import Presence
+
+#: Words that make a contract, or claim or move a right: not those of a machine whose journal is not to be relied on.
+#: That they are missing is for all others as if they were lost on the bus, which they bear.
+_OF_RIGHTS = (
+    *(CallForProposals, LeftOut, Bid, Award, Itinerary),
+    *(TokenRequest, TokenGrant, TokenHeld, TokenGiven, TokenDispute),
+)
+
+
+@dataclass
+class Holds:
+    """One machine's. ``heartbeat`` makes its sign of life, ``new_life`` begins another: its number, what to ask."""
+
+    holding: Holding
+    presence: Presence
+    own: OwnNumber
+    drops: Counter[Reason]
+    heartbeat: Callable[[], Heartbeat]
+    new_life: Callable[[int], tuple[int, list[Effect]]]
+
+    def on_own_number(self, message: Message, now_us: int) -> list[Effect]:
+        """Somebody sends under my number: I hold, and take nothing in, until I know that nobody believed it."""
+        self.drops[Reason.DUPLICATE_NODE_ID] += 1
+        return self.apply(self.holding.own_frame(now_us, is_right=self.own.is_right(message)), now_us)
+
+    def on_stop(self, stop: EmergencyStop, now_us: int) -> list[Effect]:
+        """From anybody: standing is always safe. It is no sign of life of its sender, who may be nobody of the site."""
+        return self.apply(self.holding.stop(stop.sender, now_us), now_us)
+
+    def on_go(self, go: Go, now_us: int) -> list[Effect]:
+        """A person lets me, or whom an emergency stop holds, go on; that gives nobody the rights back that it lost."""
+        if go.stopper == self.holding.node_id and self.holding.why.reason in RIGHTS_LOST:
+            return []
+        return self.apply(self.holding.go(go.stopper), now_us)
+
+    def on_halted(self, halted: Halted, now_us: int) -> list[Effect]:
+        """Another machine does not act."""
+        self.presence.heard_halted(halted, now_us)
+        return []
+
+    def apply(self, outcome: Outcome, now_us: int) -> list[Effect]:
+        """What follows from an event of the holds."""
+        match outcome:
+            case Outcome.HOLDS:
+                reason, cause, needs_person = self.holding.why
+                line = f"held: {reason.name}, by node {cause}" + (", a person must decide" if needs_person else "")
+                is_lasting = self.holding.hold is Hold.PERSON
+                record: list[Effect] = [Record(self.holding.record())] if is_lasting else []
+                return [*record, Report(line), *self.words()]
+            case Outcome.GOES_ON:
+                self.presence.listen_anew(now_us)
+                return [Report("goes on"), *self.words()]
+            case Outcome.COMES_BACK:
+                return self._come_back(now_us)
+            case _:
+                return []
+
+    def words(self) -> list[Effect]:
+        """My sign of life, and why I do not act where I do not."""
+        beat = self.heartbeat()
+        held: list[Effect] = [Send(self.holding.word(beat.boot))] if self.holding.is_held else []
+        return [Send(beat), *held]
+
+    def _come_back(self, now_us: int) -> list[Effect]:
+        """As after a restart: under a new boot counter, and all are asked what they know before any right is used."""
+        boot, ask = self.new_life(now_us)
+        self.presence.listen_anew(now_us)
+        records: list[Effect] = [Record(self.holding.record()), Record(BootRecord(boot))]
+        return [*records, Report("comes back: nobody sends under its number any more"), *self.words(), *ask]
+
+
+def without_rights(effects: list[Effect], vouching: tuple[type[Message], ...]) -> list[Effect]:
+    """What is left of them where nobody knows this machine's rights: it still tells how it is, and gives tasks back.
+
+    ``vouching`` are messages that only who has its rights may say, beside those of the core.
+    """
+    of_rights = (*_OF_RIGHTS, *vouching)
+    return [one for one in effects if not (isinstance(one, Send) and _is_of_rights(one.message, of_rights))]
+
+
+def _is_of_rights(message: Message, of_rights: tuple[type[Message], ...]) -> bool:
+    if isinstance(message, TaskReport):
+        return message.phase is not TaskPhase.FORFEITED
+    return isinstance(message, of_rights)

@@ -1,0 +1,481 @@
+"""The holon: a value that eats messages and timers and returns effects. It owns no task, socket or clock.
+
+``receive`` (fleet bus), ``sense`` (device bus) and ``wake`` take the machine's loop time in us; ``next_wake`` tells
+when to call ``wake`` again. Inside, all times are bus time. You can drive one from a Python prompt.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory
+from onboard.core.bus_time import BUS_TIME_MODULUS
+from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
+from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
+from onboard.core.journal_records import Entry, records_in
+from onboard.core.journal_state import INTACT, OLD, RIGHTS_LOST, JournalCondition, reason_of, still_counting
+from onboard.core.messages import (
+    Award,
+    Bid,
+    BusTime,
+    CallForProposals,
+    EmergencyStop,
+    Heartbeat,
+    Itinerary,
+    LeftOut,
+    Message,
+    Progress,
+    Speakers,
+    SyncRequest,
+    TaskReport,
+    TokenGrant,
+    TokenHeld,
+)
+from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_of
+from onboard.core.records import BootRecord
+from onboard.core.recovery_messages import Go, Halted, Regeneration
+from onboard.core.site import Machine, Site
+from onboard.holon.admission import Admission
+from onboard.holon.drops import ToldDrops
+from onboard.holon.holding import Hold, Holding
+from onboard.holon.holds import Holds, without_rights
+from onboard.holon.own_number import OwnNumber
+from onboard.holon.presence import Presence
+from onboard.holon.regeneration import Regenerating
+from onboard.holon.rights import Rights
+from onboard.holon.taking_part import TakingPart
+from onboard.holon.timekeeper import Heard, Timekeeper
+from onboard.holon.witness import Doubt, Witness
+
+#: Most effects that one event may cause before the holon counts as running away.
+MAX_ROUNDS = 100
+#: All that is heard of a machine with another contract or site: the stop, who it is, and where it stands.
+_HEARD_FROM_STRANGERS = (EmergencyStop, Heartbeat, Progress)
+#: All that a machine hears while it is apart: what may end that, who lives, and why others do not act.
+_WHILE_APART = (EmergencyStop, Go, Halted, Heartbeat, Regeneration)
+
+
+class Holon:
+    """One machine's controller, of any kind. ``boot`` is the boot counter, 1 to 255; ``entries`` the journal's."""
+
+    def __init__(
+        self,
+        site: Site,
+        machine: Machine,
+        factory: BehaviourFactory,
+        *,
+        boot: int = 1,
+        entries: Iterable[Entry] = (),
+        journal: JournalCondition = INTACT,
+    ) -> None:
+        self.site = site
+        #: How the journal was found; its ``entries`` are all that there ever were only where it is reliable.
+        self.journal = journal
+        self.machine, self.node_id, self.boot = machine, machine.node_id, boot
+        self.halted: str | None = None
+        #: Input dropped here, by reason, and the counts of the shell's decoders and queues below; summed when told.
+        self.drops: Counter[Reason] = Counter()
+        self.wire_drops: tuple[Counter[Reason], ...] = ()
+        self._told = ToldDrops()
+        self.admission = Admission(site)
+        self.tokens = TokenBook(site, machine.node_id)
+        entries = still_counting(journal, entries)
+        self.tokens.replay(entries)
+        self._has_past = any(records_in(entries, BootRecord))
+        self.mirror = factory.fleet_type.mirror_type(site, machine.node_id)
+        self.mirror.replay(entries)
+        self.time = Timekeeper(site, machine, self.mirror, self.drops)
+        self.clock = self.time.clock
+        self.presence = Presence(site, machine.node_id, self.mirror, self.tokens)
+        self.holding = Holding(machine.node_id, site.timing.heartbeat_us)
+        self.holding.replay(entries, reason_of(journal))
+        #: Whether the bus has taken my frames of late; the shell knows.
+        self.is_acknowledged = True
+        own = OwnNumber(machine.node_id, self.tokens, self.mirror)
+        self.holds = Holds(self.holding, self.presence, own, self.drops, self._heartbeat, self._new_life)
+        self._factory, estimator = factory, factory.estimator(site, machine, self.mirror)
+        is_obstacle = self.mirror.aside.__contains__
+        self.negotiation = negotiation_of(site, machine, estimator, boot, is_obstacle)
+        self.fleet = factory.fleet_type(site, machine, self.tokens, self.mirror, self.negotiation, entries, self.drops)
+        self.behaviour: Behaviour = factory.behaviour(self.fleet, estimator)
+        self._attentive = self.behaviour if isinstance(self.behaviour, Attentive) else None
+        self.witness = Witness(self.tokens, self.mirror, boot, self._has_past, self._statements, self.presence.halts)
+        self.rights = Rights(self.fleet, self._may_grant, self.witness)
+        self.regeneration = Regenerating(self.tokens, self.mirror, self._statements, self._thaw)
+        self.regeneration.replay(entries)
+        self.regeneration.refuses = lambda: self.holding.why.reason if self.holding.is_apart else Reason.NONE
+        self.part = TakingPart(self.presence, self.holding, self.regeneration, self.witness, self.time)
+        self.fleet.motion.why_still = self.part.why_still
+        self.rights.is_frozen = self.mirror.is_frozen = lambda: self.regeneration.is_frozen
+        if self.holding.why.reason in RIGHTS_LOST:
+            self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
+        self._heartbeat_due_us: int | None = None
+        #: When ``wake`` is due, bus time in us; not known after any event but a heartbeat that says nothing new.
+        self._due_us: int | None = None
+        self.is_due_known = False
+        self._bus_time_lost = False
+        self._sensed_early: dict[type[Message], Message] = {}
+        # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
+        self._handlers: dict[type[Message], Callable[[Any, int], list[Effect]]] = {
+            **self.rights.handlers(),
+            **self.regeneration.handlers(),
+            **dict.fromkeys((CallForProposals, Bid, Award, TaskReport, LeftOut), self._negotiate),
+            Itinerary: self._on_itinerary,
+            Progress: self._on_progress,
+            Heartbeat: self._on_heartbeat,
+            SyncRequest: self._on_sync_request,
+            EmergencyStop: self.holds.on_stop,
+            Go: self.holds.on_go,
+            Halted: self.holds.on_halted,
+            **self.mirror.handlers(),
+        }
+
+    # --- events in ---------------------------------------------------------------------------------------------
+
+    def bus_us(self, local_us: int) -> int:
+        """Bus time as this machine believes it to be at loop time ``local_us``, for who looks from outside."""
+        return self.time.bus_us(local_us)
+
+    def start(self, local_us: int) -> list[Effect]:
+        """First effects after power-up: the boot counter to the journal, then the first heartbeat."""
+        local_us = self.time.steady(local_us)
+        # Bus time starts somewhere; the lowest fixed node's start is as good as any.
+        self.time.elect(local_us)
+        now_us = self.clock.bus_us(local_us)
+        self._heartbeat_due_us = now_us
+        self.presence.begins(now_us)
+        if self.journal.is_foreign:
+            return [Report(self.journal.line), *self._beat(now_us)]
+        effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self._beat(now_us)
+        return self._settle(effects + self.witness.begin(now_us), now_us)
+
+    def _first_entries(self, journal: JournalCondition) -> list[Effect]:
+        """Of a short journal only that it was: another is begun, that stands for the hold until a person ends it."""
+        boot = BootRecord(self.boot)
+        if journal.is_reliable:
+            return [Record(boot)]
+        return [Renew((*self.fleet.entries, boot.entry, self.holding.record().entry)), Report(journal.line)]
+
+    def listen(self, speakers: Speakers) -> None:
+        """From now on only who may say a message, by the contract of the wire, is heard with it."""
+        self.admission.listen(speakers)
+
+    def receive(self, message: Message, local_us: int) -> list[Effect]:
+        """A message of the fleet bus, received at ``local_us``."""
+        local_us = self.time.steady(local_us)
+        now_us = self.clock.bus_us(local_us)
+        if isinstance(message, Heartbeat) and self._only_waits(now_us) and self.part.lives_on(message, now_us):
+            return []
+        self.is_due_known = False
+        if message.sender == self.node_id:
+            return self.holds.on_own_number(message, now_us)
+        why = self.admission.why_not(message)
+        if why is not Reason.NONE:
+            self.drops[why] += 1
+            return self.admission.passed_over(message, why) if self.halted is None else []
+        self.holding.heard(now_us)
+        if isinstance(message, BusTime):
+            return self._on_bus_time(message, local_us)
+        if self.holding.is_apart and not isinstance(message, _WHILE_APART):
+            return []
+        if message.sender in self.presence.foreign and not isinstance(message, _HEARD_FROM_STRANGERS):
+            self.drops[self.presence.foreign[message.sender][0]] += 1
+            return []
+        effects = self._awake(now_us)
+        self.mirror.hear(message, now_us)
+        self.presence.heard(message.sender, now_us)
+        handler = self._handlers.get(type(message))
+        effects += handler(message, now_us) if handler is not None else []
+        if isinstance(message, (Itinerary, Heartbeat)):
+            self.presence.heard(message.sender, now_us)
+        effects = effects + self.behaviour.hear(message, now_us)
+        if isinstance(message, (TokenGrant, TokenHeld)):
+            proven = self.mirror.settle(TokenKey(message.token_kind, message.token))
+            effects += self.behaviour.hear(proven, now_us) if proven is not None else []
+        return self._settle(effects, now_us)
+
+    def sense(self, message: Message, local_us: int) -> list[Effect]:
+        """A message of the machine's own device bus."""
+        if self.journal.is_foreign:
+            return []
+        local_us = self.time.steady(local_us)
+        self.is_due_known = False
+        if not self.clock.is_set:
+            # Plans made before bus time is known would be told in a time of one's own.
+            self._sensed_early[type(message)] = message
+            return []
+        now_us = self.clock.bus_us(local_us)
+        return self._settle(self._awake(now_us) + self.behaviour.sense(message, now_us), now_us)
+
+    def wake(self, local_us: int) -> list[Effect]:
+        """Do what has fallen due."""
+        local_us = self.time.steady(local_us)
+        self.is_due_known = False
+        # Who has slept counts nobody as silent, so that it does not take itself for the time source.
+        effects = self._awake(self.clock.bus_us(local_us))
+        self.time.elect(local_us)
+        now_us = self.clock.bus_us(local_us)
+        effects += self.holds.apply(self.holding.wake(now_us, acknowledged=self.is_acknowledged), now_us)
+        effects += self.regeneration.wake(now_us)
+        if not self.holding.is_apart:
+            effects += self.witness.wake(now_us)
+        if self.part.deals:
+            effects += self.tokens.wake(now_us) + self.rights.serve_petitions(now_us)
+        self._bus_time_lost = self.clock.is_lost(local_us)
+        if self.presence.is_admitted(now_us, in_time=self.clock.far_us is None):
+            # What was planned before is old; the first word is that of a machine that takes part.
+            self.fleet.admissions += 1
+            self.fleet.winners.begin_anew(now_us)
+            self._heartbeat_due_us = now_us
+        if not self._bus_time_lost and self.part.begins:
+            effects += self._carry_out(self.negotiation.wake(now_us), now_us)
+        effects += self._beat(now_us)
+        return self._settle(effects, now_us)
+
+    def next_wake(self) -> int | None:
+        """Loop time in us at which ``wake`` is to be called, or None before ``start``."""
+        if self.halted is not None:
+            return None
+        if not self.is_due_known:
+            self._due_us, self.is_due_known = self._earliest_due(), True
+        return None if self._due_us is None else self.time.loop_us(self._due_us)
+
+    def _earliest_due(self) -> int | None:
+        """When the first of all parts has something to do, bus time in us: a matter of what they know, not of when."""
+        times = [
+            self._heartbeat_due_us,
+            self.time.due_us,
+            self.holding.next_wake(),
+            self.regeneration.next_wake(),
+            self.presence.held_until_us,
+        ]
+        if not self.holding.is_apart:
+            times.append(self.witness.next_wake())
+        if self.part.deals:
+            times += (self.tokens.next_wake(), self.rights.petition_due())
+        if self.part.begins:
+            times += (self._negotiation_due(), self.behaviour.next_wake())
+        return min((time for time in times if time is not None), default=None)
+
+    def _only_waits(self, now_us: int) -> bool:
+        """Whether nothing is to be done here unless something happens: nothing is due, and nobody looks for it."""
+        if self._attentive is None or not self.is_due_known or self._due_us is None or self._due_us <= now_us:
+            return False
+        return not self._attentive.watches(now_us)
+
+    def _awake(self, now_us: int) -> list[Effect]:
+        """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
+        if self._heartbeat_due_us is None or not self.presence.awake(now_us):
+            return []
+        self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+        self.holding.slept(now_us)
+        self.witness.slept(now_us)
+        # One by one: all are asked at power-up only.
+        asked = [effect for node in self.mirror.peers for effect in self.witness.ask(node)]
+        return [Report("woke after a sleep"), Send(self._heartbeat()), *asked]
+
+    def _on_bus_time(self, message: BusTime, local_us: int) -> list[Effect]:
+        if message.sender in self.presence.foreign:
+            return []
+        if message.bus_time_us >= BUS_TIME_MODULUS:
+            self.drops[Reason.VALUE_OUT_OF_RANGE] += 1
+            return []
+        before_us = self.clock.bus_us(local_us)
+        heard = self.time.hear(message, local_us)
+        now_us = self.clock.bus_us(local_us)
+        self.witness.shift(now_us - before_us)
+        self._bus_time_lost &= heard in (Heard.NOTHING, Heard.REFUTED)
+        match heard:
+            case Heard.REFUTED:
+                return [self._bus_time(now_us)]
+            case Heard.FIRST:
+                return self._begin(now_us)
+            case Heard.SET_ANEW:
+                return self._set_anew(now_us)
+        return []
+
+    def _begin(self, now_us: int) -> list[Effect]:
+        """Bus time is known: the first word, and what was sensed before."""
+        self.presence.begins(now_us)
+        self._heartbeat_due_us = now_us
+        effects: list[Effect] = []
+        for early in self._sensed_early.values():
+            effects += self._settle(self.behaviour.sense(early, now_us), now_us)
+        self._sensed_early.clear()
+        return effects
+
+    def _set_anew(self, now_us: int) -> list[Effect]:
+        """Bus time was far off, and is set: what was read of plans meanwhile was read in the wrong time."""
+        self.mirror.retime(now_us)
+        return self._awake(now_us)
+
+    def _negotiation_due(self) -> int | None:
+        """Nothing is due in the negotiation while bus time is lost: its deadlines mean nothing then."""
+        # The last loop time is not known here; what ``wake`` found holds until the next time message.
+        return None if self._bus_time_lost else self.negotiation.next_wake()
+
+    # --- handlers ----------------------------------------------------------------------------------------------
+
+    def _negotiate(self, message: Message, now_us: int) -> list[Effect]:
+        why = self.part.why_no_bid(self.behaviour.state, now_us)
+        if why is not Reason.NONE and isinstance(message, CallForProposals):
+            self.drops[why] += 1
+            return []
+        return self._carry_out(self.negotiation.receive(message, now_us), now_us)
+
+    def _on_itinerary(self, itinerary: Itinerary, now_us: int) -> list[Effect]:
+        self.mirror.on_itinerary(itinerary, now_us)
+        return self._carry_out(self.negotiation.receive(itinerary, now_us), now_us)
+
+    def _on_progress(self, progress: Progress, now_us: int) -> list[Effect]:
+        self.mirror.on_progress(progress)
+        return []
+
+    def _on_heartbeat(self, beat: Heartbeat, now_us: int) -> list[Effect]:
+        news = self.regeneration.on_heartbeat(beat, now_us)
+        reason = self.regeneration.strange(beat)
+        if reason is not Reason.NONE:
+            self.drops[reason] += 1
+            self.presence.heard_foreign(beat.sender, reason, now_us)
+            return news
+        self.presence.foreign.pop(beat.sender, None)
+        self.presence.heard_beat(beat)
+        fresh = self.mirror.on_heartbeat(beat, now_us)
+        if fresh or (self.clock.is_source and beat.sender < self.node_id):
+            self.time.elect(self.clock.local_us(now_us))
+        if self.holding.is_apart:
+            return news
+        if fresh:
+            self.tokens.begin_anew(now_us)
+            self.negotiation.begin_anew(now_us)
+        return news + self.witness.on_heartbeat(beat, now_us, is_fresh=fresh)
+
+    def _on_sync_request(self, request: SyncRequest, now_us: int) -> list[Effect]:
+        if request.whom not in (NOBODY, self.node_id):
+            return []
+        effects = self.witness.on_request(request, now_us)
+        if self.clock.is_source:
+            # Who asks may just have joined: it need not wait for the next period.
+            effects = [self._bus_time(now_us), *effects]
+        return effects
+
+    def _statements(self, now_us: int) -> list[Effect]:
+        return self.behaviour.statements(now_us) + self.mirror.statements()
+
+    # --- holds -------------------------------------------------------------------------------------------------
+
+    def _thaw(self, lost: int, now_us: int) -> list[Effect]:
+        """Rights were made anew, or it was broken off: who lost its own begins as after a restart, all others look."""
+        if lost not in (NOBODY, self.node_id):
+            self.fleet.forgetful.add(lost)
+        elif lost == self.node_id:
+            self.witness.doubt, self.witness.has_past, self.fleet.has_no_rights = None, True, False
+            self.fleet.slots_told = self.regeneration.slots()
+            if self.holding.why.reason in RIGHTS_LOST:
+                return self.holds.apply(self.holding.go(self.node_id), now_us)
+        self.presence.listen_anew(now_us)
+        return self.holds.words()
+
+    def _may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
+        """Who is held gives no right away: it may be one that it does not have any more."""
+        if self.holding.is_held or self.regeneration.is_frozen:
+            return self.holding.why.reason if self.holding.is_held else Reason.REGENERATION
+        return self.behaviour.may_grant(key, requester, now_us)
+
+    def _new_life(self, now_us: int) -> tuple[int, list[Effect]]:
+        """As after a restart: the boot counter, and the question to all what they know."""
+        self.boot = self.witness.boot = self.boot % 255 + 1
+        self.witness.has_past = True
+        return self.boot, self.witness.begin(now_us)
+
+    def last_word(self, reason: Reason) -> Halted:
+        """What is said before the process ends: ``reason`` where none was given before."""
+        if self.holding.hold is not Hold.HALTED:
+            self.holding.halt(reason)
+        return self.holding.word(self.boot)
+
+    # --- inner works -------------------------------------------------------------------------------------------
+
+    def _settle(self, effects: list[Effect], now_us: int) -> list[Effect]:
+        """Let the machine go on until it waits for something; bounded, as each round must come from the one before."""
+        if self.witness.doubt is not None:
+            effects = effects + self._doubts(now_us)
+        if self.halted is not None:
+            return [effect for effect in effects if isinstance(effect, Report | Halt)]
+        for _ in range(MAX_ROUNDS if self.part.begins else 0):
+            more = self.behaviour.advance(now_us)
+            if not more:
+                break
+            effects = effects + more
+        else:
+            if self.part.begins:
+                effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
+        fault = self.fleet.motion.fault(effects, self.site.moved_by)
+        if fault is not None:
+            return self._halt(fault, Reason.NOT_AUTHORISED)
+        self.holds.own.note(effects)
+        is_mute = self.fleet.has_no_rights and not self.regeneration.is_frozen
+        return without_rights(effects, self.mirror.vouching) if is_mute else effects
+
+    def _doubts(self, now_us: int) -> list[Effect]:
+        """Somebody knows that the journal is old: nothing of it is used any more, as if it were short."""
+        doubt = self.witness.doubt
+        if doubt is None or self.holding.why.reason in RIGHTS_LOST:
+            return []
+        self.fleet.has_no_rights = True
+        held = self.holds.apply(self.holding.for_person(doubt.reason, doubt.cause), now_us)
+        return [*(self._forget(now_us) if self._has_past else []), Report(doubt.text), *held]
+
+    def _forget(self, now_us: int) -> list[Effect]:
+        """What the behaviour took up from an old journal may be long over: it begins anew, and so does the journal."""
+        self.fleet.entries = still_counting(OLD, self.fleet.entries)
+        self.negotiation.estimator = estimator = self._factory.estimator(self.site, self.machine, self.mirror)
+        self.behaviour = behaviour = self._factory.behaviour(self.fleet, estimator)
+        self._attentive = behaviour if isinstance(behaviour, Attentive) else None
+        return [*self._first_entries(OLD), *self.behaviour.start(now_us)]
+
+    def _carry_out(self, outcome: list[Effect | NegotiationEvent], now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        for item in outcome:
+            if isinstance(item, EVENT_TYPES):
+                effects += self.behaviour.negotiated(item, now_us)
+            else:
+                effects.append(item)
+        return effects
+
+    def _beat(self, now_us: int) -> list[Effect]:
+        effects: list[Effect] = []
+        if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
+            self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+            self.presence.review(now_us)
+            effects += self.holds.words() + self.mirror.forgotten()
+            effects += self._told.words(self.node_id, sum(self.wire_drops, Counter(self.drops)))
+            effects += [Send(word) for word in self.presence.halted_ones(now_us)]
+            effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
+        if self.time.due_us is not None and self.time.due_us <= now_us:
+            self.time.due_us = now_us + self.site.timing.bus_time_us
+            effects.append(self._bus_time(now_us))
+        return effects
+
+    def _bus_time(self, now_us: int) -> Effect:
+        return Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS))
+
+    def _heartbeat(self) -> Heartbeat:
+        return Heartbeat(
+            self.node_id,
+            CONTRACT_VERSION,
+            self.site.digest,
+            self.mirror.digest(),
+            self.boot,
+            self.machine.kind,
+            MachineState.OBSTACLE if self.part.is_still else self.behaviour.state,
+            self.regeneration.epoch,
+        )
+
+    def _halt(self, why: str, reason: Reason, cause: int = NOBODY) -> list[Effect]:
+        if self.halted is not None:
+            return []
+        self.halted = why
+        self.holding.halt(reason, cause)
+        return [Halt(why, reason)]

@@ -1,0 +1,231 @@
+"""The mirror of a site with ways: what everybody's plans occupy, who passes first, and what is in the way there."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from onboard.core.behaviour import Fleet
+from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason, TokenKind
+from onboard.core.effects import Effect
+from onboard.core.messages import Blocked, Clear, Itinerary, Message, Progress
+from onboard.core.mirror import Mirror
+from onboard.core.serial import reread_us
+from onboard.core.site import Machine, Segment, Station
+from onboard.core.token_keys import TokenKey, segment_token
+from onboard.ways.blocked_words import BlockedWords
+from onboard.ways.cars import CarFleet, CarMirror
+from onboard.ways.lift_uses import standing_after
+from onboard.ways.lifts import lift_tracks
+from onboard.ways.obstacles import Obstacles
+from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, turned_in
+from onboard.ways.passing import Plan, next_plan
+from onboard.ways.passing_order import PassingOrder
+from onboard.ways.reservations import Reservations
+from onboard.ways.site import WaySite
+from onboard.ways.standing import Standing
+from onboard.ways.tokens import tokens_of
+
+
+@dataclass
+class WayMirror(CarMirror):
+    """What one machine believes of the others' ways."""
+
+    site: WaySite
+
+    #: Plans with when their first legs began, and what each replaced: the order of passing comes from there.
+    plans: dict[int, Plan] = field(default_factory=dict)
+    replaced: dict[int, Plan] = field(default_factory=dict)
+    reservations: Reservations = field(default_factory=Reservations)
+    order: PassingOrder = field(init=False)
+    obstacles: Obstacles = field(init=False)
+    standing: Standing = field(init=False)
+    blocked_words: BlockedWords = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.order = PassingOrder(self.site)
+        self.obstacles = Obstacles(self.site, lambda: self.reservations, self.aside)
+        self.standing = Standing(self.site, self.itineraries)
+        self.blocked_words = BlockedWords(self.site, self.node_id, self.obstacles)
+
+    # --- what is heard -----------------------------------------------------------------------------------------
+
+    def handlers(self) -> dict[type[Message], Callable[[Any, int], list[Effect]]]:
+        """Words about blocked segments as well."""
+        return {**super().handlers(), **dict.fromkeys((Blocked, Clear), self._on_word)}
+
+    def replay(self, entries: Iterable[Mapping[str, str | int]]) -> None:
+        """What is in my journal is blocked, or clear, as it was."""
+        self.blocked_words.replay(entries)
+        self._digest = None
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """Who moves, and who says what it waits for."""
+        self.standing.hear(message, now_us)
+
+    def statements(self) -> list[Effect]:
+        """What is blocked, or clear again, of the tracks that I am steward of."""
+        return self.blocked_words.statements()
+
+    def _on_word(self, word: Blocked | Clear, now_us: int) -> list[Effect]:
+        self._digest = None
+        return self.blocked_words.hear(word, now_us)
+
+    def on_itinerary(self, itinerary: Itinerary, now_us: int) -> bool:
+        """Take up a firm itinerary, and what it occupies."""
+        node, is_continued = itinerary.sender, itinerary.sender in self.itineraries
+        if not super().on_itinerary(itinerary, now_us):
+            return False
+        if is_continued and node in self.plans:
+            self.replaced[node] = self.plans[node]
+        self.plans[node] = next_plan(self.plans.get(node), itinerary, now_us)
+        if node not in self.aside:
+            self._count_on(self.plans[node], now_us)
+        return True
+
+    def _count_on(self, plan: Plan, now_us: int) -> None:
+        """Plan around a machine's plan, and keep its place in the order of passing."""
+        itinerary = plan.itinerary
+        self.order.on_plan(plan, now_us)
+        self.reservations.release(itinerary.sender)
+        self.reservations.reserve(
+            itinerary.sender,
+            itinerary_windows(self.site, itinerary, now_us, plan.first_begin_us),
+            lift_uses(self.site, itinerary, now_us, plan.first_begin_us),
+        )
+
+    def _forget_plan(self, node: int) -> None:
+        # Its body is still somewhere: the reservation stays until its first new itinerary replaces it.
+        self.plans.pop(node, None)
+        self.replaced.pop(node, None)
+        super()._forget_plan(node)
+
+    def on_progress(self, progress: Progress) -> None:
+        """Last known position of a machine, and how far it has come on its way."""
+        super().on_progress(progress)
+        self.order.on_progress(progress)
+
+    def retime(self, now_us: int) -> None:
+        """Times of plans are read anew, as the nearest to ``now_us`` that they can be."""
+        self.reservations, self.order = Reservations(), PassingOrder(self.site)
+        for plans in (self.plans, self.replaced):
+            for node, plan in plans.items():
+                plans[node] = plan._replace(first_begin_us=reread_us(plan.first_begin_us, now_us))
+        for node, plan in self.plans.items():
+            if node not in self.aside:
+                self._count_on(plan, now_us)
+        for progress in self.progress.values():
+            self.order.on_progress(progress)
+        self.obstacles.retime(now_us)
+
+    # --- who is in the way -------------------------------------------------------------------------------------
+
+    def set_aside(self, node: int, slots: frozenset[Segment], reason: Reason, now_us: int) -> bool:
+        """A machine is an obstacle at ``slots`` and passes nothing."""
+        if not super().set_aside(node, slots, reason, now_us):
+            return False
+        self.obstacles.put(node, slots, now_us)
+        self.order.drop(node)
+        return True
+
+    def admit(self, node: int, now_us: int) -> bool:
+        """A machine takes part: its plan counts again."""
+        if not super().admit(node, now_us):
+            return False
+        self.obstacles.let_go(node)
+        if node in self.plans:
+            self._count_on(self.plans[node], now_us)
+        return True
+
+    def slots_of(self, machine: Machine, holder_of: Callable[[TokenKey], int]) -> frozenset[Segment]:
+        """Slots that a machine is in by its last word, and those whose tokens it holds."""
+        seen = self.progress.get(machine.node_id)
+        return self.obstacles.slots_of(machine, seen, lambda slot: holder_of(segment_token(slot)))
+
+    def stands(self, node: int, now_us: int) -> bool:
+        """Whether a machine has stood for too long where its plan does not leave it."""
+        return self.standing.stands(node, now_us)
+
+    def is_planless(self, machine: Machine) -> bool:
+        """Whether a machine that moves has told no plan; where there are no tracks it may have none to tell."""
+        return bool(self.site.tracks) and machine.kind in MOBILE_KINDS and machine.node_id not in self.itineraries
+
+    # --- the order of passing ----------------------------------------------------------------------------------
+
+    def predecessor(self, node: int, key: TokenKey) -> int:
+        """Who passes a slot right before ``node``; 0 for nobody, and for what is no slot."""
+        if key.kind is not TokenKind.SEGMENT:
+            return NOBODY
+        return self.order.predecessor(node, slot_of(key)) or NOBODY
+
+    def on_return(self, node: int, key: TokenKey) -> None:
+        """A machine gave a slot back."""
+        if key.kind is TokenKind.SEGMENT:
+            self.order.on_return(node, slot_of(key))
+
+    # --- what plans need ---------------------------------------------------------------------------------------
+
+    def others_standing(self) -> list[Segment]:
+        """Where the plans of all other machines end: there they stand until they plan anew; obstacles stand now."""
+        found = [
+            final_position(self.site, itinerary)
+            for node, itinerary in sorted(self.itineraries.items())
+            if node != self.node_id and node not in self.aside
+        ]
+        for node in sorted(self.aside):
+            seen, machine = self.progress.get(node), self.site.machines[node]
+            if machine.kind in MOBILE_KINDS:
+                here = machine.home if seen is None else Segment(seen.track, seen.index)
+                found += [here, turned_in(self.site, here)]
+        return [position for position in found if position is not None]
+
+    def lift_floors(self, now_us: int, at_us: int) -> dict[int, int]:
+        """Where each lift (by its track) stands at ``at_us``, by its own word and the rides planned until then."""
+        standing = {}
+        uses = []
+        for track in lift_tracks(self.site):
+            seen = self.progress.get(self.site.stewards[track])
+            standing[track] = seen.index if seen is not None else 1
+            uses += self.reservations.uses(track, excluding=0)
+        return standing_after(uses, standing, now_us, at_us)
+
+    def free_places(self) -> list[Station]:
+        """Places at which no car is known to stand, in the site's order."""
+        taken = {record.station for record in self.cars.values()}
+        return [place for place in self.site.places if place.number not in taken]
+
+    def site_tokens(self) -> Iterable[TokenKey]:
+        """All tokens of segments and stations."""
+        return tokens_of(self.site)
+
+    def _believed(self) -> list[int]:
+        """Blocked segments as well."""
+        return [*super()._believed(), *(1 << 31 | segment.number for segment in sorted(self.obstacles.blocked))]
+
+
+@dataclass
+class WayFleet(CarFleet):
+    """What a machine works with that moves along ways, or deals in them."""
+
+    mirror_type: ClassVar[type[Mirror]] = WayMirror
+
+    site: WaySite
+    mirror: WayMirror
+
+
+def way_mirror(mirror: Mirror) -> WayMirror:
+    """The same mirror, for machines of a site with ways. Raises ``TypeError`` for any other."""
+    if not isinstance(mirror, WayMirror):
+        raise TypeError(f"node {mirror.node_id}: its mirror knows no ways")
+    return mirror
+
+
+def way_fleet(fleet: Fleet) -> WayFleet:
+    """The same fleet, for machines of a site with ways. Raises ``TypeError`` for any other."""
+    if not isinstance(fleet, WayFleet):
+        raise TypeError(f"node {fleet.node_id}: its fleet knows no ways")
+    return fleet
+
+
+def slot_of(key: TokenKey) -> Segment:
+    """The slot of a segment's token."""
+    return Segment(key.number >> 8, key.number & 0xFF)

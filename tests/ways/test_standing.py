@@ -1,0 +1,67 @@
+"""Who says that it goes and stands is an obstacle until it moves; who waits and says so is given longer."""
+
+from dataclasses import replace
+
+from onboard.core.codes import Grade, LegAction, Reason, Side
+from onboard.core.messages import Itinerary, Leg, Progress, Stamp, Waiting
+from onboard.core.mirror import Mirror
+from onboard.ways.standing import STANDS_AFTER_US, WAITS_AFTER_US, Standing
+from tests.sites import one_floor
+
+ROBOT, ME = 11, 1
+RUN_MS = 10_000
+
+
+def goes(version: int = 1) -> Itinerary:
+    """From position 3 to 7, in ten seconds."""
+    run = Leg(LegAction.TRAVEL, 1, 3, 7, Side.NEAR, RUN_MS)
+    return Itinerary(ROBOT, version, Grade.FIRM, Stamp(0, ME, 1), (run,))
+
+
+def seen(place: int = 3) -> Standing:
+    """A robot at a place that has told where it goes."""
+    site = one_floor()
+    mirror = Mirror(site, ME)
+    mirror.on_itinerary(goes(), 0)
+    standing = Standing(site, mirror.itineraries)
+    standing.hear(Progress(ROBOT, 1, 0, 1, place, 0, 0), 0)
+    return standing
+
+
+def test_a_machine_that_stands_where_its_plan_does_not_leave_it_is_found() -> None:
+    standing = seen()
+    due_us = RUN_MS * 1000 + STANDS_AFTER_US
+    assert not standing.stands(ROBOT, due_us - 1)
+    assert standing.stands(ROBOT, due_us)
+    standing.hear(Waiting(ROBOT, 1, 4, 12, Reason.TOKEN_HELD_BY_OTHER), due_us)
+    assert standing.stands(ROBOT, due_us + 1), "no word is a motion"
+    standing.hear(Progress(ROBOT, 1, 0, 1, 4, 0, 500), due_us + 2)
+    assert not standing.stands(ROBOT, due_us + 2)
+
+
+def test_a_machine_that_waits_and_says_so_is_given_longer() -> None:
+    standing = seen()
+    for now_us in range(0, WAITS_AFTER_US + STANDS_AFTER_US, 10_000_000):
+        standing.hear(Waiting(ROBOT, 1, 4, 12, Reason.TOKEN_HELD_BY_OTHER), now_us)
+        assert not standing.stands(ROBOT, now_us)
+    assert standing.stands(ROBOT, WAITS_AFTER_US + STANDS_AFTER_US)
+
+
+def test_a_machine_that_has_stood_idle_for_long_has_all_the_time_for_a_new_plan() -> None:
+    site = one_floor()
+    mirror = Mirror(site, ME)
+    standing = Standing(site, mirror.itineraries)
+    now_us = 2 * WAITS_AFTER_US
+    standing.hear(Progress(ROBOT, 0, 0, 1, 3, 0, 0), 0)
+    assert not standing.stands(ROBOT, now_us)
+    plan = goes()
+    begins = now_us // 1000
+    plan = replace(plan, stamp=Stamp(begins, ME, 1), legs=(plan.legs[0]._replace(end_ms=begins + RUN_MS),))
+    mirror.on_itinerary(plan, now_us)
+    standing.hear(plan, now_us)
+    assert not standing.stands(ROBOT, now_us + 1_000_000)
+    assert standing.stands(ROBOT, now_us + RUN_MS * 1000 + STANDS_AFTER_US)
+
+
+def test_a_machine_at_the_end_of_its_plan_may_stand_there_for_ever() -> None:
+    assert not seen(place=7).stands(ROBOT, 10 * WAITS_AFTER_US)
