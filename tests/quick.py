@@ -21,14 +21,13 @@ QUICK = (
     *("tests/project/test_layers.py", "tests/project/test_make.py", "tests/project/test_rows.py"),
     *("tests/project/test_sources.py", "tests/system/test_mistakes.py", "tests/system/test_p54_picture.py"),
     *("tests/web/test_contrast.py", "tests/wire"),
-    *(
-        f"tests/core/test_{noun}.py"
-        for noun in (
-            *("admission", "after_a_jump", "all_or_none_pace", "authority", "backoff", "bus_time_far", "car_words"),
-            *("fig7", "holding", "kinematics", "lift_uses", "memory", "occupancy", "passing_order", "petitions"),
-            *("reach", "refuges", "reservations", "serial", "standing", "stops"),
-        )
-    ),
+    *("tests/core/test_admission.py", "tests/core/test_after_a_jump.py", "tests/core/test_authority.py"),
+    *("tests/core/test_backoff.py", "tests/core/test_bus_time_far.py", "tests/core/test_holding.py"),
+    *("tests/core/test_memory.py", "tests/core/test_petitions.py", "tests/core/test_serial.py"),
+    *("tests/ways/test_all_or_none_pace.py", "tests/ways/test_car_words.py", "tests/ways/test_fig7.py"),
+    *("tests/ways/test_kinematics.py", "tests/ways/test_lift_uses.py", "tests/ways/test_occupancy.py"),
+    *("tests/ways/test_passing_order.py", "tests/ways/test_reach.py", "tests/ways/test_refuges.py"),
+    *("tests/ways/test_reservations.py", "tests/ways/test_standing.py", "tests/ways/test_stops.py"),
 )
 #: Tests there that take longer than half a second, or may on another machine: `make test` runs them.
 SLOW = (

@@ -48,7 +48,7 @@ class Stop(Repeated):
     every_us = 10 * _SECOND_US
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``Repeated``."""
+        """One emergency stop under the attacker's number."""
         yield EmergencyStop(self.node.node_id, Reason.OPERATOR)
 
 
@@ -56,7 +56,7 @@ class OtherSite(Repeated):
     """Several machines of another site, all of them made up."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``Repeated``."""
+        """One heartbeat for each made-up machine, all with a digest that is not this site's."""
         digest = self.node.site.digest % 0xFFFF + 1
         for ghost in range(self.node.node_id, self.node.node_id + _GHOSTS):
             yield Heartbeat(ghost, CONTRACT_VERSION, digest, 0, 1, KindCode.ROBOT, MachineState.IDLE)
@@ -70,12 +70,12 @@ class NewerBoot(Repeated):
         self._boots: dict[int, int] = {}
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """Note each machine's boot counter."""
         if isinstance(message, Heartbeat):
             self._boots[message.sender] = message.boot
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``Repeated``."""
+        """One request a machine that names a boot counter newer than its own."""
         for node in self.node.site.machines:
             yield SyncRequest(self.node.node_id, node, self._boots.get(node, 1) % 255 + 1)
 
@@ -84,7 +84,7 @@ class BlockAll(Repeated):
     """Says of every slot that nobody can pass it."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``Repeated``."""
+        """``Blocked`` for every segment of every track; nothing on sites without tracks."""
         tracks = getattr(self.node.site, "tracks", {})
         for number, track in tracks.items():
             for index in range(1, min(track.length, 255) + 1):
@@ -95,7 +95,7 @@ class HoldAll(Repeated):
     """Holds every machine, as a person would."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``Repeated``."""
+        """One order a machine to hold, all under one number."""
         number = self.node.chance.randint(1, 255)
         for node in self.node.site.machines:
             yield ManualOrder(self.node.node_id, node, number, ManualMode.HELD)
@@ -111,12 +111,12 @@ class WrongTime(Repeated):
         self._ahead_us: int | None = None
 
     def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
+        """Follow the true bus time, by how many us it is ahead of loop time."""
         if isinstance(message, BusTime):
             self._ahead_us = message.bus_time_us - now_us
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``Repeated``."""
+        """Bus time an hour ahead of the true one, once that was heard."""
         if self._ahead_us is not None:
             yield BusTime(self.node.node_id, (now_us + self._ahead_us + 3_600 * _SECOND_US) % BUS_TIME_MODULUS)
 
@@ -131,7 +131,7 @@ class Orders(Repeated):
         self.number = node.chance.randint(1, 10_000)
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``Repeated``."""
+        """An order for a box or a robot where the site has such, and every known car at every compartment."""
         self.number += 1
         yield from self.orders()
 

@@ -103,7 +103,7 @@ def disk_full(simulation: BusRun[Any], injection: Injection) -> None:
 
 
 def pause(simulation: BusRun[Any], injection: Injection) -> None:
-    """The process stands still."""
+    """Stop the process until the fault ends, as SIGSTOP does: it hears and does nothing meanwhile."""
     holon = _holon(simulation, injection)
     if holon is not None:
         holon.pause(injection.until_us)

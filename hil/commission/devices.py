@@ -32,7 +32,7 @@ from onboard.core.messages import (
     ShuttleState,
 )
 from onboard.core.serial import successor
-from onboard.systems.car_park.site import car_park
+from onboard.work.timing import DeviceTiming
 
 #: Small and slow: a hand's breadth, at a pace that one can step away from. Ours.
 STEP_MM, SPEED_MM_S = 200, 100
@@ -175,7 +175,9 @@ async def _order_door(setting: Setting, door: DoorName, action: DoorAction, want
         position = state.input_door if door is DoorName.INPUT else state.output_door
         return setting.is_own(state) and position is wanted
 
-    within_s = 3 * car_park(setting.site).timing.door_us / 1e6 + 1
+    timing = setting.site.timing
+    assert isinstance(timing, DeviceTiming), "a site with doors says how long they take"
+    within_s = 3 * timing.door_us / 1e6 + 1
     return await setting.devices.first(DoorState, within_s, is_there, since) is not None
 
 

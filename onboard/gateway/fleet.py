@@ -51,11 +51,11 @@ class FleetTopics:
         self._hour: int | None = None
 
     def set_epoch(self, epoch_us: int) -> None:
-        """As of the publisher."""
+        """Wall time of loop time 0, in us since 1970: what timestamps are counted from."""
         self._epoch_us = epoch_us
 
     def feed(self, message: Message, now_us: int) -> Iterator[Told]:
-        """Take up one message."""
+        """Take up one message of the fleet bus; what it changes is yielded as publications."""
         yield from self.take(message, self.picture.history.feed(message, now_us), now_us)
 
     def take(self, message: Message, fact: Fact | None, now_us: int) -> Iterator[Told]:
@@ -86,7 +86,7 @@ class FleetTopics:
         return {"at": self._at(now_us), **self.picture.indicators.figures(now_us).to_json()}
 
     def task(self, reference: Reference, now_us: int) -> Json:
-        """How a task stands."""
+        """The JSON of one task: what it is, its phase, who has it."""
         view = self.picture.view
         told: Json = {"at": self._at(now_us), "task": reference_text(reference)}
         record = view.tasks.get(reference)

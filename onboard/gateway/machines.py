@@ -59,7 +59,7 @@ class TaskInHand:
 
 @dataclass(slots=True)
 class Body:
-    """One mobile machine."""
+    """What is known of one mobile machine: when it was heard (loop time, us), its state, task and load."""
 
     machine: Machine
     heard_us: int | None = None

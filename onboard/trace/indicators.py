@@ -86,7 +86,7 @@ class FleetIndicators:
     robots_empty_share: float
 
     def to_json(self) -> dict[str, object]:
-        """Plain values for ``json.dump``."""
+        """The fields as ``json.dump`` takes them; units stand in the keys."""
         return asdict(self)
 
     def lines(self) -> list[str]:

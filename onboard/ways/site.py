@@ -7,7 +7,7 @@ one side of a segment.
 
 from dataclasses import dataclass, field, fields
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, singledispatch
 
 from onboard.core.site import Segment, Site, Station
 
@@ -100,8 +100,12 @@ class WaySite(Site):
         return (segment.index - 1) * self.tracks[segment.track].pitch_mm
 
 
+@singledispatch
 def way_site(site: Site) -> WaySite:
     """The same site with its tracks; one whose machines do not move along any has none."""
-    if isinstance(site, WaySite):
-        return site
     return WaySite(**{one.name: getattr(site, one.name) for one in fields(Site)})
+
+
+@way_site.register
+def _(site: WaySite) -> WaySite:
+    return site

@@ -53,7 +53,7 @@ class CellView:
     _offers: dict[tuple[int, Reference], float] = field(default_factory=dict)
 
     def feed(self, message: Message, time_us: int = 0) -> None:
-        """Take up one message."""
+        """Take up one message of the fleet bus."""
         match self._calls.feed(message, time_us):
             case CallOpened(call):
                 self.goal_messages += 1

@@ -14,12 +14,12 @@ from onboard.ways.mirror import WayFleet, way_fleet
 
 @dataclass(frozen=True)
 class CompartmentFactory(BehaviourFactory):
-    """Makes compartments."""
+    """Makes compartments: a bay with doors, a desk, and the custody of cars."""
 
     fleet_type = WayFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> BayGeneration:
-        """The compartment's task-generation function."""
+        """What a task at the bay costs: a compartment bids to receive cars."""
         return BayGeneration(car_park(site), machine)
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Compartment:

@@ -14,12 +14,12 @@ from onboard.ways.site import way_site
 
 @dataclass(frozen=True)
 class LiftFactory(BehaviourFactory):
-    """Makes lifts."""
+    """Makes lifts: machines that bid for rides."""
 
     fleet_type = WayFleet
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> LiftGeneration:
-        """The lift's task-generation function."""
+        """What a ride costs, around those that are planned."""
         return LiftGeneration(way_site(site), machine, way_mirror(mirror))
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> Lift:

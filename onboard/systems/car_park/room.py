@@ -17,7 +17,7 @@ from onboard.ways.site import TrackKind, WaySite
 
 
 def robots_of(site: WaySite) -> int:
-    """Number of carriers."""
+    """How many carriers the site has."""
     return sum(1 for machine in site.machines.values() if machine.kind is KindCode.ROBOT)
 
 

@@ -114,7 +114,7 @@ class TaskOnce(Rule):
         self._aboard: dict[int, int] = {}
 
     def handlers(self) -> Handlers:
-        """Calls and robots' words."""
+        """Reads calls, and robots' words of their tasks."""
         return {CallForProposals: self._on_call, StepState: self._on_state}
 
     def _on_call(self, event: Event[CallForProposals]) -> None:
@@ -170,7 +170,7 @@ class RoundsGoDown(Rule):
         self._round: _RoundSeen | None = None
 
     def handlers(self) -> Handlers:
-        """Rounds, bids and awards."""
+        """Reads rounds, bids and awards of each step."""
         return {StepRound: self._on_round, Bid: self._on_bid, StepTurn: self._on_turn, Award: self._on_award}
 
     def _on_round(self, event: Event[StepRound]) -> None:
@@ -237,7 +237,7 @@ class PathsApart(_OnFloor):
         self._paths: dict[int, _Told] = {}
 
     def handlers(self) -> Handlers:
-        """Paths."""
+        """Reads the paths that robots publish."""
         return {PathHead: self._on_head, PathMoves: self._on_moves}
 
     def _on_head(self, event: Event[PathHead]) -> None:

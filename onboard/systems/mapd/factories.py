@@ -15,7 +15,7 @@ from onboard.work.plain import NoEstimator
 
 @dataclass(frozen=True)
 class UnitRobotFactory(BehaviourFactory):
-    """Makes robots."""
+    """Makes robots that move in unit steps."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> UnitGeneration:
         """The robot's task-generation function."""
@@ -32,7 +32,7 @@ class UnitRobotFactory(BehaviourFactory):
 
 @dataclass(frozen=True)
 class OrderDeskFactory(BehaviourFactory):
-    """Makes the desk."""
+    """Makes the site's one desk, which calls for tasks."""
 
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
         """A desk bids for nothing."""
@@ -41,5 +41,5 @@ class OrderDeskFactory(BehaviourFactory):
         return NoEstimator()
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> OrderDesk:
-        """The desk's steps."""
+        """A desk that begins with the tasks of its journal."""
         return OrderDesk(fleet)
