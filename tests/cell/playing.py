@@ -47,7 +47,7 @@ class Scene:
         self.view = CellView(site)
 
         def before(run: BusRun) -> None:
-            run.observers.append(self.view.feed)
+            run.observers.append(lambda message, _: self.view.feed(message))
             if prepare is not None:
                 prepare(run)
 

@@ -109,7 +109,7 @@ def test_p54_the_picture_fits_the_terminal_with_the_newest_event_the_figures_and
 ) -> None:
     site, (width, height) = find_site(name), size
     view = SiteView(site)
-    view.states = dict.fromkeys(site.machines, MachineState.STARTING)
+    view.history.lives.states = dict.fromkeys(site.machines, MachineState.STARTING)
     for number in range(40):
         view.say(number * 1_000_000, f"event {number}")
     console = Console(width=width, height=height, file=io.StringIO())

@@ -77,7 +77,7 @@ def test_a_machine_that_says_nothing_any_more_is_silent() -> None:
             later_us += beat_us
             for node in site.machines:
                 if node != 11:
-                    state = picture.view.states[node]
+                    state = picture.view.history.lives.states[node]
                     picture.feed(Heartbeat(node, 1, site.digest, 0, 1, site.machines[node].kind, state), later_us)
         states = {node: one["state"] for node, one in picture.snapshot()["machines"].items()}
     assert states[11] == "silent" and {state for node, state in states.items() if node != 11} == {"idle"}

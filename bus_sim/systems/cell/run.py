@@ -28,7 +28,7 @@ def run_cell(site: Site, options: "SystemOptions") -> int:
     view = CellView(site)
 
     def prepare(run: BusRun) -> None:
-        run.observers.append(view.feed)
+        run.observers.append(lambda message, _: view.feed(message))
 
     def picture(_: BusRun, plant: SystemPlant) -> str:
         return plan(cast("CellPlant", plant), view)

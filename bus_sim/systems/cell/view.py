@@ -52,7 +52,7 @@ class CellView:
     _highs: dict[tuple[int, Reference], int] = field(default_factory=dict)
     _offers: dict[tuple[int, Reference], float] = field(default_factory=dict)
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def feed(self, message: Message, time_us: int = 0) -> None:
         """Take up one message."""
         match self._calls.feed(message, time_us):
             case CallOpened(call):
