@@ -34,7 +34,7 @@ def main() -> int:
     rows = read_rows()
     unknown = [name for name in options.rows if name not in rows]
     if unknown:
-        parser.error(f"{unknown[0]}: no such row in docs/systems; rows are P01 to C24")
+        parser.error(f"{unknown[0]}: no such row in docs/systems; rows are P01 to A06")
     wanted = [rows[name] for name in (options.rows or all_names()) if name in rows and rows[name].mutation is not None]
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copies: Queue[Path] = Queue()

@@ -3,6 +3,7 @@
 Nothing here touches a class or a module, so a bug ends with its run.
 """
 
+import dataclasses
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -10,7 +11,7 @@ from bus_sim.run import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.behaviour import Behaviour
 from onboard.core.codes import KindCode, Reason
-from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.effects import Actuate, Effect, Send, Tell
 from onboard.core.messages import Message
 from onboard.core.site import Segment
 
@@ -50,8 +51,8 @@ def saying(simulation: Simulation, kind: KindCode | None, said: Said) -> None:
     def changed(effects: list[Effect]) -> list[Effect]:
         result: list[Effect] = []
         for effect in effects:
-            if isinstance(effect, Send | Actuate):
-                result += [type(effect)(message) for message in said(effect.message)]
+            if isinstance(effect, Send | Actuate | Tell):
+                result += [dataclasses.replace(effect, message=message) for message in said(effect.message)]
             else:
                 result.append(effect)
         return result

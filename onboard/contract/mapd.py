@@ -25,25 +25,10 @@ class TransportResult(IntEnum):
 
 
 @message(frozen=True, slots=True)
-class TransportCall(Message):
-    """A call for proposals, which stands until a robot tells that it has the task aboard.
-
-    The task is the sender's.
-    """
-
-    #: Serial number of the task at the desk, modulo 65535. 0 to 65534.
-    task: int
-    #: Cell where it is. 0 to 63999.
-    pickup: int
-    #: Cell to which it is to be brought. 0 to 63999.
-    delivery: int
-
-
-@message(frozen=True, slots=True)
 class StepRound(Message):
     """Step begins: sent when all robots have told that they have come to it.
 
-    Asks for bids for all calls that stand; bids end when the first StepAward of the step is heard.
+    Asks for bids for all calls that stand; bids end when the first StepTurn of the step is heard.
     """
 
     #: The step. 0 to 4194303.
@@ -57,10 +42,11 @@ class StepRound(Message):
 
 
 @message(frozen=True, slots=True)
-class StepAward(Message):
-    """Closes the round of a step: one for each change, or one with changes 0.
+class StepTurn(Message):
+    """Closes the round of a step.
 
-    The robots named plan in this order, each after it has heard the paths of those before.
+    One for each robot for which the round has changed anything, or one with changes 0. These plan in this order,
+    each after it has heard the paths of those before.
     """
 
     #: The step. 0 to 4194303.
@@ -71,26 +57,19 @@ class StepAward(Message):
     changes: int
     #: Node-ID of the robot, 0 where there are no changes. 0 to 250.
     robot: int
-    #: The task that it has now, 65535 for none. 0 to 65535.
-    task: int
+    #: Whether it has won a task: the Award that says which has the lowest 7 bits of the step as its task_version. If
+    #: not, it has none now. 0 to 1.
+    won: int
 
 
 @message(frozen=True, slots=True)
-class TransportBid(Message):
-    """A bid, sent only where it is better than every bid for that task heard in the round (lower cost.
+class TurnRequest(Message):
+    """A robot without a task asks for a turn to plan: others need the place where it rests."""
 
-    Then lower node-ID); better bids are sent sooner. It takes the sender's former bid of the round back.
-    """
-
-    #: Lowest 16 bits of the step. 0 to 65535.
-    step_low: int
+    #: The step. 0 to 4194303.
+    step: int
     #: That of the StepRound. 0 to 255.
     attempt: int
-    #: The task, 65535 for none: the sender asks for a turn to plan, as others need its place. 0 to 65535.
-    task: int
-    #: Hundredths of a step: until it is free, to the pick-up, and half of those from there to the delivery. 0 to
-    #: 16777215.
-    cost: int
 
 
 @message(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from typing import ParamSpec
 
 from onboard.controller.rest import Rest
 from onboard.core.codes import MachineState, Reason
-from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, Send
+from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, Send, Tell
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.ports.bus import Bus
@@ -211,7 +211,7 @@ class Controller:
             case Send(message):
                 for frame in self._codecs[0].encode(message):
                     self.ports.fleet_bus.send(frame)
-            case Actuate(message):
+            case Actuate(message) | Tell(message):
                 for frame in self._codecs[1].encode(message):
                     self.ports.device_bus.send(frame)
             case Record():

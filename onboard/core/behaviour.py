@@ -14,6 +14,7 @@ from onboard.core.effects import Effect, Record
 from onboard.core.journal_records import Entry
 from onboard.core.messages import CallForProposals, CarAt, Message, Reference
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import MotionAuthority
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent, Proposal
 from onboard.core.negotiation.winners import Winners
 from onboard.core.petitions import Petitions
@@ -34,6 +35,8 @@ class Fleet:
     #: Input that came to nothing, by reason: the holon's own count.
     drops: Counter[Reason] = field(default_factory=Counter)
     petitions: Petitions = field(init=False)
+    #: What permits motion.
+    motion: MotionAuthority = field(init=False)
     #: Who has this machine's tasks in hand, and whether it is at work.
     winners: Winners = field(init=False)
     #: How often this machine was admitted again after it had been an obstacle: its plans of before are old then.
@@ -50,6 +53,7 @@ class Fleet:
 
     def __post_init__(self) -> None:
         self.petitions = Petitions(self.site.timing.token_repeat_us)
+        self.motion = MotionAuthority(self.tokens)
         self.winners = Winners(self.node_id, self.negotiation, self.mirror.obstacles.machines)
         self.mirror.on_forgotten.append(self._retire)
 

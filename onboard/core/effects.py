@@ -1,6 +1,6 @@
 """What the core asks of its shell. Effects are carried out in order; a ``Record`` must be durable before the next."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.core.codes import Reason
 from onboard.core.journal_records import Entry, JournalRecord
@@ -16,7 +16,16 @@ class Send:
 
 @dataclass(frozen=True, slots=True)
 class Actuate:
-    """Say this on the machine's device bus."""
+    """Order a device of this machine to move. Made by the answer of ``authorised`` only (core/motion_authority.py)."""
+
+    message: Message
+    #: That answer: the holon looks whose it is, and of when.
+    permit: object = field(compare=False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """Say this on the machine's device bus: something by which nothing moves, such as an answer to a person."""
 
     message: Message
 
@@ -58,4 +67,4 @@ class Halt:
     reason: Reason = Reason.INVARIANT_BROKEN
 
 
-Effect = Send | Actuate | Record | Renew | Report | Halt
+Effect = Send | Actuate | Tell | Record | Renew | Report | Halt

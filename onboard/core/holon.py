@@ -115,6 +115,7 @@ class Holon:
         self.regeneration.replay(entries)
         self.regeneration.refuses = lambda: self.holding.why.reason if self.holding.is_apart else Reason.NONE
         self.part = TakingPart(self.presence, self.holding, self.regeneration, self.witness, self.time)
+        self.fleet.motion.why_still = self.part.why_still
         self.rights.is_frozen = lambda: self.regeneration.is_frozen
         if self.holding.why.reason in RIGHTS_LOST:
             self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
@@ -425,6 +426,9 @@ class Holon:
         else:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
+        fault = self.fleet.motion.fault(effects, self.site.moved_by)
+        if fault is not None:
+            return self._halt(fault, Reason.NOT_AUTHORISED)
         self.holds.own.note(effects)
         is_mute = self.fleet.has_no_rights and not self.regeneration.is_frozen
         return without_rights(effects) if is_mute else effects

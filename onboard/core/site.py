@@ -5,6 +5,7 @@ Read from a TOML file by ``onboard.config``. Words: a *track* is a line of *segm
 a car can stand: a place or a compartment, on one side of a segment.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -120,6 +121,14 @@ class Timing:
 _NO_AXIS = Axis(1, 1)
 
 
+class Needs(Enum):
+    """What an order by which something moves needs beside a machine that stands in nobody's way."""
+
+    RIGHT = "each needs a right: what it moves in is shared with others"
+    PLACE = "some need a right, by where they move: there is open ground, or a part that nobody else comes to"
+    ALONE = "none: it moves within the machine only"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Site:
     """Everything a machine knows beforehand, of any system. Built and checked by ``onboard.config``; frozen thereafter.
@@ -139,6 +148,8 @@ class Site:
     #: Names of the fields that say what comes to the site in a run of the simulator. No machine knows them, so they are
     #: not in the digest.
     demand: ClassVar[frozenset[str]] = frozenset()
+    #: The messages of the device bus by which something moves: no other does, and these only as ``authorised`` lets.
+    moved_by: ClassVar[Mapping[str, Needs]] = {}
 
     name: str
     digest: int

@@ -29,6 +29,15 @@ class TakingPart:
         """Whether this machine is an obstacle: it neither moves nor bids."""
         return self.presence.held_until_us is not None or self.holding.is_held or self.regeneration.is_frozen
 
+    def why_still(self) -> Reason:
+        """Why this machine may not move anything; NONE where it may."""
+        if self.holding.is_held:
+            return self.holding.why.reason
+        if self.regeneration.is_frozen:
+            return Reason.REGENERATION
+        # It was started, or slept, or its bus time was set anew: it listens before it moves.
+        return Reason.NONE if self.begins else Reason.POSITION_UNKNOWN
+
     @property
     def deals(self) -> bool:
         """Whether this machine asks for rights and gives them away."""

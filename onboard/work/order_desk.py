@@ -12,7 +12,7 @@ from typing import ClassVar, Generic, TypeVar
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
@@ -156,7 +156,7 @@ class OrderDesk(ABC, Generic[AnOrder]):
             if order.answer_at_us is not None and order.answer_at_us <= now_us:
                 order.answer_at_us = None if order.is_over else now_us + ANSWER_US
                 answer = self.answer(order)
-                effects += [Actuate(answer)] if answer is not None else []
+                effects += [Tell(answer)] if answer is not None else []
         return effects
 
     def next_wake(self) -> int | None:

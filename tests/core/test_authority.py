@@ -16,7 +16,7 @@ from onboard.core.authority import (
 from onboard.core.codes import Reason, TokenKind
 from onboard.core.effects import Effect, Record, Report
 from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
-from onboard.core.motion_authority import MotionState, authorised
+from onboard.core.motion_authority import MotionAuthority, authorised
 from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
 from tests.core.token_words import hear, said
@@ -75,8 +75,7 @@ def test_a_refusal_tells_the_requester_why() -> None:
     (refusal,) = said(steward.on_request(request, Reason.TOKEN_NOT_GRANTABLE_YET, 0))
     assert isinstance(refusal, TokenRefusal)
     alice.on_refusal(refusal, 0)
-    state = MotionState(alice, position_known=True, stopped=False)
-    assert authorised(state, SEGMENT) == (False, Reason.TOKEN_NOT_GRANTABLE_YET)
+    assert authorised(MotionAuthority(alice), [KEY]).reason is Reason.TOKEN_NOT_GRANTABLE_YET
 
 
 def test_a_stale_duplicate_of_a_grant_never_doubles_a_token() -> None:
@@ -110,14 +109,6 @@ def test_the_journal_restores_holdings_and_open_grants() -> None:
     awake = TokenBook(SITE, ALICE)
     awake.replay([effect.entry for effect in taken if isinstance(effect, Record)])
     assert awake.holds(KEY)
-
-
-@pytest.mark.parametrize(
-    ("known", "stopped", "reason"),
-    [(False, False, Reason.POSITION_UNKNOWN), (True, True, Reason.OPERATOR), (True, False, Reason.NOT_AUTHORISED)],
-)
-def test_nothing_but_authorised_permits_motion(known: bool, stopped: bool, reason: Reason) -> None:
-    assert authorised(MotionState(TokenBook(SITE, ALICE), known, stopped), SEGMENT) == (False, reason)
 
 
 @given(st.integers(0, 2**32 - 1))

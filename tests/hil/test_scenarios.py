@@ -101,7 +101,7 @@ def test_a_device_that_moves_without_authority_is_found_by_the_judge(tmp_path: P
         if isinstance(effect, Actuate) and isinstance(effect.message, DriveOrder):
             order = effect.message
             # Straight to the far end of the alley, whatever was granted.
-            return Actuate(DriveOrder(order.sender, order.sequence, 12_000, order.speed_limit_mm_s))
+            return replace(effect, message=DriveOrder(order.sender, order.sequence, 12_000, order.speed_limit_mm_s))
         return effect
 
     outcome = play_with("moves under authority", tmp_path, reckless)

@@ -20,7 +20,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.holon import Holon
 from onboard.core.messages import (
     BayState,
@@ -202,7 +202,7 @@ def test_a_car_that_its_driver_took_out_while_the_bay_was_off_is_called_for_by_n
 
 
 def tickets(effects: list[Effect]) -> list[Reference]:
-    orders = [effect.message for effect in effects if isinstance(effect, Actuate)]
+    orders = [effect.message for effect in effects if isinstance(effect, Tell)]
     return [one.car for one in orders if isinstance(one, DeskOrder) and one.text is DeskText.TAKE_TICKET]
 
 

@@ -6,16 +6,15 @@ from bus_sim.importers.command import import_files
 from bus_sim.importers.draft import site_text
 from bus_sim.importers.mapf import Wanted
 from onboard.config.site import parse_site
-from onboard.core.messages import Message
+from onboard.core.messages import Bid, Message
+from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.calls import award_of, call_of
 from onboard.systems.mapd.messages import (
     NO_TASK,
     PathHead,
     PathMoves,
-    StepAward,
     StepRound,
     StepState,
-    TransportBid,
-    TransportCall,
 )
 from tests.faults.systems import PLANTS, judged, withstands
 from tests.mapd.sites import drawn, made
@@ -48,7 +47,7 @@ def _path(robot: int, cell: int, *codes: int, step: int = 0) -> list[Message]:
     return [PathHead(robot, step, cell, len(codes), 1, False), *moves]
 
 
-_CALL = TransportCall(1, 3, 12, 15)
+_CALL = call_of(1, Task(3, 0, 12, 15), 0)
 
 
 @pytest.mark.parametrize(
@@ -64,13 +63,13 @@ _CALL = TransportCall(1, 3, 12, 15)
         ("task-once", [_CALL, _at(11, 4, 16, 3, served=True)]),
         (
             "rounds-go-down",
-            [StepRound(1, 0, 1, 0, True), TransportBid(11, 0, 0, 3, 50), TransportBid(12, 0, 0, 3, 70)],
+            [StepRound(1, 0, 1, 0, True), Bid(11, 1, 4, 50, 0), Bid(12, 1, 4, 70, 0)],
         ),
         (
             "rounds-go-down",
-            [StepRound(1, 0, 1, 0, True), TransportBid(11, 0, 0, 3, 50), StepAward(1, 0, 0, 1, 12, 3)],
+            [StepRound(1, 0, 1, 0, True), Bid(11, 1, 4, 50, 0), award_of(1, 0, 12, 3)],
         ),
-        ("rounds-go-down", [StepRound(1, 0, 1, 0, True), TransportBid(11, 1, 0, 3, 50)]),
+        ("rounds-go-down", [StepRound(1, 0, 1, 0, True), Bid(11, 1, 4, 50, 1)]),
         ("paths-apart", [*_path(11, 0, 1, 2), *_path(12, 2)]),
         ("paths-apart", [*_path(11, 0, 1), *_path(12, 1, 1)]),
         ("paths-apart", [*_path(11, 9, 3)]),

@@ -13,7 +13,8 @@ from bus_sim.systems.mapd.steps import Day
 from bus_sim.systems.registry import SystemOptions
 from bus_sim.systems.session import play
 from onboard.cli import main as onboard
-from onboard.systems.mapd.messages import StepAward, StepState, TransportBid, TransportCall
+from onboard.core.messages import Award, Bid, CallForProposals, Reference
+from onboard.systems.mapd.messages import StepRound, StepState
 from onboard.systems.mapd.site import Mapd
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts
@@ -40,12 +41,13 @@ def test_p59_bids_and_awards_are_frames_and_better_bids_speak_sooner() -> None:
     run, plant = played(site)
     said = [message for _, message in run.messages]
     assert run.is_good
-    assert sum(isinstance(one, TransportCall) for one in said) >= len(site.tasks)
-    first = [one for one in said if isinstance(one, TransportBid) and one.step_low == 0]
+    assert sum(isinstance(one, CallForProposals) for one in said) >= len(site.tasks)
+    second = next(at for at, one in enumerate(said) if isinstance(one, StepRound) and one.step == 1)
+    first = [one for one in said[:second] if isinstance(one, Bid)]
     # One task in step 0: whoever is nearest speaks, and nobody else.
-    assert [(one.sender, one.task) for one in first] == [(min(first, key=lambda one: one.cost).sender, 0)]
-    winner = next(one for one in said if isinstance(one, StepAward))
-    assert (winner.robot, winner.task) == (first[0].sender, 0)
+    assert [(one.sender, one.call) for one in first] == [(min(first, key=lambda one: one.cost).sender, 1)]
+    award = next(one for one in said if isinstance(one, Award))
+    assert (award.winner, award.task) == (first[0].sender, Reference(site.desk, 0))
     told = {one.task: one.step for one in said if isinstance(one, StepState) and one.served}
     assert told == plant.served
 

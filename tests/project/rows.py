@@ -1,8 +1,8 @@
 """The rows of the source papers: what was checked of each, by which test, and a mutation that this test finds.
 
 Rows are numbered in the order of the papers: P01 to P60 (Pujo, Ounnar, Zanni 2006; P29 was left free), M01 to M39
-(Le Page, Barras 1995), G01 to G31 (Gnatowski 2010), C01 to C24 (Panescu, Miron 2006). Each has a table in one of
-``docs/systems/*.toml``::
+(Le Page, Barras 1995), G01 to G31 (Gnatowski 2010), C01 to C24 (Panescu, Miron 2006). A01 to A06 are of no paper: what
+moves in each system. Each has a table in one of ``docs/systems/*.toml``::
 
     [M22]
     check = "what was checked"
@@ -27,6 +27,7 @@ PAPERS = {
     "M": ("Le Page, Barras: MARTHA, container terminal", 39),
     "G": ("Gnatowski: several robots on a graph", 31),
     "C": ("Panescu, Miron: contract net, manufacturing cell", 24),
+    "A": ("Authority: what moves anything passes `authorised`, in each of the six systems", 6),
 }
 #: No such row.
 FREE = frozenset({"P29"})
@@ -85,8 +86,8 @@ def read_rows() -> dict[str, Row]:
 
 def rows_of(test: str) -> list[str]:
     """The rows that a test's name begins with."""
-    found = re.match(r"test((?:_[pmgc]\d\d)+)_\w", test)
-    return [row.upper() for row in re.findall(r"_([pmgc]\d\d)", found.group(1))] if found else []
+    found = re.match(r"test((?:_[pmgca]\d\d)+)_\w", test)
+    return [row.upper() for row in re.findall(r"_([pmgca]\d\d)", found.group(1))] if found else []
 
 
 def functions_of(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
@@ -133,5 +134,6 @@ _HEAD = """\
 # What the papers ask for
 
 Written by `make docs` from `docs/systems/*.toml`. Every row of the four papers has a test named after it, and one
-change of product code that makes this test fail: `make mutants` makes each of them in a copy and runs its test.
+change of product code that makes this test fail: `make mutants` makes each of them in a copy and runs its test. Rows A
+are of no paper: what moves anything in each system, and what lets it.
 """

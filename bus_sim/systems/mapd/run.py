@@ -1,6 +1,7 @@
 """``bus-sim run`` on a pick-up and delivery site: what came of it, in steps and in seconds."""
 
 import sys
+from collections import Counter
 from statistics import fmean
 from typing import TYPE_CHECKING, cast
 
@@ -9,8 +10,9 @@ from bus_sim.systems.mapd.plant import UnitPlant, make_plant
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.show import picture
 from bus_sim.systems.session import Played, SystemPlant, conclude, play
+from onboard.core.messages import CallForProposals
 from onboard.core.site import Site
-from onboard.systems.mapd.messages import PathHead, StepAward, StepRound, TransportBid, TransportCall
+from onboard.systems.mapd.messages import StepRound
 from onboard.systems.mapd.site import Mapd
 
 if TYPE_CHECKING:
@@ -44,9 +46,7 @@ def figures(played: Played) -> dict[str, object]:
     served = [one for one in plant.goods.values() if one.served_step is not None and one.served_us is not None]
     steps = [one.served_step - one.task.release for one in served if one.served_step is not None]
     seconds = [(one.served_us - one.ordered_us) / 1e6 for one in served if one.served_us is not None]
-    counts = {
-        kind: sum(isinstance(one, kind) for one in said) for kind in (TransportCall, TransportBid, StepAward, PathHead)
-    }
+    counts = Counter(type(one).__name__ for one in said)
     published = token_passing(site.name, len(site.tasks))
     return {
         "robots": len(site.homes),
@@ -58,8 +58,8 @@ def figures(played: Played) -> dict[str, object]:
         **({} if published is None else {"token_passing_published": published}),
         "makespan_steps": max((one.served_step or 0 for one in served), default=0),
         "mean_service_s": fmean(seconds) if seconds else 0.0,
-        "calls": counts[TransportCall],
-        "bids": counts[TransportBid],
-        "awards": counts[StepAward],
-        "paths": counts[PathHead],
+        "calls": len({one.call for one in said if isinstance(one, CallForProposals)}),
+        "bids": counts["Bid"],
+        "awards": counts["Award"],
+        "paths": counts["PathHead"],
     }

@@ -6,34 +6,10 @@ Written by ``make docs`` from ``dbc/mapd.dbc``: change that file, never this one
 from struct import Struct
 
 from onboard.contract.base import FrameCode, OutOfRangeError
-from onboard.contract.mapd import PathHead, PathMoves, StepAward, StepRound, StepState, TransportBid, TransportCall
+from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn, TurnRequest
 
-_HHHXX = Struct("<HHHxx")
+_IXXXX = Struct("<Ixxxx")
 _Q = Struct("<Q")
-
-
-def pack_transport_call(message: TransportCall) -> bytes:
-    task = message.task
-    if not 0 <= task <= 65534:
-        raise OutOfRangeError("TransportCall.task", task, 0, 65534)
-    pickup = message.pickup
-    if not 0 <= pickup <= 63999:
-        raise OutOfRangeError("TransportCall.pickup", pickup, 0, 63999)
-    delivery = message.delivery
-    if not 0 <= delivery <= 63999:
-        raise OutOfRangeError("TransportCall.delivery", delivery, 0, 63999)
-    return _HHHXX.pack(task, pickup, delivery)
-
-
-def unpack_transport_call(sender: int, data: bytes) -> TransportCall | None:
-    task, pickup, delivery = _HHHXX.unpack_from(data)
-    if task > 65534:
-        return None
-    if pickup > 63999:
-        return None
-    if delivery > 63999:
-        return None
-    return TransportCall(sender, task, pickup, delivery)
 
 
 def pack_step_round(message: StepRound) -> bytes:
@@ -57,26 +33,26 @@ def unpack_step_round(sender: int, data: bytes) -> StepRound | None:
     return StepRound(sender, step, open_tasks, attempt, word_0 & 0x400000000000 != 0)
 
 
-def pack_step_award(message: StepAward) -> bytes:
+def pack_step_turn(message: StepTurn) -> bytes:
     step = message.step
     if not 0 <= step <= 4194303:
-        raise OutOfRangeError("StepAward.step", step, 0, 4194303)
+        raise OutOfRangeError("StepTurn.step", step, 0, 4194303)
     index = message.index
     if not 0 <= index <= 255:
-        raise OutOfRangeError("StepAward.index", index, 0, 255)
+        raise OutOfRangeError("StepTurn.index", index, 0, 255)
     changes = message.changes
     if not 0 <= changes <= 255:
-        raise OutOfRangeError("StepAward.changes", changes, 0, 255)
+        raise OutOfRangeError("StepTurn.changes", changes, 0, 255)
     robot = message.robot
     if not 0 <= robot <= 250:
-        raise OutOfRangeError("StepAward.robot", robot, 0, 250)
-    task = message.task
-    if not 0 <= task <= 65535:
-        raise OutOfRangeError("StepAward.task", task, 0, 65535)
-    return _Q.pack(step + index * 0x400000 + (changes + robot * 0x100) * 0x40000000 + task * 0x400000000000)
+        raise OutOfRangeError("StepTurn.robot", robot, 0, 250)
+    won = message.won
+    if not 0 <= won <= 1:
+        raise OutOfRangeError("StepTurn.won", won, 0, 1)
+    return _Q.pack(step + index * 0x400000 + (changes + robot * 0x100 + won * 0x10000) * 0x40000000)
 
 
-def unpack_step_award(sender: int, data: bytes) -> StepAward | None:
+def unpack_step_turn(sender: int, data: bytes) -> StepTurn | None:
     (word_0,) = _Q.unpack_from(data)
     step = word_0 & 0x3FFFFF
     index = word_0 >> 22 & 0xFF
@@ -84,33 +60,25 @@ def unpack_step_award(sender: int, data: bytes) -> StepAward | None:
     robot = word_0 >> 38 & 0xFF
     if robot > 250:
         return None
-    task = word_0 >> 46 & 0xFFFF
-    return StepAward(sender, step, index, changes, robot, task)
+    won = word_0 >> 46 & 0x1
+    return StepTurn(sender, step, index, changes, robot, won)
 
 
-def pack_transport_bid(message: TransportBid) -> bytes:
-    step_low = message.step_low
-    if not 0 <= step_low <= 65535:
-        raise OutOfRangeError("TransportBid.step_low", step_low, 0, 65535)
+def pack_turn_request(message: TurnRequest) -> bytes:
+    step = message.step
+    if not 0 <= step <= 4194303:
+        raise OutOfRangeError("TurnRequest.step", step, 0, 4194303)
     attempt = message.attempt
     if not 0 <= attempt <= 255:
-        raise OutOfRangeError("TransportBid.attempt", attempt, 0, 255)
-    task = message.task
-    if not 0 <= task <= 65535:
-        raise OutOfRangeError("TransportBid.task", task, 0, 65535)
-    cost = message.cost
-    if not 0 <= cost <= 16777215:
-        raise OutOfRangeError("TransportBid.cost", cost, 0, 16777215)
-    return _Q.pack(step_low + attempt * 0x10000 + task * 0x1000000 + cost * 0x10000000000)
+        raise OutOfRangeError("TurnRequest.attempt", attempt, 0, 255)
+    return _IXXXX.pack(step + attempt * 0x400000)
 
 
-def unpack_transport_bid(sender: int, data: bytes) -> TransportBid | None:
-    (word_0,) = _Q.unpack_from(data)
-    step_low = word_0 & 0xFFFF
-    attempt = word_0 >> 16 & 0xFF
-    task = word_0 >> 24 & 0xFFFF
-    cost = word_0 >> 40
-    return TransportBid(sender, step_low, attempt, task, cost)
+def unpack_turn_request(sender: int, data: bytes) -> TurnRequest | None:
+    (word_0,) = _IXXXX.unpack_from(data)
+    step = word_0 & 0x3FFFFF
+    attempt = word_0 >> 22 & 0xFF
+    return TurnRequest(sender, step, attempt)
 
 
 def pack_path_head(message: PathHead) -> bytes:
@@ -186,27 +154,16 @@ def unpack_step_state(sender: int, data: bytes) -> StepState | None:
 
 #: Every frame of this module.
 FRAMES = (
-    FrameCode(
-        "TransportCall",
-        0x05B80000,
-        8,
-        pack_transport_call,
-        unpack_transport_call,
-        TransportCall,
-        TransportCall,
-        ("Desk",),
-        False,
-    ),
     FrameCode("StepRound", 0x05B90000, 8, pack_step_round, unpack_step_round, StepRound, StepRound, ("Desk",), False),
-    FrameCode("StepAward", 0x05BB0000, 8, pack_step_award, unpack_step_award, StepAward, StepAward, ("Desk",), False),
+    FrameCode("StepTurn", 0x05BB0000, 8, pack_step_turn, unpack_step_turn, StepTurn, StepTurn, ("Desk",), False),
     FrameCode(
-        "TransportBid",
+        "TurnRequest",
         0x06BA0000,
         8,
-        pack_transport_bid,
-        unpack_transport_bid,
-        TransportBid,
-        TransportBid,
+        pack_turn_request,
+        unpack_turn_request,
+        TurnRequest,
+        TurnRequest,
         ("Vehicle",),
         False,
     ),

@@ -28,6 +28,8 @@ class Proposal(NamedTuple):
     alternatives: tuple[Any, ...]
     parts: tuple[int, ...] = ()
     detail: tuple[Message, ...] = ()
+    #: What the bid names where it rests on no itinerary: the round of a call that stands.
+    version: int = 0
 
 
 @dataclass(frozen=True, slots=True)

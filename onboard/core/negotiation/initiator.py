@@ -144,6 +144,8 @@ class Initiator:
     due_us: int | None = None
     awards_sent: int = 0
     awarded_us: int = 0
+    #: Of a round: its deadline only ends it; who opened it decides whether anything has changed.
+    is_round: bool = False
     _lost_reason: Reason = Reason.NONE
 
     # --- events ------------------------------------------------------------------------------------------------
@@ -194,10 +196,10 @@ class Initiator:
             self.counters.bids_of_no_account += 1
             return []
         self.bids[bid.sender] = bid.cost
-        self._choose()
+        self.choose()
         return []
 
-    def _choose(self) -> None:
+    def choose(self) -> None:
         """The best of the bids that count: whoever has become an obstacle since does not."""
         assert self.call is not None
         self.best = None
@@ -257,6 +259,10 @@ class Initiator:
         is_late = self.state is State.AWARDING and now_us - self.awarded_us >= ACCEPT_WITHIN_US
         return self.best[1] if is_late and self.best is not None else NOBODY
 
+    def next_wake(self) -> int | None:
+        """When ``wake`` has something to do, bus time in us."""
+        return None if self.is_round and self.state is State.OPEN else self.due_us
+
     def wake(self, now_us: int) -> Outcome:
         """Let the deadline pass, or say the award again."""
         if self.due_us is None or self.due_us > now_us:
@@ -265,7 +271,11 @@ class Initiator:
             return self._fire(Event.REPEAT, now_us)
         if self.state is State.HELD:
             return self._fire(Event.EXPIRE, now_us)
-        self._choose()
+        return [] if self.is_round else self.conclude(now_us)
+
+    def conclude(self, now_us: int) -> Outcome:
+        """The time for bids is over: award, or open the call again, or give it up."""
+        self.choose()
         if self.best is not None:
             option = self.deadline_us is not None
             return self._fire(Event.DEADLINE_WITH_OPTION if option else Event.DEADLINE_WITH_BID, now_us)

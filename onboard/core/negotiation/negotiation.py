@@ -1,6 +1,6 @@
 """All calls of one machine at once, in both roles (rows P02 to P04)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -29,6 +29,11 @@ MAX_WINDOWS = 60
 Outcome = list[Effect | NegotiationEvent]
 
 
+def never(call: CallForProposals) -> bool:
+    """Every call is looked at when it is heard."""
+    return False
+
+
 @dataclass
 class Negotiation:
     """Participants by call, initiators by own call number. ``silent`` is the award-free form, for comparison only.
@@ -54,6 +59,11 @@ class Negotiation:
     is_obstacle: Callable[[int], bool] = nobody_is
     #: Whether a bid for a task goes with what its bidder said right before it; a kind sets it where its bids say more.
     is_sound: Callable[[Reference, Bid], bool] = is_any_sound
+    #: Whether a call stands: this machine looks at it in its initiator's rounds, and not when it is heard.
+    stands: Callable[[CallForProposals], bool] = never
+    #: Own calls that stand and are open in this round, by number, and the end of the round.
+    _standing: Mapping[int, CallTerms] = field(default_factory=dict)
+    _until_us: int = 0
     #: The newest word of each initiator about whom it leaves out: the call, and the nodes.
     _left_out: dict[int, tuple[int, frozenset[int]]] = field(default_factory=dict)
     _last_call: int = field(init=False)
@@ -166,9 +176,74 @@ class Negotiation:
     def next_wake(self) -> int | None:
         """The earliest due time of all calls, bus time in us."""
         times = [participant.next_wake() for participant in self.participants.values()]
-        times += [initiator.due_us for initiator in self.initiators]
+        times += [initiator.next_wake() for initiator in self.initiators]
         due = [time for time in times if time is not None]
         return min(due) if due else None
+
+    # --- calls that stand, round by round ------------------------------------------------------------------------
+
+    def look(self, call: CallForProposals, round_us: tuple[int, int], heard: Iterable[Bid], now_us: int) -> None:
+        """Take part in a call that stands, in a round from its begin to its end; ``heard`` are its bids so far."""
+        since_us, until_us = round_us
+        participant = self._participant(call, until_us, now_us)
+        self.participants[participant.key] = participant
+        # Released and awarded calls are told as ever; before the first bid there is nothing to tell.
+        participant.open(since_us)
+        for bid in heard:
+            participant.on_bid(bid, now_us)
+
+    def leave_round(self, initiator: int) -> None:
+        """A round of another's calls is over: what came of it was told, or is told by the next."""
+        self.participants = {key: one for key, one in self.participants.items() if key.initiator != initiator}
+
+    def begin_round(self, standing: Mapping[int, CallTerms], until_us: int) -> None:
+        """Own calls, by number, were told to all and are open again until then: their bids count."""
+        self.end_round()
+        self._standing, self._until_us = standing, until_us
+
+    def end_round(self) -> None:
+        """What was not awarded in the round stands for the next."""
+        self._standing = {}
+        self.initiators = [one for one in self.initiators if not one.is_round]
+
+    def best_of_round(self) -> dict[int, tuple[int, int]]:
+        """Cost and node-ID of the best bid for each own call that has one, by number."""
+        found = {}
+        for one in self.initiators:
+            if one.is_round and one.call is not None:
+                one.choose()
+                found[one.call.call] = one.best
+        return {call: best for call, best in found.items() if best is not None}
+
+    def award_in_round(self, call: int, now_us: int) -> list[Effect]:
+        """The best bid for a call has won, and that is news."""
+        for one in self.initiators:
+            if one.is_round and one.call is not None and one.call.call == call and one.best is not None:
+                return [item for item in one.conclude(now_us) if not isinstance(item, NegotiationEvent)]
+        return []
+
+    def _open_in_round(self, call: int, now_us: int) -> None:
+        """With the first bid for a call that stands: it needs no other word."""
+        terms = self._standing.get(call)
+        begun = (one.call.call for one in self.initiators if one.is_round and one.call is not None)
+        if terms is None or call in begun:
+            return
+        one = Initiator(
+            self.node_id,
+            terms,
+            self.timing,
+            self.policy,
+            lambda: call,
+            False,
+            self.counters,
+            self.trust,
+            self.is_obstacle,
+            self.is_sound,
+            is_round=True,
+        )
+        one.open(now_us)
+        one.due_us = self._until_us
+        self.initiators.append(one)
 
     # --- calls of others ---------------------------------------------------------------------------------------
 
@@ -178,6 +253,8 @@ class Negotiation:
             whole.on_rival(from_bus_ms(call.deadline_ms, now_us))
         if call.kind not in (KindCode.ANY, self.kind):
             self.counters.calls_of_other_kind += 1
+            return []
+        if self.stands(call):
             return []
         key = CallKey(call.sender, call.call)
         known = self.participants.get(key)
@@ -196,8 +273,12 @@ class Negotiation:
             outcome += one.supersede(now_us)
         self.participants.pop(key, None)
         outcome += self._make_room(now_us)
+        participant = self.participants[key] = self._participant(call, deadline_us, now_us)
+        return outcome + participant.open(now_us)
+
+    def _participant(self, call: CallForProposals, deadline_us: int, now_us: int) -> Participant:
         left_out = self._out_of(call)
-        participant = Participant(
+        return Participant(
             self.node_id,
             call,
             self._timing_of(call, deadline_us - now_us),
@@ -212,8 +293,6 @@ class Negotiation:
             left_out,
             self.is_sound,
         )
-        self.participants[key] = participant
-        return outcome + participant.open(now_us)
 
     def _on_left_out(self, word: LeftOut) -> None:
         """Whom the next call of its sender leaves out; a second frame for the same call names more."""
@@ -275,6 +354,7 @@ class Negotiation:
 
     def _on_bid(self, bid: Bid, now_us: int) -> Outcome:
         if bid.initiator == self.node_id:
+            self._open_in_round(bid.call, now_us)
             for initiator in self.initiators:
                 if initiator.call is not None and initiator.call.call == bid.call:
                     return initiator.on_bid(bid, now_us)

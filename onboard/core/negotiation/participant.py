@@ -288,7 +288,7 @@ class Participant:
         self.counters.bids_sent += 1
         self.has_bid = True
         itinerary = self.proposal.itinerary
-        version = itinerary.version if itinerary is not None else 0
+        version = itinerary.version if itinerary is not None else self.proposal.version
         self.best = (self.proposal.cost, self.node_id)
         bid = Bid(self.node_id, self.call.sender, self.call.call, self.proposal.cost, version)
         outcome: Outcome = [*(Send(message) for message in self.proposal.detail), Send(bid)]

@@ -83,7 +83,7 @@ class Compartment:
 
     def __post_init__(self) -> None:
         self.stewardship = Stewardship(self.fleet)
-        self.outputs = BayOutputs(self.fleet.node_id)
+        self.outputs = BayOutputs(self.fleet.node_id, self.fleet.motion, station_token(self.station))
         site, machine = self.fleet.site, self.fleet.machine
         self._robots = CarParkGeneration(site, machine, self.fleet.mirror, Program(site))
         self.memory = BayMemory(self.fleet.node_id, station_token(self.station)).read(self.fleet.entries)

@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey, car_token, station_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
-from onboard.core.effects import Actuate, Effect, Record
+from onboard.core.effects import Effect, Record
 from onboard.core.messages import ShuttleOrder, ShuttleState
+from onboard.core.motion_authority import Permit, authorised
 from onboard.core.serial import successor
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.program import Handling, Phase, Work
@@ -98,7 +99,7 @@ class ShuttleWork:
         if order is None or not self.is_out or state.sequence == order.sequence:
             self.stall.rests()
             return []
-        return [Actuate(order)] if self._unheard.is_due("shuttle", now_us, heard=False) else []
+        return self._permit().order(order) if self._unheard.is_due("shuttle", now_us, heard=False) else []
 
     def advance(self, now_us: int) -> list[Effect]:
         """Take the next step of the table where its condition is met."""
@@ -111,7 +112,7 @@ class ShuttleWork:
             is_taken = self.work.handling is Handling.LEAVE and custody.others_in(
                 self.fleet.mirror, self.work.station, self.work.car
             )
-            if is_taken or not self._has_rights():
+            if is_taken:
                 return effects
             return effects + self._next(now_us)
         if self.sensed is None or self.sensed.sequence != self.sequence or self.sensed.mode is not ENDS[self.phase]:
@@ -137,8 +138,8 @@ class ShuttleWork:
         assert self.work is not None
         return [station_token(self.work.station), car_token(*self.work.car)]
 
-    def _has_rights(self) -> bool:
-        return all(self.fleet.tokens.holds(key) for key in self._rights())
+    def _permit(self) -> Permit:
+        return authorised(self.fleet.motion, self._rights())
 
     def _acquire(self, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
@@ -148,16 +149,21 @@ class ShuttleWork:
 
     def _next(self, now_us: int) -> list[Effect]:
         assert self.work is not None
-        order, self.phase = TABLE[self.phase, self.work.handling]
+        order, following = TABLE[self.phase, self.work.handling]
         if order is None:
+            self.phase = following
             return self._finish(self.work, now_us)
+        permit = self._permit()
+        if not permit:
+            return []
+        self.phase = following
         self.sequence = successor(self.sequence, 8)
         side, wheelbase_mm = self.work.station.side, self.work.wheelbase_mm
         self._ordered = ShuttleOrder(self.fleet.node_id, self.sequence, order, side, wheelbase_mm)
         self._unheard.ordered("shuttle")
         self.stall.ordered(now_us)
         begun = StepRecord(self.phase, self.work.handling, self.work.station.number, self.work.car.number)
-        return [Record(begun), Actuate(self._ordered)]
+        return [Record(begun), *permit.order(self._ordered)]
 
     def _finish(self, work: Work, now_us: int) -> list[Effect]:
         """The shuttle is home: state where the car is, pass custody on after leaving it, give the station back."""

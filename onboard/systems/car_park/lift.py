@@ -12,7 +12,7 @@ from enum import Enum
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import records_in
 from onboard.core.messages import (
     Award,
@@ -25,7 +25,7 @@ from onboard.core.messages import (
     Progress,
     TaskReport,
 )
-from onboard.core.motion_authority import MotionState, authorised
+from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor
 from onboard.systems.car_park.bay_memory import BayMemory
@@ -443,9 +443,8 @@ class Lift:
         """Order the drive to a floor and keep the order fresh, under the authority of the gate."""
         if self._stands_at(index):
             return self._stand()
-        state = MotionState(self.fleet.tokens, position_known=True, stopped=False)
-        allowed, _ = authorised(state, gate(self.track))
-        if not allowed or self.platform is None or self.platform.crossing:
+        permit = authorised(self.fleet.motion, [segment_token(gate(self.track))])
+        if not permit or self.platform is None or self.platform.crossing:
             return self._stand()
         if index != self._target:
             self._target = index
@@ -455,7 +454,8 @@ class Lift:
         site = self.fleet.site
         self.stall.ordered(now_us)
         self._refresh_at_us = now_us + site.timing.drive_refresh_us
-        return [Actuate(DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s))]
+        order = DriveOrder(self.fleet.node_id, self._sequence, self._position_mm(index), site.lift.speed_mm_s)
+        return permit.order(order)
 
 
 def rides_of(track: int, robot: int, itinerary: Itinerary, seen: Progress | None, now_us: int) -> list[Ride]:

@@ -7,9 +7,11 @@ which do nothing when they come twice; a desk that hears the number of its last 
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour
-from onboard.core.effects import Actuate, Effect, Record
-from onboard.core.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Message, Reference
+from onboard.core.authority import TokenKey
+from onboard.core.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour, Reason
+from onboard.core.effects import Effect, Record, Tell
+from onboard.core.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference
+from onboard.core.motion_authority import ALONE, MotionAuthority, Permit, authorised
 from onboard.core.serial import successor
 from onboard.systems.car_park.records import DoorRecord
 from onboard.systems.car_park.unheard import Unheard
@@ -17,6 +19,8 @@ from onboard.systems.car_park.unheard import Unheard
 #: A desk tells nobody what it shows: its last order is said again with so many states of the bay (ours).
 DESK_TIMES = 4
 
+#: By these somebody comes to what is in the bay, or is shut in with it: not while another machine holds the bay.
+_INTO_THE_BAY = ((DoorName.INPUT, DoorAction.OPEN), (DoorName.OUTPUT, DoorAction.CLOSE))
 #: Where a door is that has heard an order. One that found something in its way has opened again by itself, and closes
 #: when it is told once more or when the way is clear.
 _HEARD = {
@@ -27,9 +31,11 @@ _HEARD = {
 
 @dataclass
 class BayOutputs:
-    """Orders of one compartment; ``light`` is the colour last ordered."""
+    """Orders of one compartment; ``light`` is the colour last ordered, ``bay`` the right to its bay."""
 
     node_id: int
+    motion: MotionAuthority
+    bay: TokenKey
     light: LightColour | None = None
     _sequence: int = 0
     _doors: dict[DoorName, DoorOrder] = field(default_factory=dict)
@@ -38,47 +44,55 @@ class BayOutputs:
     _unheard: Unheard = field(default_factory=Unheard)
 
     def door(self, door: DoorName, action: DoorAction) -> list[Effect]:
-        """Order a door once; the plant's interlock refuses what must not be, and the phase then waits."""
+        """Order a door once; the plant's interlock refuses what must not be, and the phase then waits.
+
+        What is not permitted yet is ordered with a later state of the doors.
+        """
         last = self._doors.get(door)
         if last is not None and last.action is action:
             return []
         order = self._doors[door] = DoorOrder(self.node_id, self._next(), door, action)
         self._unheard.ordered(door)
-        return [Record(DoorRecord(door, action)), Actuate(order)]
+        return [Record(DoorRecord(door, action)), *self._permit(door, action).order(order)]
+
+    def _permit(self, door: DoorName, action: DoorAction) -> Permit:
+        """A compartment that begins its first life opens to customers before others have confirmed its rights."""
+        is_away = (door, action) in _INTO_THE_BAY and not self.motion.tokens.is_mine_by_journal(self.bay)
+        return authorised(self.motion, ALONE, Reason.TOKEN_HELD_BY_OTHER if is_away else Reason.NONE)
 
     def show(self, text: DeskText, car: Reference) -> Effect:
         """What the desk is to show; with TAKE_TICKET it prints."""
         self._desk, self._desk_left = DeskOrder(self.node_id, self._next(), text, car), DESK_TIMES
         self._unheard.ordered("desk")
-        return Actuate(self._desk)
+        return Tell(self._desk)
 
     def light_up(self, colour: LightColour) -> Effect:
         """The light before the input door."""
         self.light = colour
         self._unheard.ordered("light")
-        return Actuate(LightOrder(self.node_id, colour))
+        return Tell(LightOrder(self.node_id, colour))
 
     def again(self, state: DoorState | BayState, now_us: int) -> list[Effect]:
         """What a state shows as not heard; time in us."""
-        orders = self._doors_again(state, now_us) if isinstance(state, DoorState) else self._desk_again(now_us)
-        return [Actuate(order) for order in orders]
+        return self._doors_again(state, now_us) if isinstance(state, DoorState) else self._desk_again(now_us)
 
-    def _doors_again(self, state: DoorState, now_us: int) -> list[Message]:
+    def _doors_again(self, state: DoorState, now_us: int) -> list[Effect]:
         where = {DoorName.INPUT: state.input_door, DoorName.OUTPUT: state.output_door}
-        orders: list[Message] = [
-            order
+        orders = [
+            effect
             for door, order in self._doors.items()
             if self._unheard.is_due(door, now_us, heard=where[door] in _HEARD[order.action])
+            for effect in self._permit(door, order.action).order(order)
         ]
         if self.light is not None and self._unheard.is_due("light", now_us, heard=state.light is self.light):
-            orders.append(LightOrder(self.node_id, self.light))
+            orders.append(Tell(LightOrder(self.node_id, self.light)))
         return orders
 
-    def _desk_again(self, now_us: int) -> list[Message]:
+    def _desk_again(self, now_us: int) -> list[Effect]:
         if self._desk is None or not self._desk_left or not self._unheard.is_due("desk", now_us, heard=False):
             return []
         self._desk_left -= 1
-        return [self._desk]
+        return [Tell(self._desk)]
 
     def _next(self) -> int:
         self._sequence = successor(self._sequence, 8)

@@ -1,10 +1,11 @@
 """What a robotized car park has beyond any other site: cars, shuttles, and when lifts are asked for."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from onboard.core.site import Axis, Site
+from onboard.core.site import Axis, Needs, Site
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,11 @@ class CarPark(Site):
 
     system: ClassVar[str] = "car-park"
     has_regeneration: ClassVar[bool] = True
+    moved_by: ClassVar[Mapping[str, Needs]] = {
+        "DriveOrder": Needs.RIGHT,
+        "ShuttleOrder": Needs.RIGHT,
+        "DoorOrder": Needs.PLACE,
+    }
 
     shuttle: Axis
     shuttle_reach_mm: int

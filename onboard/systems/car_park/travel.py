@@ -8,15 +8,15 @@ Into a spur a carrier turns in its mouth, and back into the alley there too. Fro
 until it is turned back its axis is the spur's, with the mouth at index 0; there it needs both slots before it turns.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import DriveMode, Reason, TokenKind
-from onboard.core.effects import Actuate, Effect, Send
+from onboard.core.effects import Effect, Send
 from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
-from onboard.core.motion_authority import MotionState, authorised, needs_no_proof
+from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.serial import successor
 from onboard.core.site import Segment, TrackKind
 from onboard.systems.car_park.axis import TrackAxis
@@ -277,7 +277,7 @@ class Carriage:
             # Pushed there by hand, or found there after a restart: a body asks for what it is in.
             effects += self.fleet.tokens.want(segment_token(slot), now_us)
         effects += self._ask(ahead, now_us) + self._ask_lifts(ahead, now_us)
-        reach, reason = self._reach(ahead)
+        reach, permit, reason = self._reach(ahead)
         if self.whole.slots and not self.whole.is_complete:
             reach, reason = None, Reason.NOT_AUTHORISED
         if reach is None:
@@ -285,9 +285,9 @@ class Carriage:
         if reach != self.target:
             self.target = reach
             self.sequence = successor(self.sequence, 8)
-            return [*effects, self._order(now_us)]
+            return [*effects, *self._order(permit, now_us)]
         if self.refresh_at_us is not None and self.refresh_at_us <= now_us:
-            effects.append(self._order(now_us))
+            effects += self._order(permit, now_us)
         return effects + self._give_back(now_us)
 
     def next_wake(self) -> int | None:
@@ -366,16 +366,13 @@ class Carriage:
         ahead_mm = braking_mm + axis.speed_mm_s * LOOKAHEAD_US // 1_000_000
         return 2 + -(-ahead_mm // self.fleet.site.tracks[self.track].pitch_mm)
 
-    def _reach(self, ahead: list[int]) -> tuple[Segment | None, Reason]:
-        """The last position of the unbroken authorised line, or None and why not even the first step is allowed."""
-        # Out of a sill, to the side from where the body came, nothing need be proved.
+    def _reach(self, ahead: list[int]) -> tuple[Segment | None, Permit, Reason]:
+        """The last position of the unbroken authorised line and what permits it, or None; and why it ends there."""
         is_out = self.goal is not None and self.goal == self.way_out
-        proof = needs_no_proof if is_out else lambda slot: self.sill.lacks(slot, self.track)
-        state = MotionState(self.fleet.tokens, self.sensed is not None, self.stopped, proof)
-        for slot in self.occupied():
-            allowed, reason = authorised(state, slot)
-            if not allowed:
-                return None, reason
+        own = Reason.OPERATOR if self.stopped else Reason.POSITION_UNKNOWN if self.sensed is None else Reason.NONE
+        permit = self._may_be_in(self.occupied(), authorised(self.fleet.motion, ALONE, own), is_out=is_out)
+        if not permit:
+            return None, permit, permit.reason
         reach = None
         reason = Reason.NONE
         blocked = self.fleet.mirror.obstacles.blocked
@@ -383,16 +380,23 @@ class Carriage:
             if reach is not None and any(slot in blocked for slot in slots):
                 reason = Reason.IMPOSSIBLE
                 break
-            verdicts = [authorised(state, slot) for slot in slots]
-            reason = next((why for allowed, why in verdicts if not allowed), Reason.NONE)
-            if reason is not Reason.NONE:
+            onward = self._may_be_in(slots, permit, is_out=is_out)
+            reason = onward.reason
+            if not onward:
                 break
-            reach = Segment(self.track, index)
+            reach, permit = Segment(self.track, index), onward
         if reach is not None and self._turns_back:
-            return self.goal, reason
+            return self.goal, permit, reason
         if reach is None or (reach == self.standing_at and reach != self.goal):
-            return None, reason
-        return reach, reason
+            return None, permit, reason
+        return reach, permit, reason
+
+    def _may_be_in(self, slots: Iterable[Segment], permit: Permit, *, is_out: bool) -> Permit:
+        """The permit for these slots too. Out of a sill, to the side from where the body came, nothing is proved."""
+        for slot in slots:
+            permit = authorised(self.fleet.motion, [segment_token(slot)], besides=permit)
+            permit = permit if is_out or not permit else permit.unless(self.sill.lacks(slot, self.track))
+        return permit
 
     @property
     def _turns_back(self) -> bool:
@@ -418,7 +422,7 @@ class Carriage:
         blocker = tokens.holder_of(segment_token(waits_for))
         return [Send(Waiting(self.fleet.node_id, waits_for.track, waits_for.index, blocker, reason))]
 
-    def _order(self, now_us: int) -> Effect:
+    def _order(self, permit: Permit, now_us: int) -> list[Effect]:
         assert self.target is not None
         self._sent[self.sequence] = self.target
         self.stall.ordered(now_us)
@@ -426,7 +430,7 @@ class Carriage:
         site = self.fleet.site
         position_mm, across = site.position_mm(self.target), site.tracks[self.target.track].kind is TrackKind.SPUR
         order = DriveOrder(self.fleet.node_id, self.sequence, position_mm, site.carrier.speed_mm_s, across)
-        return Actuate(order)
+        return permit.order(order)
 
     def _give_back(self, now_us: int) -> list[Effect]:
         """Return segments that the body has left and does not need again before its goal.

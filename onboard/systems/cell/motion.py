@@ -2,8 +2,10 @@
 
 from dataclasses import dataclass, field
 
+from onboard.core.authority import TokenKey
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect
+from onboard.core.motion_authority import MotionAuthority, authorised
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point, crosses, shortest_way
 from onboard.systems.cell.messages import ArmMode, ArmOrder, ArmState
@@ -13,13 +15,10 @@ from onboard.work.device_link import DeviceLink
 ROUNDING_MM = 1
 
 
-def may_go(here: Point, there: Point, arm: Arm, obstacles: tuple[Area, ...]) -> tuple[bool, Reason]:
-    """Whether a straight line may be driven: inside the own area, through no obstacle. Asked before every order."""
-    if not arm.area.contains(there):
-        return False, Reason.NOT_AUTHORISED
-    if any(crosses(here, there, obstacle) for obstacle in obstacles):
-        return False, Reason.NOT_AUTHORISED
-    return True, Reason.NONE
+def lacks(here: Point, there: Point, arm: Arm, obstacles: tuple[Area, ...]) -> Reason:
+    """Why a straight line may not be driven: it leaves the own area, or crosses an obstacle. NONE where it may."""
+    is_inside = arm.area.contains(there) and not any(crosses(here, there, obstacle) for obstacle in obstacles)
+    return Reason.NONE if is_inside else Reason.NOT_AUTHORISED
 
 
 def _shrunk(area: Area) -> Area:
@@ -30,6 +29,7 @@ def _shrunk(area: Area) -> Area:
 class Driver:
     """One robot's drive. ``state`` is what its sensor said last; None before it has said anything."""
 
+    motion: MotionAuthority
     arm: Arm
     obstacles: tuple[Area, ...]
     refresh_us: int
@@ -55,8 +55,11 @@ class Driver:
         """Whether the robot has come to rest exactly there."""
         return self.state is not None and self.state.arm_mode is ArmMode.RESTING and self.position == place
 
-    def go(self, end: Point, now_us: int) -> list[Effect]:
-        """Order the next stretch of the shortest way to ``end`` and keep the order fresh; none where it is closed."""
+    def go(self, end: Point, right: TokenKey, now_us: int) -> list[Effect]:
+        """Order the next stretch of the shortest way to ``end`` and keep the order fresh; none where it is closed.
+
+        ``right`` is what it goes there for: the custody of a part.
+        """
         here = self.position
         if here is None or self.stands_at(end):
             return self.rest()
@@ -66,10 +69,10 @@ class Driver:
             if way is None or len(way) < 2:
                 return self.rest()
             target = way[1]
-        allowed, _ = may_go(here, target, self.arm, self._obstacles_around(here))
-        if not allowed:
+        permit = authorised(self.motion, [right], lacks(here, target, self.arm, self._obstacles_around(here)))
+        if not permit:
             return self.rest()
-        return self.link.order(target, now_us)
+        return self.link.order(target, permit, now_us)
 
     def _obstacles_around(self, here: Point) -> tuple[Area, ...]:
         """The obstacles; one on whose border the robot stopped and the sensor's millimetre says inside, a bit less."""

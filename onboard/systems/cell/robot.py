@@ -14,6 +14,7 @@ from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskP
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.records import last_boot
 from onboard.core.site import Machine, Site
@@ -89,7 +90,7 @@ class ArmRobot:
 
     def __post_init__(self) -> None:
         site = self.generation.site
-        self.driver = Driver(self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
+        self.driver = Driver(self.fleet.motion, self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
         self.fleet.negotiation.is_sound = self.generation.hearsay.is_sound
         # Names of goals of an earlier life may still be about.
         self.generation.number = last_boot(self.fleet.entries) << 8
@@ -399,7 +400,7 @@ class ArmRobot:
 
     def _when_going_there(self, one: Undertaking, now_us: int) -> list[Effect]:
         if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, now_us)
+            return self.driver.go(one.contract.goal.start, car_token(*one.contract.goal.part), now_us)
         one.stage = Stage.TAKEN
         self._engage()
         return [*self.driver.rest(), stage_record(one), *self._to(ArmPhase.TAKING, now_us)]
@@ -417,12 +418,12 @@ class ArmRobot:
         if self.driver.stands_at(one.contract.move.via) and self._lies_here():
             return self._put(one, now_us)
         if not self.driver.stands_at(one.contract.goal.start):
-            return self.driver.go(one.contract.goal.start, now_us)
+            return self.driver.go(one.contract.goal.start, car_token(*one.contract.goal.part), now_us)
         return self._order(GripAction.TAKE, part, now_us)
 
     def _when_carrying(self, one: Undertaking, now_us: int) -> list[Effect]:
         if not self.driver.stands_at(one.contract.move.via):
-            return self.driver.go(one.contract.move.via, now_us)
+            return self.driver.go(one.contract.move.via, car_token(*one.contract.goal.part), now_us)
         return [*self.driver.rest(), *self._to(ArmPhase.PUTTING, now_us)]
 
     def _when_putting(self, one: Undertaking, now_us: int) -> list[Effect]:
@@ -451,7 +452,8 @@ class ArmRobot:
         """Said again while it is not obeyed; a grip at nothing is tried anew."""
         assert self.grip is not None
         failed = self.grip.grip_mode is GripMode.NOTHING_THERE and self.gripper.is_obeyed(self.grip.sequence)
-        return self.gripper.order((action, part), now_us, anew=failed)
+        permit = authorised(self.fleet.motion, [car_token(*part)])
+        return self.gripper.order((action, part), permit, now_us, anew=failed)
 
     # --- words -------------------------------------------------------------------------------------------------
 

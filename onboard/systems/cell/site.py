@@ -1,11 +1,12 @@
 """What the machines of a cell know beforehand."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 from onboard.core.codes import KindCode
-from onboard.core.site import Site
+from onboard.core.site import Needs, Site
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
 
@@ -31,6 +32,7 @@ class Cell(Site):
 
     system: ClassVar[str] = "cell"
     demand: ClassVar[frozenset[str]] = frozenset({"wishes"})
+    moved_by: ClassVar[Mapping[str, Needs]] = {"ArmOrder": Needs.RIGHT, "GripOrder": Needs.RIGHT}
 
     arms: dict[int, Arm]
     obstacles: tuple[Area, ...] = ()

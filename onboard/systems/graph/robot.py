@@ -12,7 +12,7 @@ from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase, TokenK
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
-from onboard.core.motion_authority import MotionState, authorised
+from onboard.core.motion_authority import Permit, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.site import Machine, Site
 from onboard.systems.graph.errands import TRANSPORT_STOPS, Errand, errand_record, errands, lost_record
@@ -33,7 +33,7 @@ from onboard.systems.graph.messages import (
 )
 from onboard.systems.graph.network import NOWHERE
 from onboard.systems.graph.planning import Position, RobotPlanning, told_way
-from onboard.systems.graph.rights import edge_segment, edge_token, keeper, slot_token
+from onboard.systems.graph.rights import edge_token, keeper, slot_token
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph
 from onboard.work.device_link import DeviceLink
@@ -396,11 +396,12 @@ class GraphRobot:
                 effects += self.fleet.tokens.give(key, keeper(self.site, key), now_us)
         return effects
 
-    def _may_go(self, start: int, end: int) -> bool:
-        """Asked before every movement order and again while the movement runs."""
-        motion = MotionState(self.fleet.tokens, position_known=self.body is not None, stopped=False)
-        allowed, _ = authorised(motion, edge_segment(start, end))
-        return allowed and (self.site.rules is not Rules.EDGE_AND_NODE or self._has_slot(end))
+    def _permit(self, start: int, end: int) -> Permit:
+        """For an edge; by some rules only with a slot at its end."""
+        needs_slot = self.site.rules is Rules.EDGE_AND_NODE and not self._has_slot(end)
+        return authorised(self.fleet.motion, [edge_token(start, end)]).unless(
+            Reason.NOT_AUTHORISED if needs_slot else Reason.NONE
+        )
 
     def _has_slot(self, node: int) -> bool:
         return any(key.kind is TokenKind.STATION and key.number >> 8 == node for key in self._held())
@@ -409,25 +410,22 @@ class GraphRobot:
 
     def _drive(self, now_us: int) -> list[Effect]:
         assert self.body is not None
-        order = self._next_order(self.body)
-        if order is None:
+        permit, order = self._next_order(self.body)
+        if permit is None or order is None:
             self.drive.rest()
             return []
-        return self.drive.order(order, now_us)
+        return self.drive.order(order, permit, now_us)
 
-    def _next_order(self, body: BodyState) -> tuple[RouteAction, int, int] | None:
+    def _next_order(self, body: BodyState) -> tuple[Permit | None, tuple[RouteAction, int, int] | None]:
+        """What to do next and what permits it."""
         grant = self._grant
-        if grant is not None and self._may_go(grant.node, grant.after):
-            return (RouteAction.GO, grant.node, grant.after)
-        if body.body_place is BodyPlace.IN_NODE:
-            return None
-        if not self._may_go(body.behind, body.node):
-            return None
+        if grant is not None and (onward := self._permit(grant.node, grant.after)):
+            return onward, (RouteAction.GO, grant.node, grant.after)
+        if body.body_place is BodyPlace.IN_NODE or not (here := self._permit(body.behind, body.node)):
+            return None, None
         if self._enters(body):
-            return (RouteAction.ENTER, body.node, NO_NODE)
-        if body.body_place is BodyPlace.ON_EDGE:
-            return (RouteAction.GO, body.behind, body.node)
-        return None
+            return here, (RouteAction.ENTER, body.node, NO_NODE)
+        return here, (RouteAction.GO, body.behind, body.node) if body.body_place is BodyPlace.ON_EDGE else None
 
     def _enters(self, body: BodyState) -> bool:
         """Whether it goes into the node ahead: to load, to be free, or to wait where the rules say so (decision 14)."""

@@ -1,11 +1,12 @@
 """What the machines of a factory graph know beforehand (row G27: every robot has the whole graph)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 from onboard.core.codes import KindCode
-from onboard.core.site import Machine, Site
+from onboard.core.site import Machine, Needs, Site
 from onboard.systems.graph.network import Edge, Graph, edge
 from onboard.systems.graph.rules import Rules
 
@@ -38,6 +39,7 @@ class FactoryGraph(Site):
 
     system: ClassVar[str] = "graph"
     demand: ClassVar[frozenset[str]] = frozenset({"orders"})
+    moved_by: ClassVar[Mapping[str, Needs]] = {"RouteOrder": Needs.RIGHT}
 
     edges: tuple[tuple[int, int, int], ...]
     rules: Rules

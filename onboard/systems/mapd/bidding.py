@@ -1,19 +1,21 @@
-"""One robot in one round: bids for the task that is cheapest for it among those for which it is still the best.
+"""One robot in one round: which of the calls that stand it takes part in, one after the other.
 
-A bid is sent only where it beats what was heard for that task, better bids are sent sooner (design, section 4), and a
-later bid takes the earlier one back. Whoever is beaten goes on to its next best task. As both sides order by the same
-cost, that ends in the one stable outcome whatever the order of frames (Gale and Shapley 1962): the lowest bid of all
-has won first, then the lowest among the rest.
+It is the cheapest for it among those for which it is still the best as far as it has heard; whoever is beaten goes on
+to the next. When to bid, and whether, is the core's: better bids are sent sooner, and none that beats nothing is sent.
+As both sides order by the same cost, that ends in the one stable outcome whatever the order of frames (Gale and Shapley
+1962): the lowest bid of all has won first, then the lowest among the rest.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from onboard.core.codes import Criterion
-from onboard.core.negotiation.bidding import delay_us
+from onboard.core.behaviour import NoEstimator
+from onboard.core.messages import Bid, CallForProposals
+from onboard.core.negotiation import Proposal
 from onboard.core.site import Timing
-from onboard.systems.mapd.messages import NO_TASK, TransportBid
+from onboard.systems.mapd.calls import task_of
 
-#: Half of the longest delay is owed by a bid of 30 steps, us. Ours: most pick-ups in a warehouse are nearer.
+#: Half of the longest delay is owed by a bid of 30 steps, us: most pick-ups in a warehouse are nearer.
 HALF_US = 3_000_000
 #: Share of a round's length that the longest delay may take, per cent: the rest is for those who are beaten late.
 DELAY_PERCENT = 60
@@ -25,78 +27,47 @@ def bid_timing(timing: Timing, window_us: int) -> Timing:
 
 
 @dataclass
+class UnitGeneration(NoEstimator):
+    """A robot's task-generation function: what each open task costs it in the round ``mark``, as it saw it then."""
+
+    costs: dict[int, int] = field(default_factory=dict)
+    mark: int = 0
+
+    def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
+        """Hundredths of a step; None for a task that it does not know, or cannot reach."""
+        return self.costs.get(call.task.number)
+
+    def estimate(self, call: CallForProposals, now_us: int) -> Proposal | None:
+        """The same: what is in the way is seen when the path is planned."""
+        cost = self.costs.get(call.task.number)
+        return None if cost is None else Proposal(cost, None, (call.task.number,), (), version=self.mark)
+
+
+@dataclass
 class Round:
     """A round that is open: ``wishes`` are (cost, task), cheapest first; ``begun_us`` when it was heard."""
 
     node_id: int
-    step: int
-    attempt: int
     begun_us: int
-    timing: Timing
-    wishes: list[tuple[int, int]]
-    standing: dict[int, tuple[int, int]] = field(default_factory=dict)
-    last: TransportBid | None = None
+    wishes: Sequence[tuple[int, int]]
+    #: The task whose call it takes part in.
+    looked_at: int | None = None
+    bids: dict[int, list[Bid]] = field(default_factory=dict)
+    _best: dict[int, tuple[int, int]] = field(default_factory=dict)
     _next: int = 0
 
-    def hear(self, bid: TransportBid) -> None:
+    def hear(self, bid: Bid) -> None:
         """Another robot's bid, of this round."""
-        if bid.attempt != self.attempt or bid.step_low != self.step & 0xFFFF or bid.task == NO_TASK:
-            return
-        best = self.standing.get(bid.task)
-        if best is None or (bid.cost, bid.sender) < best:
-            self.standing[bid.task] = (bid.cost, bid.sender)
+        task, offered = task_of(bid), (bid.cost, bid.sender)
+        self.bids.setdefault(task, []).append(bid)
+        self._best[task] = min(offered, self._best.get(task, offered))
 
     @property
-    def wish(self) -> tuple[int, int] | None:
+    def wish(self) -> int | None:
         """The cheapest task for which nobody is better as far as is known; None where there is none."""
         while self._next < len(self.wishes):
             cost, task = self.wishes[self._next]
-            best = self.standing.get(task)
-            if best is None or (cost, self.node_id) <= best:
-                return self.wishes[self._next]
+            if (cost, self.node_id) <= self._best.get(task, (cost, self.node_id)):
+                return task
             self._next += 1
         return None
-
-    def due_us(self) -> int | None:
-        """When the next bid is to be sent; None where there is nothing to say."""
-        wish = self.wish
-        if wish is None or (self.last is not None and self.last.task == wish[1]):
-            return None
-        return self.begun_us + delay_us(wish[0], 0, Criterion.LENGTH, self.timing)
-
-    def speak(self, now_us: int) -> list[TransportBid]:
-        """The bid that is due."""
-        due_us, wish = self.due_us(), self.wish
-        if due_us is None or wish is None or now_us < due_us:
-            return []
-        cost, task = wish
-        self.standing[task] = (cost, self.node_id)
-        self.last = TransportBid(self.node_id, self.step & 0xFFFF, self.attempt, task, cost)
-        return [self.last]
-
-
-@dataclass
-class Tally:
-    """The bids of a round as the desk heard them: of each robot its last, and who wants a turn without a task."""
-
-    step: int
-    attempt: int
-    last: dict[int, tuple[int, int]] = field(default_factory=dict)
-    yielding: set[int] = field(default_factory=set)
-
-    def hear(self, bid: TransportBid) -> None:
-        """A bid of this round; others are too late or too old."""
-        if bid.attempt != self.attempt or bid.step_low != self.step & 0xFFFF:
-            return
-        if bid.task == NO_TASK:
-            self.yielding.add(bid.sender)
-        else:
-            self.last[bid.sender] = (bid.cost, bid.task)
-
-    def winners(self) -> dict[int, tuple[int, int]]:
-        """Task and cost of each robot whose last bid is the best for its task, by robot."""
-        best: dict[int, tuple[int, int]] = {}
-        for robot, (cost, task) in self.last.items():
-            if task not in best or (cost, robot) < best[task]:
-                best[task] = (cost, robot)
-        return {robot: (task, cost) for task, (cost, robot) in best.items()}

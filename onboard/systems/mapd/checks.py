@@ -3,20 +3,19 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from onboard.core.messages import Award, Bid, CallForProposals
+from onboard.systems.mapd.calls import is_of_step, mark_of, task_of
 from onboard.systems.mapd.messages import (
     MOVE_BITS,
     MOVES_A_FRAME,
-    NO_TASK,
     PathHead,
     PathMoves,
-    StepAward,
     StepRound,
     StepState,
-    TransportBid,
-    TransportCall,
+    StepTurn,
 )
 from onboard.systems.mapd.site import Mapd
-from onboard.trace.check.calls import CROSSING_US, BidsGoDown, BidsInTime, CallsClosed
+from onboard.trace.check.calls import CROSSING_US
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rights import OneHolder
@@ -108,7 +107,7 @@ class TaskOnce(Rule):
 
     def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._calls: dict[int, TransportCall] = {}
+        self._calls: dict[int, CallForProposals] = {}
         self._carrier: dict[int, int] = {}
         self._cells: dict[int, tuple[int, ...]] = {}
         self._served: dict[int, tuple[int, int]] = {}
@@ -116,10 +115,10 @@ class TaskOnce(Rule):
 
     def handlers(self) -> Handlers:
         """Calls and robots' words."""
-        return {TransportCall: self._on_call, StepState: self._on_state}
+        return {CallForProposals: self._on_call, StepState: self._on_state}
 
-    def _on_call(self, event: Event[TransportCall]) -> None:
-        self._calls[event.message.task] = event.message
+    def _on_call(self, event: Event[CallForProposals]) -> None:
+        self._calls[event.message.task.number] = event.message
 
     def _on_state(self, event: Event[StepState]) -> None:
         state, robot = event.message, event.message.sender
@@ -133,14 +132,14 @@ class TaskOnce(Rule):
             is_news = self._is_news(state) and not is_midway
             if first != robot:
                 self.find(event, (first, robot), f"both have task {state.task}")
-            elif call is not None and is_news and call.pickup not in cells:
-                self.find(event, (robot,), f"has task {state.task} aboard and was not in cell {call.pickup}")
+            elif call is not None and is_news and call.from_station not in cells:
+                self.find(event, (robot,), f"has task {state.task} aboard and was not in cell {call.from_station}")
         if state.served:
             before = self._served.setdefault(state.task, (robot, state.step))
             if before != (robot, state.step):
                 self.find(event, (before[0], robot), f"task {state.task} is served twice")
-            if call is not None and call.delivery not in cells:
-                self.find(event, (robot,), f"served task {state.task} and was not in cell {call.delivery}")
+            if call is not None and call.to_station not in cells:
+                self.find(event, (robot,), f"served task {state.task} and was not in cell {call.to_station}")
 
     def _is_news(self, state: StepState) -> bool:
         known = self._aboard.get(state.sender)
@@ -152,8 +151,7 @@ class TaskOnce(Rule):
 class _RoundSeen:
     """One round: bids as (time us, cost, robot) by task, and each robot's last."""
 
-    step: int
-    attempt: int
+    opened: StepRound
     bids: dict[int, list[tuple[int, int, int]]] = field(default_factory=dict)
     last: dict[int, tuple[int, int]] = field(default_factory=dict)
     is_closed: bool = False
@@ -173,38 +171,42 @@ class RoundsGoDown(Rule):
 
     def handlers(self) -> Handlers:
         """Rounds, bids and awards."""
-        return {StepRound: self._on_round, TransportBid: self._on_bid, StepAward: self._on_award}
+        return {StepRound: self._on_round, Bid: self._on_bid, StepTurn: self._on_turn, Award: self._on_award}
 
     def _on_round(self, event: Event[StepRound]) -> None:
         word = event.message
-        if self._round is None or (word.step, word.attempt) != (self._round.step, self._round.attempt):
-            self._round = _RoundSeen(word.step, word.attempt)
+        known = None if self._round is None else self._round.opened
+        if known is None or (word.step, word.attempt) != (known.step, known.attempt):
+            self._round = _RoundSeen(word)
 
-    def _on_bid(self, event: Event[TransportBid]) -> None:
-        bid, seen = event.message, self._round
-        if seen is None or bid.task == NO_TASK:
+    def _on_bid(self, event: Event[Bid]) -> None:
+        bid, seen, task = event.message, self._round, task_of(event.message)
+        if seen is None:
             return
-        if (bid.step_low, bid.attempt) != (seen.step & 0xFFFF, seen.attempt) or seen.is_closed:
-            self.find(event, (bid.sender,), f"bids for task {bid.task} in no open round")
+        if bid.itinerary_version != mark_of(seen.opened) or seen.is_closed:
+            self.find(event, (bid.sender,), f"bids for task {task} in no open round")
             return
-        before = seen.bids.setdefault(bid.task, [])
+        before = seen.bids.setdefault(task, [])
         better = [one for one in before if one[1:] < (bid.cost, bid.sender) and one[0] < event.time_us - CROSSING_US]
         if better:
-            what = f"bids {bid.cost} for task {bid.task} after node {better[0][2]} bid {better[0][1]}"
+            what = f"bids {bid.cost} for task {task} after node {better[0][2]} bid {better[0][1]}"
             self.find(event, (bid.sender, better[0][2]), what)
         before.append((event.time_us, bid.cost, bid.sender))
-        seen.last[bid.sender] = (bid.cost, bid.task)
+        seen.last[bid.sender] = (bid.cost, task)
 
-    def _on_award(self, event: Event[StepAward]) -> None:
+    def _on_turn(self, event: Event[StepTurn]) -> None:
+        if self._round is not None and event.message.step == self._round.opened.step:
+            self._round.is_closed = True
+
+    def _on_award(self, event: Event[Award]) -> None:
         award, seen = event.message, self._round
-        if seen is None or award.step != seen.step:
+        if seen is None or not is_of_step(award, seen.opened.step):
             return
         seen.is_closed = True
-        if award.task == NO_TASK:
-            return
-        rivals = [(cost, robot) for robot, (cost, task) in seen.last.items() if task == award.task]
-        if not rivals or min(rivals)[1] != award.robot:
-            self.find(event, (award.sender, award.robot), f"task {award.task} to node {award.robot}, no best bid")
+        number = award.task.number
+        rivals = [(cost, robot) for robot, (cost, task) in seen.last.items() if task == number]
+        if not rivals or min(rivals)[1] != award.winner:
+            self.find(event, (award.sender, award.winner), f"task {number} to node {award.winner}, no best bid")
 
 
 @dataclass
@@ -287,12 +289,10 @@ class PathsApart(_OnFloor):
             before = (mine, theirs)
 
 
-#: What a log of a pick-up and delivery site is judged by: the rules of every system that apply, and its own.
+#: What a log of a pick-up and delivery site is judged by: the rules of every system that apply, and its own. Calls that
+#: stand are judged round by round.
 RULES: tuple[type[Rule], ...] = (
     OneHolder,
-    CallsClosed,
-    BidsInTime,
-    BidsGoDown,
     OneACell,
     TaskOnce,
     RoundsGoDown,

@@ -10,26 +10,25 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Plain
 from onboard.core.codes import KindCode, MachineState, Reason
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Message, SyncRequest
+from onboard.core.messages import Award, Bid, Message, Reference, SyncRequest
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
 from onboard.systems.mapd.auction import Task
-from onboard.systems.mapd.bidding import Tally
+from onboard.systems.mapd.calls import award_of, call_of, mark_of, number_of, terms_of
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.messages import (
     NO_TASK,
     PathHead,
     PathMoves,
-    StepAward,
     StepRound,
     StepState,
+    StepTurn,
     TransportAnswer,
-    TransportBid,
-    TransportCall,
     TransportKey,
     TransportResult,
+    TurnRequest,
 )
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
 from onboard.systems.mapd.rights import resource_of
@@ -45,13 +44,16 @@ _LOW = 1 << 16
 
 @dataclass
 class OrderDesk(Plain):
-    """One desk. ``step`` is the next to be opened, or the one whose round is open (``tally``)."""
+    """One desk. ``step`` is the next to be opened, or the one whose round is open (``is_open``)."""
 
     kind: KindCode = KindCode.DESK
     step: int = 0
     round: StepRound | None = None
-    awards: list[StepAward] = field(default_factory=list)
-    tally: Tally | None = None
+    turns: list[StepTurn] = field(default_factory=list)
+    awards: list[Award] = field(default_factory=list)
+    is_open: bool = False
+    #: Robots without a task that asked for a turn in this round.
+    yielding: set[int] = field(default_factory=set)
     #: Tasks that were ordered and not served, by number, with the step from which on they are to be called for.
     orders: dict[int, Task] = field(default_factory=dict)
     served: set[int] = field(default_factory=set)
@@ -68,7 +70,13 @@ class OrderDesk(Plain):
         assert isinstance(site, Mapd)
         self.site = site
         self.knowledge = Knowledge(site.floor, site.robots, 0)
+        self.fleet.negotiation.is_sound = self._is_sound
         self._replay(self.fleet.entries)
+
+    def _is_sound(self, task: Reference, bid: Bid) -> bool:
+        """Whether a bid counts: a robot's, of this round, and no lower than the way from where it is."""
+        is_of_round = self.round is not None and bid.itinerary_version == mark_of(self.round)
+        return is_of_round and bid.sender in self.site.homes and self.knowledge.is_possible(bid)
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
@@ -79,12 +87,12 @@ class OrderDesk(Plain):
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Where robots are and what they carry, what they bid, and their paths: a right is given by those."""
         match message:
-            case TransportBid() if not self.knowledge.is_possible(message):
+            case Bid() if not self.knowledge.is_possible(message):
                 # Nobody is nearer than where it is.
                 self.fleet.drops[Reason.FALSE_STATEMENT] += 1
-            case TransportBid() if message.sender in self.site.homes:
-                if self.tally is not None:
-                    self.tally.hear(message)
+            case TurnRequest() if message.sender in self.site.homes and self.is_open and self.round is not None:
+                if (message.step, message.attempt) == (self.round.step, self.round.attempt):
+                    self.yielding.add(message.sender)
             case StepState():
                 self.fleet.winners.works(message.sender, message.step, now_us)
                 return self._on_state(message)
@@ -104,10 +112,10 @@ class OrderDesk(Plain):
     def advance(self, now_us: int) -> list[Effect]:
         """Close the round that is over, open the step to which all have come."""
         self.state = MachineState.WORKING if self.orders else MachineState.IDLE
-        if self.tally is not None:
+        if self.is_open:
             if self._close_us is None or now_us < self._close_us:
                 return []
-            return self._close(self.tally)
+            return self._close(now_us)
         if now_us < self._due_us:
             return []
         missing = self.knowledge.behind(self.step)
@@ -125,29 +133,29 @@ class OrderDesk(Plain):
 
     def next_wake(self) -> int | None:
         """The end of a round, the next step, or the next question."""
-        return self._close_us if self.tally is not None else self._due_us
+        return self._close_us if self.is_open else self._due_us
 
     def statements(self, now_us: int) -> list[Effect]:
         """All calls that stand or are under way, and the last round with its awards."""
         if self._told_us is not None and now_us < self._told_us + SAID_US:
             return []
         self._told_us = now_us
-        effects: list[Effect] = [self._call(task) for _, task in sorted(self.knowledge.tasks.items())]
+        effects: list[Effect] = [self._call(task, now_us) for _, task in sorted(self.knowledge.tasks.items())]
         if self.round is not None:
             effects.append(Send(self.round))
-        return effects + [Send(award) for award in self.awards]
+        return effects + [Send(word) for word in (*self.awards, *self.turns)]
 
     # --- orders ------------------------------------------------------------------------------------------------
 
     def _on_key(self, key: TransportKey) -> list[Effect]:
         if key.task in self.served:
-            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.DONE))]
-        answer = Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.RECEIVED))
+            return [Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.DONE))]
+        answer = Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.RECEIVED))
         if key.task in self.orders:
             return [answer]
         floor = self.site.floor
         if max(key.pickup, key.delivery) >= floor.size:
-            return [Actuate(TransportAnswer(self.fleet.node_id, key.task, TransportResult.REFUSED))]
+            return [Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.REFUSED))]
         release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
         task = Task(key.task, release, key.pickup, key.delivery)
         self.orders[key.task] = task
@@ -164,11 +172,15 @@ class OrderDesk(Plain):
         """A robot had it aboard and has it no more."""
         self.orders.pop(task, None)
         self.served.add(task)
-        answer = Actuate(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
+        answer = Tell(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
         return [Record(ServedRecord(task)), answer]
 
-    def _call(self, task: Task) -> Effect:
-        return Send(TransportCall(self.fleet.node_id, task.number, task.pickup, task.delivery))
+    def _call(self, task: Task, now_us: int) -> Effect:
+        """The call for a task: said again, it is the same."""
+        calls = self.knowledge.calls
+        if task.number not in calls:
+            calls[task.number] = call_of(self.fleet.node_id, task, now_us + self.site.bid_window_us)
+        return Send(calls[task.number])
 
     # --- rounds ------------------------------------------------------------------------------------------------
 
@@ -183,22 +195,33 @@ class OrderDesk(Plain):
         self._changed = False
         me, step, count = self.fleet.node_id, self.step, len(self.knowledge.open_tasks)
         self.round = StepRound(me, step, count, self._attempt, bidding)
-        self.awards = []
+        self.turns, self.awards = [], []
         self._due_us = now_us + self.site.step_us
         record = Record(RoundRecord(step, bidding, count))
         if bidding:
-            self.tally = Tally(step, self._attempt)
+            self.is_open, self.yielding = True, set()
             self._close_us = now_us + self.site.bid_window_us
+            standing = {number_of(task.number): terms_of(me, task, step) for task in self.knowledge.open_tasks}
+            self.fleet.negotiation.begin_round(standing, self._close_us)
         else:
             self.step += 1
-        return [record, *(self._call(task) for task in sorted(fresh, key=lambda one: one.number)), Send(self.round)]
+        calls = [self._call(task, now_us) for task in sorted(fresh, key=lambda one: one.number)]
+        return [record, *calls, Send(self.round)]
 
-    def _close(self, tally: Tally) -> list[Effect]:
+    def _won(self) -> dict[int, tuple[int, int]]:
+        """Task and cost of each robot whose bid is the best for a task, by robot; the cheapest where bids crossed."""
+        won: dict[int, tuple[int, int]] = {}
+        for call, (bid, robot) in self.fleet.negotiation.best_of_round().items():
+            if robot not in won or bid < won[robot][1]:
+                won[robot] = call - 1, bid
+        return won
+
+    def _close(self, now_us: int) -> list[Effect]:
         """Everybody keeps what it bid best for; those for whom that is a change are told, and plan in this order.
 
         First who lost its task or must make room, then who won, lower bids first.
         """
-        won = tally.winners()
+        won = self._won()
         changed = []
         idle = []
         for robot in self.site.robots:
@@ -208,17 +231,18 @@ class OrderDesk(Plain):
             task, bid = won.get(robot, (NO_TASK, 0))
             if task not in (NO_TASK, before):
                 changed.append((bid, robot, task))
-            elif task == NO_TASK and (before != NO_TASK or robot in tally.yielding):
+            elif task == NO_TASK and (before != NO_TASK or robot in self.yielding):
                 idle.append((robot, NO_TASK))
         order = idle + [(robot, task) for _, robot, task in sorted(changed)]
         me, step = self.fleet.node_id, self.step
-        self.awards = [
-            StepAward(me, step, index, len(order), robot, task) for index, (robot, task) in enumerate(order)
-        ] or [StepAward(me, step, 0, 0, 0, NO_TASK)]
-        self.tally = self._close_us = None
+        self.turns, self.awards = _told(me, step, order)
+        self.is_open, self._close_us = False, None
         self.step += 1
         told = " ".join(f"{robot}:{task}" for robot, task in order)
-        return [Record(AwardsRecord(step, told)), *(Send(award) for award in self.awards)]
+        effects: list[Effect] = [Record(AwardsRecord(step, told))]
+        for _, task in order:
+            effects += self.fleet.negotiation.award_in_round(number_of(task), now_us) if task != NO_TASK else []
+        return effects + [Send(turn) for turn in self.turns]
 
     # --- power-up ----------------------------------------------------------------------------------------------
 
@@ -242,11 +266,15 @@ class OrderDesk(Plain):
                     told, self.step = record, record.step + 1
         if self.round is not None and self.step > self.round.step and told is not None:
             pairs = [tuple(map(int, one.split(":"))) for one in told.changes.split()]
-            self.awards = [
-                StepAward(me, self.round.step, index, len(pairs), robot, task)
-                for index, (robot, task) in enumerate(pairs)
-            ] or [StepAward(me, self.round.step, 0, 0, 0, NO_TASK)]
+            self.turns, self.awards = _told(me, self.round.step, [(robot, task) for robot, task in pairs])
         # Tasks that were called for before are known from their release; the next round brings those of its own step.
         for number, task in self.orders.items():
             if self.round is not None and task.release <= self.round.step:
                 self.knowledge.tasks[number] = task
+
+
+def _told(desk: int, step: int, order: list[tuple[int, int]]) -> tuple[list[StepTurn], list[Award]]:
+    """What is said of a round that has brought these changes."""
+    turns = [StepTurn(desk, step, at, len(order), robot, task != NO_TASK) for at, (robot, task) in enumerate(order)]
+    awards = [award_of(desk, step, robot, task) for robot, task in order if task != NO_TASK]
+    return turns or [StepTurn(desk, step, 0, 0, 0, won=False)], awards

@@ -6,6 +6,7 @@ from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import Reason
 from onboard.core.effects import Effect
+from onboard.core.motion_authority import Permit, authorised
 from onboard.systems.mapd.cart import Cart
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.memory import served_record, step_record
@@ -76,9 +77,9 @@ class Driving:
         if body.task == task and cell == known.delivery:
             first, self.unloaded = self.unloaded != task, task
             record: list[Effect] = [served_record(task, since)] if first else []
-            return record + self.cart.order(CartAction.UNLOAD, cell, task, step, now_us)
+            return record + self.cart.order(self._permit(cell), CartAction.UNLOAD, cell, task, step, now_us)
         if body.task == NO_TASK and cell == known.pickup and self.unloaded != task:
-            return self.cart.order(CartAction.LOAD, cell, task, step, now_us)
+            return self.cart.order(self._permit(cell), CartAction.LOAD, cell, task, step, now_us)
         return None
 
     def _enter(self, to: int, step: int, now_us: int) -> list[Effect]:
@@ -86,9 +87,10 @@ class Driving:
         resource = self.site.floor.resources[to]
         key, tokens = cell_token(resource), self.fleet.tokens
         self._entering = resource
-        if tokens.holds(key):
+        permit = self._permit(to)
+        if permit:
             self._want_us = None
-            return self.cart.order(CartAction.MOVE, to, NO_TASK, step + 1, now_us)
+            return self.cart.order(permit, CartAction.MOVE, to, NO_TASK, step + 1, now_us)
         if key in tokens.wanted:
             return []
         if self._want_us is None:
@@ -97,6 +99,10 @@ class Driving:
             return []
         self._want_us = None
         return tokens.want(key, now_us)
+
+    def _permit(self, cell: int) -> Permit:
+        """To be in a cell, and to work there."""
+        return authorised(self.fleet.motion, [cell_token(self.site.floor.resources[cell])])
 
     def _is_expected(self, resource: int, step: int) -> bool:
         """Whether somebody is there by the paths until this step."""

@@ -6,32 +6,38 @@ from onboard.core.behaviour import Fleet, NoEstimator
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Machine, Site
+from onboard.systems.mapd.bidding import UnitGeneration
 from onboard.systems.mapd.desk import OrderDesk
 from onboard.systems.mapd.robot import UnitRobot
 from onboard.systems.mapd.site import Mapd
 
 
 @dataclass(frozen=True)
-class _Factory:
+class UnitRobotFactory:
+    """Makes robots."""
+
+    def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> UnitGeneration:
+        """The robot's task-generation function."""
+        if not isinstance(site, Mapd):
+            raise TypeError("a machine of a pick-up and delivery site needs one")
+        return UnitGeneration()
+
+    def behaviour(self, fleet: Fleet, estimator: Estimator) -> UnitRobot:
+        """The robot's steps; ``estimator`` is the one made above."""
+        if not isinstance(estimator, UnitGeneration):
+            raise TypeError("a robot needs its own task-generation function")
+        return UnitRobot(fleet, generation=estimator)
+
+
+@dataclass(frozen=True)
+class OrderDeskFactory:
+    """Makes the desk."""
+
     def estimator(self, site: Site, machine: Machine, mirror: Mirror) -> NoEstimator:
-        """Nothing: tasks are auctioned all together, step by step; a call for one by itself finds nobody."""
+        """A desk bids for nothing."""
         if not isinstance(site, Mapd):
             raise TypeError("a machine of a pick-up and delivery site needs one")
         return NoEstimator()
-
-
-@dataclass(frozen=True)
-class UnitRobotFactory(_Factory):
-    """Makes robots."""
-
-    def behaviour(self, fleet: Fleet, estimator: Estimator) -> UnitRobot:
-        """The robot's steps."""
-        return UnitRobot(fleet)
-
-
-@dataclass(frozen=True)
-class OrderDeskFactory(_Factory):
-    """Makes the desk."""
 
     def behaviour(self, fleet: Fleet, estimator: Estimator) -> OrderDesk:
         """The desk's steps."""

@@ -5,10 +5,12 @@ Made of frames alone, so that all have the same once all have heard all frames o
 
 from dataclasses import dataclass, field
 
+from onboard.core.messages import Bid, CallForProposals
 from onboard.core.serial import is_newer
 from onboard.systems.mapd.auction import Rule, Task
+from onboard.systems.mapd.calls import task_of
 from onboard.systems.mapd.floor import Floor
-from onboard.systems.mapd.messages import NO_TASK, PathHead, PathMoves, StepState, TransportBid, TransportCall
+from onboard.systems.mapd.messages import NO_TASK, PathHead, PathMoves, StepState
 from onboard.systems.mapd.moves import Assembly
 from onboard.systems.mapd.paths import Path, Paths
 
@@ -28,6 +30,7 @@ class Knowledge:
     me: int
     states: dict[int, StepState] = field(default_factory=dict)
     tasks: dict[int, Task] = field(default_factory=dict)
+    calls: dict[int, CallForProposals] = field(default_factory=dict)
     loads: dict[int, int] = field(default_factory=dict)
     #: Tasks that their robots stand beside with their new paths: theirs before they have come to another step.
     taken: dict[int, int] = field(default_factory=dict)
@@ -43,10 +46,12 @@ class Knowledge:
 
     # --- tasks and steps ---------------------------------------------------------------------------------------
 
-    def on_call(self, call: TransportCall) -> None:
+    def on_call(self, call: CallForProposals) -> None:
         """A task is called for, or told again."""
-        if call.task not in self.tasks and max(call.pickup, call.delivery) < self.floor.size:
-            self.tasks[call.task] = Task(call.task, 0, call.pickup, call.delivery)
+        number, cells = call.task.number, (call.from_station, call.to_station)
+        if max(cells) < self.floor.size:
+            self.tasks.setdefault(number, Task(number, 0, *cells))
+            self.calls[number] = call
 
     def on_state(self, state: StepState) -> bool:
         """A robot's word; True where it is news."""
@@ -59,13 +64,14 @@ class Knowledge:
         self.loads.pop(state.sender, None)
         if state.served:
             self.tasks.pop(state.task, None)
+            self.calls.pop(state.task, None)
         elif state.loaded:
             self.loads[state.sender] = state.task
         return True
 
-    def is_possible(self, bid: TransportBid, rule: Rule = PLAIN) -> bool:
+    def is_possible(self, bid: Bid, rule: Rule = PLAIN) -> bool:
         """Whether a bid is no lower than the way from where its robot is; of what is not known yet any is."""
-        state, task = self.states.get(bid.sender), self.tasks.get(bid.task)
+        state, task = self.states.get(bid.sender), self.tasks.get(task_of(bid))
         if state is None or task is None:
             return True
         if state.cell >= self.floor.size:

@@ -4,12 +4,11 @@ from onboard.contract.mapd import (
     CartAction,
     PathHead,
     PathMoves,
-    StepAward,
     StepRound,
     StepState,
-    TransportBid,
-    TransportCall,
+    StepTurn,
     TransportResult,
+    TurnRequest,
 )
 from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
 from onboard.systems.mapd.fields import LAST_STEP, MOST_MOVES, MOST_WAYS, MOVE_BITS, MOVES_A_FRAME, NO_TASK
@@ -26,12 +25,11 @@ __all__ = [
     "CartState",
     "PathHead",
     "PathMoves",
-    "StepAward",
     "StepRound",
     "StepState",
+    "StepTurn",
     "TransportAnswer",
-    "TransportBid",
-    "TransportCall",
     "TransportKey",
     "TransportResult",
+    "TurnRequest",
 ]

@@ -11,12 +11,14 @@ from enum import Enum
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Plain
-from onboard.core.codes import KindCode, MachineState, Reason
+from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Message, SyncRequest, TokenGrant
+from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, SyncRequest, TaskReport, TokenGrant
+from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor
 from onboard.systems.mapd.auction import Offer, Rule, cost
-from onboard.systems.mapd.bidding import Round, bid_timing
+from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
+from onboard.systems.mapd.calls import mark_of
 from onboard.systems.mapd.driving import Driving
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.memory import path_record, read_past
@@ -25,11 +27,10 @@ from onboard.systems.mapd.messages import (
     CartState,
     PathHead,
     PathMoves,
-    StepAward,
     StepRound,
     StepState,
-    TransportBid,
-    TransportCall,
+    StepTurn,
+    TurnRequest,
 )
 from onboard.systems.mapd.moves import path_frames
 from onboard.systems.mapd.paths import Path
@@ -48,20 +49,11 @@ TOKENS_SAID_US = 1_000_000
 
 
 #: What may let a robot go on; all else, such as others' heartbeats, changes nothing for it.
-_OF_INTEREST = (
-    TransportBid,
-    StepState,
-    PathMoves,
-    PathHead,
-    StepAward,
-    TransportCall,
-    StepRound,
-    TokenGrant,
-)
+_OF_INTEREST = (Bid, StepState, PathMoves, PathHead, StepTurn, Award, CallForProposals, StepRound, TokenGrant)
 
 
 #: What only the desk says.
-_OF_DESK = (StepAward, TransportCall, StepRound)
+_OF_DESK = (StepTurn, Award, CallForProposals, StepRound)
 
 
 class Phase(Enum):
@@ -80,6 +72,7 @@ class UnitRobot(Plain):
     kind: KindCode = KindCode.VEHICLE
     state: MachineState = MachineState.STARTING
     rule: Rule = field(default_factory=Rule)
+    generation: UnitGeneration = field(default_factory=UnitGeneration)
     phase: Phase = Phase.GATHER
     step: int = 0
     task: int = NO_TASK
@@ -89,7 +82,7 @@ class UnitRobot(Plain):
     failures: int = 0
     _bids: Round | None = None
     #: Bids of this step, also those that came before all that is needed to bid oneself.
-    _heard_bids: list[TransportBid] = field(default_factory=list)
+    _heard_bids: list[Bid] = field(default_factory=list)
     _head: PathHead | None = None
     _said: StepState | None = None
     _ask_us: int | None = None
@@ -107,7 +100,10 @@ class UnitRobot(Plain):
         self.driving = Driving(self.fleet, site, self.knowledge)
         self.turns = Turns(0)
         self._home = site.homes[self.fleet.node_id]
-        self._timing = bid_timing(site.timing, site.bid_window_us)
+        dealing = self.fleet.negotiation
+        dealing.timing, dealing.slot = bid_timing(site.timing, site.bid_window_us), ANY_TIME
+        dealing.stands = lambda call: call.sender == site.desk
+        dealing.is_sound = self._is_sound
 
     # --- the Behaviour -----------------------------------------------------------------------------------------
 
@@ -130,19 +126,27 @@ class UnitRobot(Plain):
             self.fleet.drops[Reason.NOT_AUTHORISED] += 1
             return []
         match message:
-            case TransportBid() if not self.knowledge.is_possible(message, self.rule):
+            case Bid() if not self.knowledge.is_possible(message, self.rule):
                 self.fleet.drops[Reason.FALSE_STATEMENT] += 1
-            case TransportBid() if message.sender in self.site.homes:
+            case Bid() if message.sender in self.site.homes:
                 self._heard_bids.append(message)
-                if self._bids is not None:
+                if self._bids is not None and self._is_of_round(message):
                     self._bids.hear(message)
             case StepState():
                 self.knowledge.on_state(message)
             case PathMoves() | PathHead():
                 self._on_path(message)
-            case StepAward():
+            case StepTurn() | Award() | CallForProposals() | StepRound():
+                return self._on_desk(message)
+        return []
+
+    def _on_desk(self, message: StepTurn | Award | CallForProposals | StepRound) -> list[Effect]:
+        match message:
+            case StepTurn():
                 self.turns.hear(message)
-            case TransportCall():
+            case Award() if self.turns.on_award(message) and message.winner == self.fleet.node_id:
+                return [Send(TaskReport(message.winner, message.task, TaskPhase.AWARDED, 0, Reason.NONE))]
+            case CallForProposals():
                 self.knowledge.on_call(message)
             case StepRound():
                 self._on_round(message)
@@ -156,7 +160,14 @@ class UnitRobot(Plain):
     def _on_round(self, message: StepRound) -> None:
         if message.step == self.step and message != self.round:
             self.round, self._bids = message, None
-            self._heard_bids = [bid for bid in self._heard_bids if bid.attempt == message.attempt]
+            self._heard_bids = [bid for bid in self._heard_bids if self._is_of_round(bid)]
+
+    def _is_of_round(self, bid: Bid) -> bool:
+        return self.round is not None and bid.itinerary_version == mark_of(self.round)
+
+    def _is_sound(self, task: Reference, bid: Bid) -> bool:
+        """Whether the core is to count a bid: of this round, and from somebody who may be so near."""
+        return self._is_of_round(bid) and self.knowledge.is_possible(bid, self.rule)
 
     def may_grant(self, key: TokenKey, requester: int, now_us: int) -> Reason:
         """A cell that it is not in goes to whoever is there first by everybody's paths."""
@@ -178,8 +189,6 @@ class UnitRobot(Plain):
     def next_wake(self) -> int | None:
         """When a bid, a question or an order to the body is due."""
         times = [self._ask_us, self.driving.next_wake()]
-        if self.phase is Phase.BID and self._bids is not None:
-            times.append(self._bids.due_us())
         return min((time for time in times if time is not None), default=None)
 
     def statements(self, now_us: int) -> list[Effect]:
@@ -263,15 +272,27 @@ class UnitRobot(Plain):
         assert self.round is not None
         effects: list[Effect] = []
         if self._bids is None:
-            self._bids = Round(self.fleet.node_id, self.step, self.round.attempt, now_us, self._timing, self._wishes())
+            wishes = self._wishes()
+            self.generation.costs, self.generation.mark = {task: bid for bid, task in wishes}, mark_of(self.round)
+            self.fleet.negotiation.leave_round(self.site.desk)
+            self._bids = Round(self.fleet.node_id, now_us, wishes)
             for heard in self._heard_bids:
                 self._bids.hear(heard)
             if self._must_yield():
-                wish = TransportBid(self.fleet.node_id, self.step & 0xFFFF, self.round.attempt, NO_TASK, 0)
-                effects.append(Send(wish))
+                effects.append(Send(TurnRequest(self.fleet.node_id, self.step, self.round.attempt)))
             self._ask_us = now_us + self.site.bid_window_us + ASK_US
-        effects += [Send(bid) for bid in self._bids.speak(now_us)]
+        self._look(self._bids, now_us)
         return effects + self._ask([self.site.desk], now_us)
+
+    def _look(self, bids: Round, now_us: int) -> None:
+        """Take part in the call for the task that is cheapest among those for which nobody is better."""
+        wish = bids.wish
+        call = None if wish is None else self.knowledge.calls.get(wish)
+        if call is None or wish is None or wish == bids.looked_at:
+            return
+        bids.looked_at = wish
+        until_us = bids.begun_us + self.site.bid_window_us
+        self.fleet.negotiation.look(call, (bids.begun_us, until_us), bids.bids.get(wish, ()), now_us)
 
     def take_turns(self, now_us: int) -> list[Effect]:
         """Wait for the paths of those before me, plan if it is my turn, wait for those after me."""

@@ -1,14 +1,14 @@
 """The pick-up and delivery site's plan: its floor, robots from cell to cell along their paths, tasks that wait.
 
-Its calls are not those of the other systems: each stands until somebody has picked its task up, so tasks, bids and
-awards are told to the view from here.
+Its calls stand until somebody has picked their tasks up, and are awarded again and again until then: who has which task
+is told to the view from here.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Operation
-from onboard.core.messages import Message, Reference
+from onboard.core.codes import CallResult
+from onboard.core.messages import Award, CallForProposals, Message, Reference
 from onboard.systems.mapd.messages import (
     MOVE_BITS,
     MOVES_A_FRAME,
@@ -16,10 +16,8 @@ from onboard.systems.mapd.messages import (
     CartState,
     PathHead,
     PathMoves,
-    StepAward,
     StepState,
-    TransportBid,
-    TransportCall,
+    StepTurn,
 )
 from onboard.systems.mapd.site import FREE, Mapd
 from onboard.trace.scene.arrange import arrange
@@ -56,7 +54,7 @@ class MapdScene:
         self.words = view.words
         self._spots = _spots(site)
         self._robots = {node: _Robot(cell, bound_for=cell) for node, cell in site.homes.items()}
-        self._tasks: dict[int, TransportCall] = {}
+        self._tasks: dict[int, CallForProposals] = {}
         for robot in self._robots.values():
             robot.path = still(self._spots[robot.cell])
 
@@ -87,12 +85,12 @@ class MapdScene:
         """As in the port."""
         robot = self._robots.get(message.sender)
         match message:
-            case TransportCall():
+            case CallForProposals():
                 self._on_call(message, time_us)
-            case TransportBid() if message.task != NO_TASK:
-                self.view.bids += 1
-            case StepAward() if message.robot in self._robots:
-                self._on_award(message, time_us)
+            case StepTurn(won=False) if message.robot in self._robots:
+                self._on_change(message.robot, NO_TASK, time_us)
+            case Award(result=CallResult.AWARDED) if message.winner in self._robots:
+                self._on_change(message.winner, message.task.number, time_us)
             case PathHead() if robot is not None:
                 robot.head, robot.parts = message, {}
             case PathMoves() if robot is not None and robot.head is not None:
@@ -101,28 +99,28 @@ class MapdScene:
             case StepState() if robot is not None:
                 self._on_state(robot, message, time_us)
 
-    def _on_call(self, call: TransportCall, time_us: int) -> None:
-        if call.task in self._tasks:
+    def _on_call(self, call: CallForProposals, time_us: int) -> None:
+        if call.task.number in self._tasks:
             return
-        self._tasks[call.task] = call
+        self._tasks[call.task.number] = call
         if len(self._tasks) > MOST_TASKS:
             del self._tasks[next(iter(self._tasks))]
-        self.view.calls_opened += 1
-        if self.view.history.tasks.open(self._reference(call.task), Operation.TRANSPORT, time_us):
-            ways = f"from {self.words.place(call.pickup)} to {self.words.place(call.delivery)}"
-            self.view.say(time_us, f"{self.view.name(call.sender)} calls: {self._thing(call.task)}, {ways}")
+        ways = f"from {self.words.place(call.from_station)} to {self.words.place(call.to_station)}"
+        self.view.say(time_us, f"{self._thing(call.task.number)}: {ways}")
 
-    def _on_award(self, award: StepAward, time_us: int) -> None:
+    def _on_change(self, node: int, task: int, time_us: int) -> None:
         """What a robot had and has not picked up is anybody's again, unless another has won it in the same round."""
-        robot, name = self._robots[award.robot], self.view.name(award.robot)
-        if robot.won not in (NO_TASK, award.task) and not (robot.loaded and robot.task == robot.won):
+        robot = self._robots[node]
+        if robot.won == task:
+            return
+        if robot.won != NO_TASK and not (robot.loaded and robot.task == robot.won):
             before = self.view.tasks.get(self._reference(robot.won))
-            if before is not None and before.is_waiting and before.owner == award.robot:
+            if before is not None and before.is_waiting and before.owner == node:
                 self.view.history.tasks.own(self._reference(robot.won), 0)
-        robot.won = award.task
-        if award.task != NO_TASK:
-            self.view.history.tasks.own(self._reference(award.task), award.robot)
-            self.view.say(time_us, f"{name} wins {self._thing(award.task)}")
+        robot.won = task
+        if task != NO_TASK:
+            self.view.history.tasks.own(self._reference(task), node)
+            self.view.say(time_us, f"{self.view.name(node)} wins {self._thing(task)}")
 
     def _on_state(self, robot: _Robot, state: StepState, time_us: int) -> None:
         if state.cell not in self._spots:
@@ -185,8 +183,8 @@ class MapdScene:
         things: list[Json] = []
         for number, call in self._tasks.items():
             record = self.view.tasks.get(self._reference(number))
-            if record is not None and record.is_waiting and number not in aboard and call.pickup in self._spots:
-                x, y = self._spots[call.pickup]
+            if record is not None and record.is_waiting and number not in aboard and call.from_station in self._spots:
+                x, y = self._spots[call.from_station]
                 things.append({"kind": "part", "name": str(number), "at": [round(x, 1), round(y, 1)]})
         return {"marks": {}, "things": things}
 
@@ -200,7 +198,7 @@ class MapdScene:
         call = self._tasks.get(task)
         if call is None:
             return "long called"
-        return f"from {self.words.place(call.pickup)} to {self.words.place(call.delivery)}"
+        return f"from {self.words.place(call.from_station)} to {self.words.place(call.to_station)}"
 
 
 def _spots(site: Mapd) -> dict[int, Spot]:

@@ -1,11 +1,12 @@
 """What the machines of a pick-up and delivery site know beforehand."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 from onboard.core.codes import KindCode
-from onboard.core.site import Site
+from onboard.core.site import Needs, Site
 from onboard.systems.mapd.auction import Task
 from onboard.systems.mapd.floor import FAR, FREE, Floor, Line, grid_floor, lasting_rests, network_floor
 from onboard.systems.mapd.rights import cell_station
@@ -34,6 +35,7 @@ class Mapd(Site):
 
     system: ClassVar[str] = "mapd"
     demand: ClassVar[frozenset[str]] = frozenset({"tasks"})
+    moved_by: ClassVar[Mapping[str, Needs]] = {"CartOrder": Needs.RIGHT}
     no_hold: ClassVar[str] = "these robots move in step, and one that is held would hold all"
 
     rows: tuple[str, ...] = ()

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from onboard.core.effects import Effect
+from onboard.core.motion_authority import Permit
 from onboard.systems.terminal.messages import (
     Action,
     HandlerMode,
@@ -20,7 +21,10 @@ REPEAT_US = 500_000
 
 @dataclass
 class Body:
-    """One vehicle's devices. ``move`` and ``handler`` are what they said last, None before they spoke."""
+    """One vehicle's devices. ``move`` and ``handler`` are what they said last, None before they spoke.
+
+    What was ordered is said again only as far as what permitted it still does.
+    """
 
     node_id: int
     move: MoveState | None = None
@@ -83,20 +87,20 @@ class Body:
             elif self.gear.is_obeyed(message.sequence) and message.gear is not HandlerMode.WORKING:
                 self.gear.rest()
 
-    def go(self, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
-        """Order one slot."""
+    def go(self, permit: Permit, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
+        """Order one slot, as far as that is permitted."""
         assert self.move is not None
-        self.crossing = (entity, towards)
-        return self.drive.order((entity, slot, towards), now_us)
+        self.crossing = (entity, towards) if permit else self.crossing
+        return self.drive.order((entity, slot, towards), permit, now_us)
 
     def towards(self) -> int:
         """For which entity the one in hand is being crossed, as ordered; 0 for none, or for not known."""
         return self.crossing[1] if self.move is not None and self.crossing[0] == self.move.entity else 0
 
-    def handle(self, action: Action, box: int, now_us: int) -> list[Effect]:
-        """Order one action at a station."""
+    def handle(self, permit: Permit, action: Action, box: int, now_us: int) -> list[Effect]:
+        """Order one action at a station, as far as that is permitted."""
         assert self.handler is not None
-        return self.gear.order((action, box), now_us)
+        return self.gear.order((action, box), permit, now_us)
 
     def repeat(self, now_us: int) -> list[Effect]:
         """Say pending orders again where they are due."""

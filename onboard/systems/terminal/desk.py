@@ -20,7 +20,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
+from onboard.core.effects import Effect, Halt, Record, Report, Send, Tell
 from onboard.core.messages import (
     CallForProposals,
     CarAt,
@@ -254,8 +254,8 @@ class Desk:
         order = self.orders.key(key)
         is_taken = self.orders.answer(key)
         if order is None:
-            return [] if is_taken is None else [Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
-        taken = Actuate(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True))
+            return [] if is_taken is None else [Tell(MissionAnswer(self.fleet.node_id, key.mission, is_taken))]
+        taken = Tell(MissionAnswer(self.fleet.node_id, key.mission, is_taken=True))
         return [*self._ranked(order.urgent, now_us), taken]
 
     def _ordered(self, wanted: BoxOrder, now_us: int) -> list[Effect]:

@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 
 from onboard.core.codes import KindCode
 from onboard.core.messages import Reference
-from onboard.core.site import Site
+from onboard.core.site import Needs, Site
 
 
 class EntityKind(Enum):
@@ -110,6 +110,7 @@ class Terminal(Site):
 
     system: ClassVar[str] = "terminal"
     demand: ClassVar[frozenset[str]] = frozenset({"missions", "blockages", "presses"})
+    moved_by: ClassVar[Mapping[str, Needs]] = {"MoveOrder": Needs.PLACE, "HandlerOrder": Needs.RIGHT}
 
     entities: Mapping[int, Entity] = field(default_factory=dict)
     boxes: tuple[Box, ...] = ()

@@ -13,7 +13,7 @@ from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, Task
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
-from onboard.core.motion_authority import MotionState, authorised
+from onboard.core.motion_authority import Permit, authorised
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.terminal.body import Body
@@ -238,7 +238,7 @@ class Vehicle:
         if here.kind is EntityKind.LANE and move.slot < here.capacity:
             return self._enter(move.entity, move.slot + 1, following, now_us)
         if here.kind is EntityKind.AREA and self.body.towards() != following:
-            return self.body.go(move.entity, move.slot, following, now_us)
+            return self.body.go(self._permit(move.entity, move.slot), move.entity, move.slot, following, now_us)
         if following in self.mirror.traffic.blocked:
             return []
         onward = steps[current + 2].entity if current + 2 < len(steps) else 0
@@ -247,14 +247,16 @@ class Vehicle:
 
     def _enter(self, entity: int, slot: int, towards: int, now_us: int) -> list[Effect]:
         """Ask for the right to a slot and go there once it is held and the slot in hand is crossed."""
-        key = segment_token(Segment(entity, slot))
-        if self.site.entities[entity].kind is not EntityKind.AREA:
-            allowed = authorised(
-                MotionState(self.fleet.tokens, self.body.is_known, stopped=False), Segment(entity, slot)
-            )
-            if not allowed[0]:
-                return self.fleet.tokens.want(key, now_us)
-        return self.body.go(entity, slot, towards, now_us) if self.body.stands_ready else []
+        permit = self._permit(entity, slot)
+        if not permit:
+            return [effect for key in permit.rights for effect in self.fleet.tokens.want(key, now_us)]
+        return self.body.go(permit, entity, slot, towards, now_us) if self.body.stands_ready else []
+
+    def _permit(self, entity: int, slot: int, *also: TokenKey) -> Permit:
+        """To be in a slot: of an area nobody holds a right, its vehicles keep clear of each other there."""
+        is_open = self.site.entities[entity].kind is EntityKind.AREA
+        rights = [] if is_open else [segment_token(Segment(entity, slot))]
+        return authorised(self.fleet.motion, [*rights, *also])
 
     def _give_back(self, now_us: int) -> list[Effect]:
         """Rights to slots behind me, and to slots that my plan does not lead to any more, go back to their stewards."""
@@ -298,7 +300,10 @@ class Vehicle:
             self._retry_at_us = now_us + RETRY_US
             return [Send(self.planner.report(owned, owned.current, now_us, StepResult.FAILED))]
         self._may_retry = False
-        return self.body.handle(action, box, now_us)
+        move = self.body.move
+        assert move is not None
+        of_box = [self._box_token(box)] if box else []
+        return self.body.handle(self._permit(move.entity, move.slot, *of_box), action, box, now_us)
 
     def _dock(self, owned: Owned, now_us: int) -> list[Effect]:
         assert self.body.handler is not None

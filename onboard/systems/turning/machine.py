@@ -5,10 +5,11 @@ from dataclasses import dataclass, field
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
-from onboard.core.effects import Actuate, Effect, Record, Send
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord, records_in
 from onboard.core.messages import Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.site import Machine, Site
 from onboard.systems.turning.generation import LatheGeneration
@@ -208,7 +209,11 @@ class LatheMachine:
         """The next part; an edge that would not last for it is changed before, by what its sensor says."""
         left_min = self.generation.state.left_min
         worn = {tool.number for tool in process.tools if left_min(tool) < process.wear_min[tool.number]}
-        return self.link.order((LatheAction.MAKE, 0, sum(1 << number - 1 for number in worn)), now_us)
+        edges = sum(1 << number - 1 for number in worn)
+        return self.link.order((LatheAction.MAKE, 0, edges), self._permit(), now_us)
+
+    def _permit(self) -> Permit:
+        return authorised(self.fleet.motion, ALONE)
 
     def _load(self, one: Batch, process: Process, now_us: int) -> list[Effect]:
         """The program to the control, until the control names it."""
@@ -218,11 +223,11 @@ class LatheMachine:
             if self._program_again_us is not None and self._program_again_us > now_us:
                 return []
             self._program_again_us = now_us + AGAIN_US
-            return [Actuate(message) for message in text_frames(self.fleet.node_id, number, process.program)]
+            return [Tell(message) for message in text_frames(self.fleet.node_id, number, process.program)]
         one.stage = Stage.SETTING
         self._program_again_us = None
         chuck = self.generation.lathe.chucks.index(process.clamping.chuck)
-        return [_stage_record(one), *self.link.order((LatheAction.SET_UP, chuck, 0), now_us)]
+        return [_stage_record(one), *self.link.order((LatheAction.SET_UP, chuck, 0), self._permit(), now_us)]
 
     def _set_up(self, one: Batch, process: Process, now_us: int) -> list[Effect]:
         """The control has obeyed and is ready again: it is set up."""

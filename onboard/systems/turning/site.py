@@ -1,11 +1,12 @@
 """What the machines of a turning cell know beforehand."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
 from onboard.core.codes import KindCode
-from onboard.core.site import Site
+from onboard.core.site import Needs, Site
 from onboard.systems.turning.drawing import At, Drawing, Element, element_fault
 from onboard.systems.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work
 
@@ -39,6 +40,7 @@ class Turning(Site):
 
     system: ClassVar[str] = "turning"
     demand: ClassVar[frozenset[str]] = frozenset({"orders"})
+    moved_by: ClassVar[Mapping[str, Needs]] = {"LatheOrder": Needs.ALONE}
 
     lathes: dict[int, Lathe]
     drawings: dict[int, Drawing]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
-from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send
+from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send, Tell
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.messages import CallForProposals
@@ -196,7 +196,7 @@ class Driver:
             case Send(message):
                 for frame in self._codecs.fleet.encode(message):
                     yield Sent(self._now_us + self._origin_us, True, frame)
-            case Actuate(message):
+            case Actuate(message) | Tell(message):
                 for frame in self._codecs.device.encode(message):
                     yield Sent(self._now_us + self._origin_us, False, frame)
             case Record():

@@ -1,0 +1,67 @@
+"""Tasks as calls of the core: each stands until a robot has it aboard, and is open for bids in each round."""
+
+from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
+from onboard.core.messages import Award, Bid, CallForProposals, Reference
+from onboard.core.negotiation import CallTerms
+from onboard.core.serial import to_bus_ms
+from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.messages import StepRound
+
+#: Bits of a round in a bid, and of a step in an award (dbc/fleet.dbc: itinerary_version, task_version).
+_ROUND, _STEP = 0xFF, 0x7F
+#: Rounds of one step that is opened again differ by this (dbc/mapd.dbc).
+_ATTEMPT = 61
+
+
+def terms_of(desk: int, task: Task, step: int) -> CallTerms:
+    """What the desk asks for in a round; stations are cells, and the award names the step."""
+    name = Reference(desk, task.number)
+    return CallTerms(
+        name, Operation.TRANSPORT, KindCode.VEHICLE, Criterion.LENGTH, task.pickup, task.delivery, name, 0, step & _STEP
+    )
+
+
+def call_of(desk: int, task: Task, until_us: int) -> CallForProposals:
+    """The call that stands; its deadline is that of the round in which it is said."""
+    terms = terms_of(desk, task, 0)
+    return CallForProposals(
+        desk,
+        number_of(task.number),
+        terms.task,
+        terms.operation,
+        terms.kind,
+        terms.criterion,
+        1,
+        0,
+        to_bus_ms(until_us),
+        terms.from_station,
+        terms.to_station,
+        terms.car,
+        terms.wheelbase_mm,
+    )
+
+
+def award_of(desk: int, step: int, robot: int, task: int) -> Award:
+    """An award as it was said, after a restart of the desk."""
+    name = Reference(desk, task)
+    return Award(desk, number_of(task), robot, name, step & _STEP, CallResult.AWARDED, Reason.NONE)
+
+
+def is_of_step(award: Award, step: int) -> bool:
+    """Whether an award was made in the round of a step."""
+    return award.result is CallResult.AWARDED and award.task_version == step & _STEP
+
+
+def number_of(task: int) -> int:
+    """The number of the call for a task; that of no call is 0."""
+    return task + 1
+
+
+def task_of(bid: Bid) -> int:
+    """The task of a bid."""
+    return bid.call - 1
+
+
+def mark_of(opened: StepRound) -> int:
+    """How bids name a round."""
+    return opened.step + _ATTEMPT * opened.attempt & _ROUND

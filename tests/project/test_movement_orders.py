@@ -1,0 +1,51 @@
+"""One place makes the orders by which something moves, and what controllers say to devices is known to move or not."""
+
+import ast
+import re
+
+import pytest
+
+from onboard.core.site import Site
+from onboard.systems.registry import part, system_names
+from tests.project.rows import ROOT
+
+#: Where each of these is made, and nowhere else in the product: an order, what permits it, and what that looks at.
+MADE_IN = {
+    "Actuate": "onboard/core/motion_authority.py",
+    "Permit": "onboard/core/motion_authority.py",
+    "MotionAuthority": "onboard/core/behaviour.py",
+}
+#: What controllers say to devices by which nothing moves: words to people, and a program that is loaded.
+STILL = {
+    *("LightOrder", "DeskOrder", "OrderAnswer", "VisitAnswer", "MissionAnswer", "JobAnswer", "TransportAnswer"),
+    *("ProgramText", "ProgramEnd"),
+}
+
+
+@pytest.mark.parametrize("name", MADE_IN)
+def test_one_place_makes_it(name: str) -> None:
+    makers = {
+        str(path.relative_to(ROOT))
+        for folder in ("onboard", "bus_sim", "hil", "deploy")
+        for path in (ROOT / folder).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and _called(node.func) == name
+    }
+    assert makers == {MADE_IN[name]}
+
+
+def _called(function: ast.expr) -> str:
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+
+
+def test_what_a_controller_says_to_its_devices_moves_something_or_is_known_not_to() -> None:
+    said = {
+        name
+        for path in sorted((ROOT / "dbc").glob("*.dbc"))
+        for name in re.findall(r"^BO_ \d+ (\w+): \d Controller$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    modules = {module.__name__ for name in system_names() if (module := part(name, "site")) is not None}
+    sites = [one for one in Site.__subclasses__() if one.__module__ in modules]
+    moving = {name for site in sites for name in site.moved_by}
+    assert len(sites) == len(system_names()) and all(site.moved_by for site in sites)
+    assert said == moving | STILL and not moving & STILL
