@@ -1,4 +1,4 @@
-# Two commands do everything: `make run` and `make test`. Each sets itself up in .venv first; no root is needed.
+# Two commands do everything: `make run` and `make test`; `make check` is the quick half of the second. Each sets itself up in .venv first; no root is needed.
 # `make help` lists the rest.
 
 VENV := .venv
@@ -13,7 +13,7 @@ ARGS ?=
 PYTEST_ARGS ?=
 export REQUIRE
 
-.PHONY: help run test coverage lint format models mutants bench docs clean
+.PHONY: help run check test coverage lint format models mutants bench docs clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-7s %s\n", $$1, $$2 }' Makefile
@@ -21,6 +21,10 @@ help: ## this list
 
 run: $(VENV)/.run ## set up, then show an hour of a real day on the standard site in about a minute
 	@$(BIN)/bus-sim run $(ARGS)
+
+check: lint ## set up, lint and types, then the quick tests: under a minute on two quiet processors, no test above a second
+	@quick=$$($(BIN)/python -m tests.quick) && \
+		$(BIN)/python -m pytest --numprocesses 2 -p tests.quick $(PYTEST_ARGS) $$quick
 
 test: lint ## set up, lint, then all tests on all processors; REQUIRE=all makes a skipped test a failure
 	$(BIN)/python -m pytest --numprocesses auto $(PYTEST_ARGS)

@@ -8,14 +8,17 @@ import sys
 import tempfile
 from pathlib import Path
 
+from bus_sim.options import RunOptions
+from bus_sim.session import run_site
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import DayOptions, run_day
+from bus_sim.systems.car_park.day import Day
 from bus_sim.systems.car_park.summary import RunSummary
 
 
-def row(name: str, site: str, options: DayOptions) -> RunSummary:
+def row(name: str, site: str, options: RunOptions) -> RunSummary:
     """Play and print one row; the hour of a window is measured without its warm-up."""
-    summary = run_day(find_site(site), options)
+    summary = run_site(find_site(site), options)
+    assert isinstance(summary, RunSummary)
     wall_s, simulated_s, frames = summary.wall_s, summary.simulated_s, summary.frames
     served = f"{summary.cars_in}/{summary.cars_out}"
     speed = f"{simulated_s / wall_s:,.0f}"
@@ -29,14 +32,14 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         trace = Path(folder) / "trace.log"
-        row("level1, its real day, no log", "level1", DayOptions(quiet=True))
-        row("level1, all buses logged", "level1", DayOptions(trace=trace, devices=True, quiet=True))
-        row("standard, the real day, no log", "standard", DayOptions(quiet=True))
-        row("standard, all buses logged", "standard", DayOptions(trace=trace, devices=True, quiet=True))
-        row("standard, its busiest hour, no log", "standard", DayOptions(window="busiest", quiet=True))
+        row("level1, its real day, no log", "level1", RunOptions(demand=Day(), quiet=True))
+        row("level1, all buses logged", "level1", RunOptions(demand=Day(), trace=trace, devices=True, quiet=True))
+        row("standard, the real day, no log", "standard", RunOptions(demand=Day(), quiet=True))
+        row("standard, all buses logged", "standard", RunOptions(demand=Day(), trace=trace, devices=True, quiet=True))
+        row("standard, its busiest hour, no log", "standard", RunOptions(demand=Day(window="busiest"), quiet=True))
         if len(sys.argv) == 3:
             sessions, day = Path(sys.argv[1]), sys.argv[2]
-            row(f"standard, {day}, no log", "standard", DayOptions(sessions=sessions, day=day, quiet=True))
+            row(f"standard, {day}, no log", "standard", RunOptions(demand=Day(sessions=sessions, day=day), quiet=True))
 
 
 if __name__ == "__main__":

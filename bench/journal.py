@@ -14,9 +14,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bus_sim.campaign.trial import STEP_US
-from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.run import RunOptions, run_until
+from bus_sim.faults.scenario import Scenario
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.authority import car_token

@@ -12,10 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from bus_sim.baselines import session_lock
-from bus_sim.demand import Demand
-from bus_sim.run import RunOptions, Simulation, build, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.baselines import session_lock
+from bus_sim.systems.car_park.demand import Demand
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.behaviour import BehaviourFactory
 from onboard.core.codes import CallResult, KindCode

@@ -12,14 +12,14 @@ import time
 from importlib.resources import as_file, files
 from itertools import pairwise
 
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
+from bus_sim.options import RunOptions
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.run import play_day
 from bus_sim.systems.mapd.steps import Day
-from bus_sim.systems.registry import SystemOptions
 from onboard.config.site import parse_site
 from onboard.systems.mapd.messages import StepRound
 from onboard.systems.mapd.site import Mapd
@@ -62,7 +62,7 @@ def _alone(site: Mapd) -> tuple[float, int, int, str]:
 
 def _on_the_bus(site: Mapd) -> tuple[float, int, int, str]:
     """Besides: frames, their share of the bus's time, the longest step, and whether the day alone was the same."""
-    played = play_day(site, SystemOptions(quiet=True))
+    played = play_day(site, RunOptions(quiet=True))
     plant = played.plant
     assert isinstance(plant, UnitPlant)
     assert played.is_good, plant.violations

@@ -18,9 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from bus_sim.baselines.contract_net import ContractNetInitiator, ContractNetParticipant
 from bus_sim.can.medium import Medium
 from bus_sim.can.node import NodeOptions, SimulatedBus
+from bus_sim.systems.car_park.baselines.contract_net import ContractNetInitiator, ContractNetParticipant
 from bus_sim.virtual_time import VirtualTimeLoop, run
 from onboard.config.site import parse_site
 from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Side

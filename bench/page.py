@@ -24,10 +24,11 @@ from pathlib import Path
 
 from websockets.sync.client import connect
 
-from bus_sim.demand import Demand
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.page import CarParkSource
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.systems.contract import codecs_for
 from onboard.trace.readers.open_log import Log

@@ -12,8 +12,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from bus_sim.response import Measured, measure
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.response import Measured, measure
 from onboard.systems.car_park.traffic import operation
 from onboard.trace.response import utilisation
 

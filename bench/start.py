@@ -4,8 +4,9 @@
 
 Each run is a new process with an empty journal; the bus is served over loopback in the socketcand protocol by this one.
 Wall time counts from just before the process is made to the arrival of the heartbeat; memory is the process's highest
-resident set by then (``VmHWM`` of proc(5), so Linux only). One run that is not counted fills the caches. For comparison
-the table begins with an interpreter that does nothing but say that it runs, alone and with each library imported.
+resident set by then (``VmHWM`` of proc(5), so Linux only), and its proportional set. One run that is not counted fills
+the caches. For comparison the table begins with an interpreter that does nothing but say that it runs, alone and with
+each library imported.
 """
 
 import argparse
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bus_sim.serve.socketcand import SocketcandServer
+from deploy.archive import build_archive
 from onboard.core.frame import Frame
 from onboard.ports.bus import BusHealth, FrameHandler
 from onboard.wire.codec import fleet_codec
@@ -45,10 +47,11 @@ port = {port}
 
 
 class Start(NamedTuple):
-    """One start: wall seconds, and MB (2**20 bytes) of the highest resident set."""
+    """One start: wall seconds, and MB (2**20 bytes): highest resident set, and proportional set (PSS) at its end."""
 
     wall_s: float
     peak_mb: float
+    pss_mb: float
 
 
 class Ear:
@@ -76,8 +79,8 @@ class Ear:
         """A client leaves."""
 
 
-async def start_onboard(interface: str) -> Start:
-    """Start one controller and wait for its first heartbeat."""
+async def start_onboard(interface: str, *program: str) -> Start:
+    """Start one controller, as ``program`` where one is named, and wait for its first heartbeat."""
     ear = Ear()
     server = SocketcandServer(lambda _channel, _name: ear, lambda time_us: time_us, port=0)
     port = await server.start()
@@ -86,17 +89,17 @@ async def start_onboard(interface: str) -> Start:
         machine = Path(folder) / "mr1.toml"
         machine.write_text(MACHINE.format(site=site, interface=interface, port=port), encoding="utf-8")
         begun_s = time.perf_counter()
-        process = await _python("-m", "onboard", "--machine", str(machine))
+        process = await _python(*(program or ("-m", "onboard")), "--machine", str(machine))
         try:
             async with asyncio.timeout(DEADLINE_S):
                 heard_s = await ear.heard
-            peak_mb = _peak_mb(process.pid)
+            peak_mb, pss_mb = _memory_mb(process.pid)
         finally:
             if process.returncode is None:
                 process.terminate()
             await process.communicate()
             await server.close()
-    return Start(heard_s - begun_s, peak_mb)
+    return Start(heard_s - begun_s, peak_mb, pss_mb)
 
 
 async def start_script(script: str) -> Start:
@@ -106,9 +109,9 @@ async def start_script(script: str) -> Start:
     assert process.stdout is not None
     await process.stdout.readline()
     heard_s = time.perf_counter()
-    peak_mb = _peak_mb(process.pid)
+    peak_mb, pss_mb = _memory_mb(process.pid)
     await process.communicate(b"\n")
-    return Start(heard_s - begun_s, peak_mb)
+    return Start(heard_s - begun_s, peak_mb, pss_mb)
 
 
 async def _python(*words: str) -> asyncio.subprocess.Process:
@@ -119,19 +122,22 @@ async def _python(*words: str) -> asyncio.subprocess.Process:
     )
 
 
-def _peak_mb(pid: int) -> float:
+def _memory_mb(pid: int) -> tuple[float, float]:
+    """Highest resident set, and what the process takes now with its share of what others use too."""
     status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    match = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.MULTILINE)
-    if match is None:
+    rollup = Path(f"/proc/{pid}/smaps_rollup").read_text(encoding="ascii", errors="replace")
+    peak = re.search(r"^VmHWM:\s+(\d+) kB$", status, re.MULTILINE)
+    pss = re.search(r"^Pss:\s+(\d+) kB$", rollup, re.MULTILINE)
+    if peak is None or pss is None:
         raise RuntimeError(f"process {pid} has ended before it was measured")
-    return int(match[1]) / 1024
+    return int(peak[1]) / 1024, int(pss[1]) / 1024
 
 
 async def measure(runs: int) -> None:
     """Print the table."""
     print(f"median of {runs} runs, worst in brackets; aims {AIM_S} s and {AIM_MB:.0f} MB")
-    print("| process | wall s | peak MB |")
-    print("|---|---|---|")
+    print("| process | wall s | peak MB | PSS MB |")
+    print("|---|---|---|---|")
     scripts = {
         "an interpreter that does nothing": "",
         "with asyncio imported": "import asyncio",
@@ -142,13 +148,18 @@ async def measure(runs: int) -> None:
         print(_row(name, [await start_script(script) for _ in range(runs + 1)]), flush=True)
     for interface in ("socketcand-asyncio", "socketcand"):
         print(_row(f"onboard on {interface}", [await start_onboard(interface) for _ in range(runs + 1)]), flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        archive = str(build_archive(Path(folder) / "onboard.pyz"))
+        starts = [await start_onboard("socketcand-asyncio", "-I", archive) for _ in range(runs + 1)]
+        print(_row("onboard.pyz, as boards have it, on socketcand-asyncio", starts), flush=True)
 
 
 def _row(name: str, starts: list[Start]) -> str:
-    wall_s, peak_mb = zip(*starts[1:], strict=True)
+    wall_s, peak_mb, pss_mb = zip(*starts[1:], strict=True)
     return (
         f"| {name} | {statistics.median(wall_s):.3f} ({max(wall_s):.3f}) "
-        f"| {statistics.median(peak_mb):.1f} ({max(peak_mb):.1f}) |"
+        f"| {statistics.median(peak_mb):.1f} ({max(peak_mb):.1f}) "
+        f"| {statistics.median(pss_mb):.1f} ({max(pss_mb):.1f}) |"
     )
 
 

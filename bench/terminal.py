@@ -7,7 +7,7 @@ Same plant, same bus, same robots, same durations; only who decides differs.
 import random
 from dataclasses import replace
 
-from bus_sim.run import RunOptions
+from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.central import play_auction, play_central
 from bus_sim.systems.terminal.run import Outcome

@@ -1,10 +1,21 @@
 """What joins a simulated site from outside: clients of the served buses, and interfaces of python-can."""
 
+from typing import Any
+
 from rich.console import Console
 
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET, BusRun
 from bus_sim.serve.bridge import Bridge, open_bridge, parse_bus_specs
 from bus_sim.serve.socketcand import ServeError, SocketcandServer
+
+#: Of TCP.
+MOST_PORT = 65_535
+
+
+def is_address(text: str) -> bool:
+    """Whether a text is HOST:PORT; port 0 is any."""
+    host, _, port = text.rpartition(":")
+    return bool(host) and port.isascii() and port.isdecimal() and int(port) <= MOST_PORT
 
 
 class Outside:
@@ -14,7 +25,7 @@ class Outside:
     raises ``ServeError`` and ``BusOpenError`` for a person's mistakes.
     """
 
-    def __init__(self, simulation: Simulation, serve: str | None, buses: tuple[str, ...], console: Console) -> None:
+    def __init__(self, simulation: BusRun[Any], serve: str | None, buses: tuple[str, ...], console: Console) -> None:
         self._simulation = simulation
         self._address = serve
         self._buses = buses
@@ -38,7 +49,7 @@ class Outside:
             bridge, _ = await open_bridge(node, settings)
             self._bridges.append(bridge)
             which = "the fleet bus" if machine is None else f"the device bus of {machine}"
-            self._console.print(f"{which} is on {settings}", highlight=False)
+            self._console.print(f"{which} is on {settings}", highlight=False, soft_wrap=True)
 
     async def __aexit__(self, *_: object) -> None:
         for bridge in self._bridges:
@@ -59,5 +70,7 @@ class Outside:
         self.served = (host or "127.0.0.1", bound)
         channels = ", ".join([FLEET, *(machine.name for machine in self._simulation.site.machines.values())])
         self._console.print(
-            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}", highlight=False
+            f"serving at {host or '127.0.0.1'}:{bound} (socketcand), channels {channels}",
+            highlight=False,
+            soft_wrap=True,
         )

@@ -6,15 +6,15 @@ Same seed, same options: the same candump log, byte for byte.
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 from bus_sim.can.faults import Fault
 from bus_sim.can.medium import Medium, Tap
 from bus_sim.can.node import SimulatedBus
+from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.journal import SimulatedJournal
-from bus_sim.systems.car_park.plant.plant import Plant
+from bus_sim.options import RunOptions
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.controller.shell import Controller, Ports
 from onboard.core.behaviour import BehaviourFactory
@@ -28,25 +28,10 @@ from onboard.ports.bus import Bus
 from onboard.systems.contract import codecs_for
 from onboard.systems.registry import compaction_for, condition_for, factory_for
 from onboard.trace.candump import CandumpWriter
-from onboard.trace.view import SiteView
 from onboard.wire.decoder import Decoder
 
 #: The fleet bus in a log and on the served socket.
 FLEET = "fleet"
-
-
-@dataclass(frozen=True)
-class RunOptions:
-    """What a run is made of. ``epoch_us`` is the wall time (us since 1970) of loop time 0, for the log's stamps."""
-
-    seed: int = 1
-    epoch_us: int = 0
-    trace: Path | None = None
-    trace_devices: bool = False
-    pace: float | None = None
-    faults: tuple[Fault, ...] = ()
-    without: frozenset[str] = frozenset()
-    silent_log: bool = False
 
 
 class EventLog:
@@ -87,16 +72,23 @@ class PlantPort(Protocol):
         """Power on: every device tells how it stands."""
 
 
+PlantT = TypeVar("PlantT", bound=PlantPort)
+
+
 @dataclass
-class BusRun:
-    """A site of any system that can be run: buses, plant and controllers, connected but not switched on."""
+class BusRun(Generic[PlantT]):
+    """A site of any system that can be run: buses, plant and controllers, connected but not switched on.
+
+    ``links`` are the plant's ends of the device buses, by node-ID: faults of sensors and actuators act there.
+    """
 
     site: Site
     options: RunOptions
     loop: VirtualTimeLoop
     fleet: Medium
     devices: dict[int, Medium]
-    plant: PlantPort
+    plant: PlantT
+    links: dict[int, BusDeviceLink] = field(default_factory=dict)
     log: EventLog = field(default_factory=EventLog)
     controllers: dict[int, Controller] = field(default_factory=dict)
     journals: dict[int, SimulatedJournal] = field(default_factory=dict)
@@ -207,7 +199,7 @@ class BusRun:
                     observer(message, time_us)
 
         self.fleet.tap(on_fleet)
-        if self.writer is not None and self.options.trace_devices:
+        if self.writer is not None and self.options.devices:
             for node_id, medium in self.devices.items():
                 medium.tap(self._device_tap(self.site.machines[node_id].name))
 
@@ -219,34 +211,23 @@ class BusRun:
         return on_device
 
 
-@dataclass
-class Simulation(BusRun):
-    """A car park that can be run. Build it on its own loop with ``build``; then ``run_until``."""
-
-    plant: Plant
-    view: SiteView = field(init=False)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.view = SiteView(self.site)
-        self.observers.append(self.view.feed)
-
-
-def buses_of(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> tuple[Medium, dict[int, Medium]]:
-    """The fleet bus, and each machine's device bus by its node-ID."""
-    fleet = Medium(loop, bit_rate=site.bitrate, faults=options.faults)
+def buses_of(site: Site, faults: tuple[Fault, ...], loop: VirtualTimeLoop) -> tuple[Medium, dict[int, Medium]]:
+    """The fleet bus with its faults of single frames, and each machine's device bus by its node-ID."""
+    fleet = Medium(loop, bit_rate=site.bitrate, faults=faults)
     return fleet, {node_id: Medium(loop, bit_rate=site.bitrate) for node_id in site.machines}
 
 
-def build(site: Site, options: RunOptions, loop: VirtualTimeLoop) -> Simulation:
-    """All parts of a run of a car park, connected but not switched on."""
-    fleet, devices = buses_of(site, options, loop)
-    plant = Plant(site, loop, {node: medium.attach("plant", node) for node, medium in devices.items()}, options.seed)
-    return Simulation(site, options, loop, fleet, devices, plant)
+def links_of(site: Site, devices: dict[int, Medium]) -> dict[int, BusDeviceLink]:
+    """The plant's end of each machine's device bus, by node-ID."""
+    codec = codecs_for(site).device
+    return {
+        node: BusDeviceLink(medium.attach("plant", node), codec, Decoder(codec), node)
+        for node, medium in devices.items()
+    }
 
 
 async def run_until(
-    simulation: BusRun,
+    run: BusRun[Any],
     done: Callable[[], bool],
     limit_us: int,
     step_us: int,
@@ -258,7 +239,7 @@ async def run_until(
     ``show`` is called after each step.
     """
     while not done():
-        if simulation.loop.now_us() >= limit_us or simulation.restless:
+        if run.loop.now_us() >= limit_us or run.restless:
             return False
         await asyncio.sleep(step_us / 1_000_000)
         if show is not None:

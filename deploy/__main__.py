@@ -17,6 +17,7 @@ from deploy.replace import write_replacement
 from deploy.update.manifest import UpdateError, version_key
 from deploy.update.signature import make_keys
 from deploy.wheels import DeployError
+from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 
 #: Outside of any checkout, and nobody else's.
@@ -42,7 +43,7 @@ examples:
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``python -m deploy``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="python -m deploy",
         description="Build what is put on boards (deploy/README.md).",
         epilog=HELP,

@@ -1,9 +1,15 @@
 """``onboard.pyz``: the program and its pinned wheels in one file that any Python of version 3.11 or newer runs.
 
-The same sources give the same bytes. The wheels' compiled parts are left out, for they cannot be loaded from an archive
-and tie it to one processor; both libraries that have some carry the same in Python.
+Beside each source lies its bytecode for the Python that built the archive: one of that version starts without compiling
+anything, any other takes the sources. The same sources and Python give the same bytes. The wheels' compiled parts are
+left out, for they cannot be loaded from an archive and tie it to one processor; both libraries that have some carry the
+same in Python.
 """
 
+import importlib.util
+import marshal
+import subprocess
+import sys
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +23,14 @@ COMMISSIONING = ("hil/__init__.py", "hil/__main__.py", "hil/cli.py", "hil/notice
 #: The first moment that a ZIP archive can name.
 _TIME = (1980, 1, 1, 0, 0, 0)
 _MAIN = b"import sys\n\nfrom onboard.cli import main\n\nsys.exit(main())\n"
+#: Head of bytecode that is found by the hash of its source and never compared with it (PEP 552).
+_UNCHECKED = importlib.util.MAGIC_NUMBER + (1).to_bytes(4, "little")
+_COMPILE = """\
+import marshal, sys
+sources = marshal.load(sys.stdin.buffer)
+made = [marshal.dumps(compile(text, name, "exec", dont_inherit=True, optimize=0)) for name, text in sources]
+sys.stdout.buffer.write(marshal.dumps(made))
+"""
 _SHEBANG = b"#!/usr/bin/env python3\n"
 
 
@@ -26,12 +40,33 @@ def build_archive(to: Path) -> Path:
     with to.open("wb") as file:
         file.write(_SHEBANG)
         with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, content in sorted(_contents()):
+            for name, content in sorted(_with_bytecode(sorted(_contents()))):
                 entry = zipfile.ZipInfo(name, _TIME)
                 entry.external_attr = 0o644 << 16
                 archive.writestr(entry, content, zipfile.ZIP_DEFLATED, 9)
     to.chmod(0o755)
     return to
+
+
+def _with_bytecode(contents: list[tuple[str, bytes]]) -> Iterator[tuple[str, bytes]]:
+    """The same files, and beside each module ``<name>.pyc``: the form that ``zipimport`` looks for first."""
+    yield from contents
+    sources = [(name, content) for name, content in contents if name.endswith(".py")]
+    for (name, content), code in zip(sources, _compiled(sources), strict=True):
+        yield f"{name}c", _UNCHECKED + importlib.util.source_hash(content) + code
+
+
+def _compiled(sources: list[tuple[str, bytes]]) -> list[bytes]:
+    """Bytecode of each module, by a process that does nothing else.
+
+    What is marshalled names an object twice where somebody else holds it too: in this process that would be chance.
+    """
+    command = [sys.executable, "-S", "-c", _COMPILE]
+    done = subprocess.run(
+        command, input=marshal.dumps(sources), capture_output=True, check=True, env={"PYTHONHASHSEED": "0"}
+    )
+    found: list[bytes] = marshal.loads(done.stdout)
+    return found
 
 
 def _contents() -> Iterator[tuple[str, bytes]]:

@@ -23,6 +23,7 @@ _PLACES = {
     },
     "record": ("usr/lib/onboard/record", 0o755),
     "clock": ("usr/lib/onboard/clock", 0o755),
+    "network": ("usr/lib/onboard/network", 0o755),
 }
 _CONTROL = """\
 Package: onboard-fleet

@@ -11,12 +11,14 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bus_sim.run import RunOptions, build
+from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import LEAD_US, DayOptions, choose_demand
+from bus_sim.systems.car_park.day import Day, choose_demand
 from bus_sim.systems.car_park.show import Clock, draw
+from bus_sim.systems.car_park.simulation import build
+from bus_sim.systems.car_park.stage import ORIGIN_US
+from bus_sim.systems.car_park.window import two_way_hour, with_short_eve
 from bus_sim.virtual_time import VirtualTimeLoop
-from bus_sim.window import two_way_hour, with_short_eve
 
 #: 15:39:10 local time: a car comes in, others are asked for, robots share the street's alley.
 MOMENT_S = 15 * 3600 + 39 * 60 + 10
@@ -28,15 +30,15 @@ async def _picture() -> str:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
     site = find_site("standard")
-    demand = choose_demand(DayOptions(), site)
+    demand = choose_demand(Day(), site)
     demand = with_short_eve(demand, two_way_hour(demand), len(site.compartments))
     first_us = demand.stays[0].arrival_us
     simulation = build(site, RunOptions(), loop)
-    simulation.plant.street.add_all(demand, LEAD_US - first_us)
+    simulation.plant.street.add_all(demand, ORIGIN_US - first_us)
     simulation.start()
-    await asyncio.sleep(MOMENT_S - first_us / 1e6 + LEAD_US / 1e6)
+    await asyncio.sleep(MOMENT_S - first_us / 1e6 + ORIGIN_US / 1e6)
     assert demand.zero is not None
-    clock = Clock(demand.zero + timedelta(microseconds=first_us - LEAD_US))
+    clock = Clock(demand.zero + timedelta(microseconds=first_us - ORIGIN_US))
     console = Console(record=True, width=COLUMNS, file=StringIO())
     street = simulation.plant.street.summary()
     line = (

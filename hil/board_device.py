@@ -8,7 +8,7 @@ from asyncio.subprocess import DEVNULL, PIPE
 from pathlib import Path
 from typing import Any
 
-from bus_sim.run import Simulation
+from bus_sim.run import BusRun
 from bus_sim.serve.bridge import Bridge, open_bridge
 from hil.bench import Capability, Command, Resources
 from hil.device import BenchError
@@ -26,7 +26,7 @@ _STATES = {"ERROR-PASSIVE": ErrorState.ERROR_PASSIVE, "BUS-OFF": ErrorState.BUS_
 class BoardDevice:
     """See ``hil.device.Device``. Raises ``BenchError`` where a command fails, ``BusOpenError`` from ``open``."""
 
-    def __init__(self, simulation: Simulation, machine: Machine, resources: Resources) -> None:
+    def __init__(self, simulation: BusRun[Any], machine: Machine, resources: Resources) -> None:
         self._simulation = simulation
         self._machine = machine
         self._resources = resources

@@ -35,7 +35,7 @@ def judge(stage: Stage, scenario: Scenario, counters: BusHealth | None) -> Judge
             for reason, count in drops.items()
             if reason not in scenario.drops | OF_THE_HOST
         ),
-        *(f"plant: {violation}" for violation in stage.simulation.plant.oracle.finish()),
+        *(f"plant: {violation}" for violation in stage.world.violations()),
         *_of_fleet(stage),
     ]
     verdict = _verdict(stage, scenario)

@@ -4,11 +4,15 @@ import asyncio
 import time
 from collections.abc import Callable
 from contextlib import AsyncExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from bus_sim.journal import WRITE_US
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.options import RunOptions
+from bus_sim.run import BusRun
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.bench import Bench, Capability, Target, TargetKind
 from hil.board_device import BoardDevice
@@ -89,11 +93,16 @@ async def _play(
     options = RunOptions(
         epoch_us=0 if target.kind is TargetKind.SIMULATED else round(time.time() * 1e6),
         trace=directory / "trace.log",
-        trace_devices=True,
+        devices=True,
         faults=(waiting_fault(target.machine.node_id),),
         without=scenario.without(bench.site, target.machine),
     )
-    simulation = build(bench.site, options, loop)
+    system = simulated_of(bench.site)
+    # Nobody comes but whom the scenario brings: what a site asks of its runs is no machine's business.
+    nothing: dict[str, Any] = dict.fromkeys(bench.site.demand, ())
+    bare = replace(bench.site, **nothing)
+    world = system.stage(bare, replace(options, demand=system.on(Occasion.NOBODY, bare)), loop)
+    simulation = world.run
     for medium in simulation.devices.values():
         # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
         medium.attach("bench")
@@ -104,7 +113,7 @@ async def _play(
         stack.push_async_callback(device.close)
         if prepare is not None:
             prepare(device)
-        stage = Stage(simulation, target.machine, device, bench.site_text)
+        stage = Stage(world, bench.site, target.machine, device, bench.site_text)
         simulation.start()
         failure = None
         try:
@@ -116,7 +125,7 @@ async def _play(
         return Outcome(failure, judgement, latencies_of(stage.said, target.machine.node_id))
 
 
-async def stop_fleet(simulation: Simulation) -> None:
+async def stop_fleet(simulation: BusRun[Any]) -> None:
     """End every controller of a simulated fleet; what it has begun to write is written, and nothing new begins."""
     controllers = list(simulation.controllers.values())
     for controller in controllers:
@@ -128,7 +137,7 @@ async def stop_fleet(simulation: Simulation) -> None:
         await asyncio.sleep(WRITE_US / 1e6)
 
 
-async def _open(simulation: Simulation, target: Target, directory: Path) -> Device:
+async def _open(simulation: BusRun[Any], target: Target, directory: Path) -> Device:
     if target.kind is TargetKind.SIMULATED:
         return SimulatedDevice(simulation, target.machine)
     if target.kind is TargetKind.BOARD:

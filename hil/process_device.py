@@ -4,11 +4,12 @@ import asyncio
 import contextlib
 from asyncio.subprocess import Process
 from pathlib import Path
+from typing import Any
 
 from bus_sim.processes.fleet import GRACE_S
 from bus_sim.processes.plan import machine_file
 from bus_sim.processes.spawn import log_of, start_machine
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET, BusRun
 from bus_sim.serve.socketcand import SocketcandServer
 from hil.cable import Cable
 from hil.short_circuit import ShortCircuit
@@ -21,7 +22,7 @@ _HOST = "127.0.0.1"
 class ProcessDevice:
     """See ``hil.device.Device``; ``directory`` keeps machine file, site file, journal and console."""
 
-    def __init__(self, simulation: Simulation, machine: Machine, directory: Path) -> None:
+    def __init__(self, simulation: BusRun[Any], machine: Machine, directory: Path) -> None:
         self._simulation = simulation
         self._machine = machine
         self._directory = directory

@@ -1,10 +1,11 @@
 """The device under test as a controller in the simulator's process and time: the scenarios are the simulator's too."""
 
 from collections.abc import Callable
+from typing import Any
 
 from bus_sim.can.node import SimulatedBus
 from bus_sim.journal import SimulatedJournal
-from bus_sim.run import NoWatchdog, Simulation
+from bus_sim.run import BusRun, NoWatchdog
 from hil.cable import Cable
 from hil.short_circuit import ShortCircuit
 from onboard.config.site import parse_site
@@ -19,7 +20,7 @@ from onboard.systems.registry import condition_for, factory_for
 class SimulatedDevice:
     """See ``hil.device.Device``. ``before_start`` are told each controller before it starts: tests break it there."""
 
-    def __init__(self, simulation: Simulation, machine: Machine) -> None:
+    def __init__(self, simulation: BusRun[Any], machine: Machine) -> None:
         self.before_start: list[Callable[[Controller], None]] = []
         self._simulation = simulation
         self._machine = machine

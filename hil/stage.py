@@ -2,25 +2,21 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
-from bus_sim.demand import Stay
-from bus_sim.run import FLEET, Simulation
-from bus_sim.systems.car_park.plant.bodies import random_car
-from bus_sim.systems.car_park.plant.customer import Customer, Event, State
+from bus_sim.run import FLEET, BusRun
+from bus_sim.systems.stage import Stage as World
 from hil.device import Device
 from hil.notice import Notice
 from onboard.core.codes import MachineState
 from onboard.core.frame import Frame
 from onboard.core.messages import BusTime, Heartbeat, Message
-from onboard.core.site import Machine
+from onboard.core.site import Machine, Site
 from onboard.wire.decoder import Decoder
 
 M = TypeVar("M", bound=Message)
 T = TypeVar("T")
 
-#: A customer of the bench does not walk or drive: these states end at once.
-_HURRIED = (State.DRIVING_IN, State.WALKING_OUT)
 #: A machine in one of these states takes part.
 _TAKING_PART = (MachineState.IDLE, MachineState.WORKING, MachineState.WAITING)
 #: Who speaks for the bench is no machine of any site (node-IDs 251 to 255 are for tools).
@@ -39,14 +35,16 @@ class Said(Generic[M]):
 class Stage:
     """One run of one scenario. Times of deadlines are seconds of the run's clock."""
 
-    def __init__(self, simulation: Simulation, machine: Machine, device: Device, site_text: str) -> None:
-        self.simulation = simulation
-        self.site = simulation.site
+    def __init__(self, world: World[Any], site: Site, machine: Machine, device: Device, site_text: str) -> None:
+        """``world`` is the fleet without orders of its own, on ``site`` but for those."""
+        self.world = world
+        self.simulation: BusRun[Any] = world.run
+        self.site = site
         self.machine = machine
         self.device = device
         self.site_text = site_text
         self.said: list[Said[Message]] = []
-        self.customers: list[Customer] = []
+        simulation = self.simulation
         #: The bench's own node on the fleet bus.
         self.node = simulation.fleet.attach("bench", None)
         self._notice = Notice()
@@ -61,9 +59,6 @@ class Stage:
                 self._hear(time_us, machine.name, message)
 
         simulation.devices[machine.node_id].tap(on_device)
-        for compartment in simulation.plant.compartments.values():
-            compartment.watch(self._soon_hurry)
-            compartment.watch_desk(lambda _text, _car: self._soon_hurry())
 
     # --- what happens ------------------------------------------------------------------------------------------
 
@@ -71,11 +66,9 @@ class Stage:
         """Power for the device, with the bench's site file."""
         await self.device.power_on(self.site_text)
 
-    def bring_car(self) -> None:
-        """A customer who does not dawdle brings a car; it is not fetched again."""
-        name = f"car {len(self.customers) + 1}"
-        stay = Stay(0, None, random_car(name, self.simulation.options.seed))
-        self.customers.append(self.simulation.plant.street.add(stay, self.simulation.loop.now_us()))
+    def bring(self) -> None:
+        """Something comes that the device can do alone: a car, an order."""
+        self.world.bring(self.site, self.machine.node_id)
 
     def say(self, message: Message) -> None:
         """Say a message on the fleet bus, under whatever node-ID it carries."""
@@ -161,10 +154,7 @@ class Stage:
         if not isinstance(message, Heartbeat) or not self._is_own(message) or message.boot == self._boot:
             return
         self._boot = message.boot
-        plant, node = self.simulation.plant, self.machine.node_id
-        for devices in (plant.shuttles, plant.carriers, plant.lifts, plant.compartments):
-            if node in devices:
-                devices[node].start()
+        self.world.power_up(self.machine.node_id)
 
     def _hear(self, time_us: int, bus: str, message: Message) -> None:
         self.said.append(Said(time_us, bus, message))
@@ -182,12 +172,3 @@ class Stage:
         if not fleet:
             return f"{self.machine.name} has said nothing on the fleet bus"
         return f"{self.machine.name} last said {fleet[-1].message} at {fleet[-1].time_us / 1e6:.3f} s"
-
-    def _soon_hurry(self) -> None:
-        """After the step that is under way."""
-        self.simulation.loop.call_soon(self._hurry)
-
-    def _hurry(self) -> None:
-        for customer in self.customers:
-            if customer.state in _HURRIED:
-                customer.on(Event.TIMER)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from onboard import __version__
+from onboard.config.arguments import Parser
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.controller.shell import Controller, Ports
@@ -71,7 +72,7 @@ examples:
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``onboard``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="onboard",
         description="Run the controller of one machine. Every machine of a site runs this same program; only its "
         "machine file differs.",
@@ -124,7 +125,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"onboard: {error}", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"onboard: journal {args.journal or config.journal}: {error.strerror or error}", file=sys.stderr)
+        where, remedy = args.journal or config.journal, "name another folder with --journal, or mend this one"
+        print(f"onboard: journal {where}: {error.strerror or error}; {remedy}", file=sys.stderr)
         return Ending.MISTAKE if error.errno in _MISTAKES else Ending.COMES_BACK
 
 

@@ -14,14 +14,12 @@ from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.trials import Plan, Result, run_attacks
 from bus_sim.campaign.command import read_seeds
 from bus_sim.campaign.report import Verdict
-from bus_sim.campaign.systems import SYSTEMS, usual_orders
 from bus_sim.demand import DemandError
-from bus_sim.faults.scenario import Arrivals
 from bus_sim.sites import find_site
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Occasion
 from onboard.config.problems import nearest
 
-#: What comes to a car park in a run, and how far apart in the mean, s.
-CARS, APART_S = 6, 90.0
 #: In the order of the table's columns.
 _COLUMNS = (*(verdict for verdict in reversed(Verdict)),)
 
@@ -57,7 +55,7 @@ def add_attack(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--node", type=int, default=240, metavar="N", help="the attacker's node-ID, none of the site's (default: 240)"
     )
-    parser.add_argument("--cars", type=int, default=CARS, metavar="N", help=f"to a car park (default: {CARS})")
+    parser.add_argument("--cars", type=int, metavar="N", help="to a car park (default: a few)")
     parser.add_argument("--orders", type=int, metavar="N", help="to any other site (default: a few, by the system)")
     parser.add_argument("--limit", type=float, metavar="SECONDS", help="longest run (default: by the orders)")
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
@@ -94,8 +92,11 @@ def _plan(args: argparse.Namespace) -> Plan:
             raise DemandError(f"--{option} {value:g}: must be above 0")
     if args.jobs < 0:
         raise DemandError(f"--jobs {args.jobs}: must be 1 or more; leave it out for one a core")
-    orders = usual_orders(site, args.orders, None) if site.system in SYSTEMS else None
-    return Plan(args.site, args.node, args.limit, Arrivals(args.cars, APART_S, APART_S / 2), orders)
+    system = simulated_of(site)
+    demand = system.on(Occasion.ATTACK, site)
+    if args.cars is not None or args.orders is not None:
+        demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": demand.apart_s})
+    return Plan(args.site, args.node, args.limit, demand)
 
 
 def _attacks(text: str | None) -> list[str]:

@@ -1,18 +1,20 @@
 """Puts an attack to work on a run that is under way, as the fault ``attack`` (bus_sim/faults/table.py)."""
 
 import random
+from typing import Any
 
 from bus_sim.attacks.attack import TICK_US, Attack, Node
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.can.node import SimulatedBus
 from bus_sim.faults.injection import Injection
 from bus_sim.run import BusRun
+from bus_sim.systems.registry import simulated_of
 from onboard.core.frame import Frame
 from onboard.core.messages import Message
 from onboard.wire.decoder import Decoder
 
 
-def attack(run: BusRun, injection: Injection) -> None:
+def attack(run: BusRun[Any], injection: Injection) -> None:
     """Join the bus at power-up as a listener, begin when it is time, and leave when it is over."""
     _Attacker(run, injection)
 
@@ -20,7 +22,7 @@ def attack(run: BusRun, injection: Injection) -> None:
 class _Attacker:
     """The attacker's node on the bus and its timers."""
 
-    def __init__(self, run: BusRun, injection: Injection) -> None:
+    def __init__(self, run: BusRun[Any], injection: Injection) -> None:
         self._run, self._injection = run, injection
         node_id = injection.count("node")
         name = f"attacker {injection.text('name')} {injection.at_us}"
@@ -29,7 +31,9 @@ class _Attacker:
         chance = random.Random(f"attack:{run.site.name}:{injection}")
         node = Node(run.site, node_id, chance, self._say, self._put, lambda: self._bus.waiting_to_send)
         self._is_begun = False
-        self._attack: Attack = ATTACKS[injection.text("name")].attack(node)
+        what = injection.text("name")
+        own = simulated_of(run.site).attacks.get(what)
+        self._attack: Attack = (own or ATTACKS[what].attack)(node)
         self._bus.subscribe(self._hear)
         run.plant.timers.call_at(injection.at_us, self._begin)
 

@@ -7,22 +7,19 @@ was served or told why.
 import math
 import random
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.report import FAILURES, Report
-from bus_sim.campaign.systems import SYSTEMS, patience_s, span_s, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import Injection
-from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.faults.scenario import Scenario
 from bus_sim.sites import find_site
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Coming
 from onboard.core.site import Site
-
-#: When an attack on a car park begins, s after power-up: cars are coming, and some stand in the park.
-PARK_SPAN_S = (60.0, 420.0)
 
 
 @dataclass(frozen=True)
@@ -32,8 +29,7 @@ class Plan:
     site: str
     node: int = 240
     limit_s: float | None = None
-    arrivals: Arrivals = field(default_factory=Arrivals)
-    orders: Orders | None = None
+    demand: Coming | None = None
 
 
 @dataclass(frozen=True)
@@ -57,13 +53,11 @@ class Result:
 def scenario_of(plan: Plan, site: Site, attack: str, seed: int) -> Scenario:
     """The attack as a scenario; always the same for the same arguments."""
     chance = random.Random(f"attack:{site.name}:{attack}:{seed}")
-    limit_s, span = plan.limit_s or 7_200.0, PARK_SPAN_S
-    if site.system in SYSTEMS:
-        drawn = with_orders(site, plan.orders, seed)
-        limit_s, span = plan.limit_s or math.ceil(patience_s(drawn)), span_s(drawn)
-    at_s, for_s = round(chance.uniform(*span), 3), ATTACKS[attack].for_s
+    system = simulated_of(site)
+    limit_s = plan.limit_s or math.ceil(system.patience_s(site, plan.demand, seed))
+    at_s, for_s = round(chance.uniform(*system.attacked_s(site, plan.demand, seed)), 3), ATTACKS[attack].for_s
     what = Injection("attack", {"name": attack, "at_s": at_s, "for_s": for_s, "node": plan.node, "seed": seed})
-    return Scenario(plan.site, seed, limit_s, plan.arrivals, (what,), plan.orders)
+    return Scenario(plan.site, seed, limit_s, plan.demand, (what,))
 
 
 def run_attack(plan: Plan, number: tuple[str, int]) -> Result:

@@ -5,30 +5,23 @@ from collections.abc import Iterator
 
 from bus_sim.attacks.attack import TICK_US, Attack, Node
 from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, OperatorAction, Reason
+from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, Reason
 from onboard.core.messages import (
     Blocked,
     BusTime,
-    CarAt,
     EmergencyStop,
     Heartbeat,
     ManualOrder,
     Message,
-    OperatorOrder,
-    Reference,
     SyncRequest,
 )
-from onboard.systems.graph.messages import NodeAnswer, NodeVerdict, TurnSignal, VisitList, five
-from onboard.systems.graph.site import FactoryGraph
-from onboard.systems.terminal.messages import BoxOrder
-from onboard.systems.terminal.site import EntityKind, Terminal
 
 _SECOND_US = 1_000_000
 #: Machines of another site that one node makes up.
 _GHOSTS = 6
 
 
-class _Repeated(Attack, ABC):
+class Repeated(Attack, ABC):
     """Says its words at the begin and again after every ``every_us``."""
 
     every_us = 5 * _SECOND_US
@@ -49,27 +42,27 @@ class _Repeated(Attack, ABC):
                 self.node.say(word)
 
 
-class Stop(_Repeated):
+class Stop(Repeated):
     """An emergency stop that nobody of the site said."""
 
     every_us = 10 * _SECOND_US
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``_Repeated``."""
+        """See ``Repeated``."""
         yield EmergencyStop(self.node.node_id, Reason.OPERATOR)
 
 
-class OtherSite(_Repeated):
+class OtherSite(Repeated):
     """Several machines of another site, all of them made up."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``_Repeated``."""
+        """See ``Repeated``."""
         digest = self.node.site.digest % 0xFFFF + 1
         for ghost in range(self.node.node_id, self.node.node_id + _GHOSTS):
             yield Heartbeat(ghost, CONTRACT_VERSION, digest, 0, 1, KindCode.ROBOT, MachineState.IDLE)
 
 
-class NewerBoot(_Repeated):
+class NewerBoot(Repeated):
     """Tells each machine that it was known under a newer boot counter: as if its journal were old."""
 
     def __init__(self, node: Node) -> None:
@@ -82,33 +75,33 @@ class NewerBoot(_Repeated):
             self._boots[message.sender] = message.boot
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``_Repeated``."""
+        """See ``Repeated``."""
         for node in self.node.site.machines:
             yield SyncRequest(self.node.node_id, node, self._boots.get(node, 1) % 255 + 1)
 
 
-class BlockAll(_Repeated):
+class BlockAll(Repeated):
     """Says of every slot that nobody can pass it."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``_Repeated``."""
+        """See ``Repeated``."""
         tracks = getattr(self.node.site, "tracks", {})
         for number, track in tracks.items():
             for index in range(1, min(track.length, 255) + 1):
                 yield Blocked(self.node.node_id, number, index, Reason.OPERATOR)
 
 
-class HoldAll(_Repeated):
+class HoldAll(Repeated):
     """Holds every machine, as a person would."""
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``_Repeated``."""
+        """See ``Repeated``."""
         number = self.node.chance.randint(1, 255)
         for node in self.node.site.machines:
             yield ManualOrder(self.node.node_id, node, number, ManualMode.HELD)
 
 
-class WrongTime(_Repeated):
+class WrongTime(Repeated):
     """Bus time that is an hour ahead."""
 
     every_us = _SECOND_US
@@ -123,48 +116,29 @@ class WrongTime(_Repeated):
             self._ahead_us = message.bus_time_us - now_us
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``_Repeated``."""
+        """See ``Repeated``."""
         if self._ahead_us is not None:
             yield BusTime(self.node.node_id, (now_us + self._ahead_us + 3_600 * _SECOND_US) % BUS_TIME_MODULUS)
 
 
-class Orders(_Repeated):
-    """What only an operator's station may order: other people's cars, boxes, ways."""
+class Orders(Repeated):
+    """What only an operator's station may order, in the words of the site's system."""
 
     every_us = 10 * TICK_US
 
     def __init__(self, node: Node) -> None:
         super().__init__(node)
-        self._cars: set[Reference] = set()
-        self._number = node.chance.randint(1, 10_000)
-
-    def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
-        if isinstance(message, CarAt):
-            self._cars.add(message.car)
+        self.number = node.chance.randint(1, 10_000)
 
     def words(self, now_us: int) -> Iterator[Message]:
-        """See ``_Repeated``."""
-        me, site, chance = self.node.node_id, self.node.site, self.node.chance
-        self._number += 1
-        if isinstance(site, Terminal):
-            stations = [number for number, one in site.entities.items() if one.kind is EntityKind.STATION]
-            box, station = chance.randint(1, len(site.boxes)), chance.choice(stations)
-            yield BoxOrder(me, site.desk, self._number, box, station, 0, True)
-        elif isinstance(site, FactoryGraph):
-            robots = [node for node, one in site.machines.items() if one.kind is KindCode.VEHICLE]
-            stops = tuple(chance.sample(sorted(site.graph.neighbours), 2))
-            yield VisitList(me, self._number, chance.choice(robots), *five(stops))
-        for compartment in getattr(site, "compartments", {}):
-            for car in sorted(self._cars):
-                yield OperatorOrder(me, compartment, OperatorAction.URGENT_TICKET, car)
+        """See ``Repeated``."""
+        self.number += 1
+        yield from self.orders()
+
+    def orders(self) -> Iterator[Message]:
+        """Those under the present number; a system without a station of the kind has none."""
+        yield from ()
 
 
 class WrongAnswers(Attack):
-    """In a factory graph every robot that comes near a node is told by the attacker that it may go on."""
-
-    def hear(self, message: Message, now_us: int) -> None:
-        """See ``Attack``."""
-        if isinstance(message, TurnSignal):
-            go = NodeAnswer(self.node.node_id, message.sender, message.node, NodeVerdict.GO, message.after, 0)
-            self.node.say(go)
+    """Whoever asks whether it may go on is told by the attacker that it may, where a system's machines ask so."""

@@ -6,14 +6,16 @@ A machine takes part once its heartbeat says so; nobody does anything by hand.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.recovery import ADMITTED
-from bus_sim.campaign.stage import Stage
-from bus_sim.campaign.systems import SYSTEMS, usual_orders
-from bus_sim.campaign.trial import STEP_US, stage_maker
-from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.run import RunOptions, run_until
+from bus_sim.campaign.trial import STEP_US, stage_of
+from bus_sim.faults.scenario import Scenario
+from bus_sim.run import run_until
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.stage import Stage
+from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.codes import MOBILE_KINDS
 from onboard.core.messages import Heartbeat, Message
@@ -25,8 +27,6 @@ STARTS_S = 30.0
 OFF_S = 5.0
 #: When it is cut, s after power-up: at work, with cars or loads on the way. Ours.
 MOMENTS_S = (45.0, 75.0, 110.0)
-#: So many cars so far apart come to a car park, s, and are fetched so soon: all kinds of work are under way then.
-BUSY = Arrivals(6, 15.0, 5.0, 30.0)
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,8 @@ def cold_start(site: Site, name: str, at_s: float, missing: str | None) -> Start
 
 
 async def _cold_start(site: Site, name: str, at_s: float, missing: str | None, loop: VirtualTimeLoop) -> Start:
-    orders = usual_orders(site, None, None) if site.system in SYSTEMS else None
-    scenario = Scenario(name, 1, at_s + OFF_S + STARTS_S, BUSY, orders=orders)
-    stage = stage_maker(site)(site, scenario, RunOptions(), loop)
+    busy = simulated_of(site).on(Occasion.BUSY, site)
+    stage = stage_of(site, Scenario(name, 1, at_s + OFF_S + STARTS_S, busy), loop)
     run = stage.run
     for medium in run.devices.values():
         # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
@@ -105,7 +104,7 @@ async def _cold_start(site: Site, name: str, at_s: float, missing: str | None, l
     return Start(name, at_s, missing, longest_us / 1e6, late, tuple(_wrong(stage, judges)))
 
 
-def _wrong(stage: Stage, judges: Judges) -> Iterator[str]:
+def _wrong(stage: Stage[Any], judges: Judges) -> Iterator[str]:
     """What must never happen, and machines that halted."""
     unsafe, _ = judges.finish()
     yield from stage.violations()

@@ -16,23 +16,20 @@ from bus_sim.campaign import table
 from bus_sim.campaign.cold_start import cold_starts
 from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.ledger import Ledger
-from bus_sim.campaign.points import SCENE_LIMIT_S, SCENES, Scene, Single, count, points, reference
+from bus_sim.campaign.points import Scene, Single, count, points, reference
 from bus_sim.campaign.profiles import PROFILES, kinds_for
 from bus_sim.campaign.report import FAILURES
 from bus_sim.campaign.runner import Plan, Point, Result, run_point, run_points, run_seed
 from bus_sim.campaign.strangers import StrangerPlan, play_pairs
-from bus_sim.campaign.systems import SYSTEMS, patience_s, usual_orders, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.demand import DemandError
-from bus_sim.faults.scenario import Arrivals, load_scenario
+from bus_sim.faults.scenario import load_scenario
 from bus_sim.sites import find_site
-from bus_sim.stranger import Stranger
-from bus_sim.systems.orders import Orders
-from bus_sim.systems.stranger import WORKERS
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.stranger import Stranger
+from bus_sim.systems.system import Occasion
 from onboard.core.site import Site
 
-#: What comes to a car park in a run, and how far apart, s.
-CARS, APART_S = 6, 120.0
 #: Longest run, and longest mean time between two cars, s: eleven days. Ours.
 LONGEST_S = 1_000_000
 #: Most orders of a run: their numbers have 16 bits on the wire, of which some systems use a part. Ours.
@@ -47,7 +44,7 @@ FILE) and its trace are kept. Every run is judged by the plant's oracle and by t
 safety at any time, and when all faults are over also that everything goes on, that everybody is served or told why,
 and that all mirrors become equal.
 
-With --exhaustive one reference scene of a car park (a car in and out, or with --scene overlap three that meet) is
+With --exhaustive one reference scene (a car in and out, or one order; with --scene overlap three that meet) is
 played again and again, each time with one single fault: every frame lost or doubled at each receiver, or every
 controller killed before each of its frames and around each of its journal writes, or (journal) at each of its writes
 with the write torn, 1 to 50 records lost, a page zeroed, a bit flipped, the seal gone, another machine's journal, an
@@ -103,7 +100,7 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
     )
     parser.add_argument("--dask", metavar="ADDRESS", help="on the workers of a Dask scheduler, such as tcp://host:8786")
     parser.add_argument("--jobs", type=int, default=0, metavar="N", help="processes (default: one a core)")
-    parser.add_argument("--cars", type=int, metavar="N", help=f"cars in each run of a car park (default: {CARS})")
+    parser.add_argument("--cars", type=int, metavar="N", help="cars in each run of a car park (default: a few)")
     parser.add_argument(
         "--orders",
         type=int,
@@ -114,7 +111,7 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--apart",
         type=float,
         metavar="SECONDS",
-        help=f"mean time between two cars, or orders (default: {APART_S:g} for cars, else by the system)",
+        help="mean time between two cars, or orders (default: by the system)",
     )
     parser.add_argument(
         "--faults-an-hour",
@@ -131,7 +128,7 @@ def add_campaign(commands: "argparse._SubParsersAction[argparse.ArgumentParser]"
         "--limit",
         type=float,
         metavar="SECONDS",
-        help=f"longest run (default: {SCENE_LIMIT_S:g} on a car park, else by the orders)",
+        help="longest run (default: two hours on a car park, else by the orders)",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("campaign"), metavar="DIR", help="failures (default: campaign)"
@@ -184,15 +181,13 @@ def run_campaign_command(args: argparse.Namespace) -> int:
 
 
 def _strangers(args: argparse.Namespace, plan: Plan, site: Site) -> int:
-    if site.system in SYSTEMS and site.system not in WORKERS:
-        known = ", ".join(WORKERS)
+    system, seeds = simulated_of(site), read_seeds(args.seeds)
+    if system.worker is None:
         raise DemandError(
-            f"--stranger {args.stranger}: {site.name} is a {site.system}; use a car park or one of {known}"
+            f"--stranger {args.stranger}: {site.name} is a {site.system}, where no machine bids by the calls of all"
         )
-    seeds = read_seeds(args.seeds)
-    drawn = with_orders(site, plan.orders, seeds[0])
-    limit_s = plan.limit_s or (patience_s(drawn) if site.system in SYSTEMS else SCENE_LIMIT_S)
-    strange = StrangerPlan(args.site, Stranger(args.stranger), plan.arrivals, limit_s, plan.orders)
+    limit_s = plan.limit_s or system.patience_s(site, plan.demand, seeds[0])
+    strange = StrangerPlan(args.site, Stranger(args.stranger), plan.demand, limit_s)
     pairs = sorted(play_pairs(strange, seeds, args.jobs or os.cpu_count() or 1), key=lambda one: one.seed)
     for pair in pairs:
         print(pair.line())
@@ -227,14 +222,11 @@ def _ledger(args: argparse.Namespace, plan: Plan) -> Ledger | None:
     """The results so far, where there is a file for them; it knows a campaign by all that its trials have in common."""
     if args.add_to is None:
         return None
-    arrivals = plan.arrivals
-    demand = f"{arrivals.cars} cars, {arrivals.mean_s:g} s, {arrivals.sigma_s:g} s, {arrivals.min_stay_s:g} s"
     what = [
         plan.site,
         plan.profile,
         str(plan.scene),
-        demand,
-        str(plan.orders),
+        str(plan.demand),
         f"{plan.faults_an_hour}",
         f"{plan.limit_s}",
     ]
@@ -250,10 +242,10 @@ def _trials(
     if args.exhaustive is None:
         seeds = read_seeds(args.seeds)
         head = f"campaign on {site.name}: seeds {seeds[0]}-{seeds[-1]}, faults {plan.profile}"
-        console.print(f"{head}, {brought(site, plan.arrivals, plan.orders)} each", highlight=False)
+        console.print(f"{head}, {simulated_of(site).count(plan.demand)} each", highlight=False)
         left = seeds if ledger is None else ledger.open_of(seeds)
         return play_all(partial(run_seed, plan), left), len(left)
-    counts = count(site, reference(plan.site, plan.limit_s or SCENE_LIMIT_S, plan.scene))
+    counts = count(site, reference(plan.site, plan.limit_s, plan.scene))
     plan = replace(plan, usual_wait_s=counts.longest_wait_s)
     every = [Point(number, one) for number, one in enumerate(points(site, Single(args.exhaustive), counts), start=1)]
     chosen = every if args.sample is None else random.Random(0).sample(every, min(args.sample, len(every)))
@@ -264,49 +256,24 @@ def _trials(
     return run_points(plan, chosen, jobs), len(chosen)
 
 
-def brought(site: Site, arrivals: Arrivals, orders: Orders | None) -> str:
-    """What comes to a site in a run, in words."""
-    if site.system not in SYSTEMS:
-        return f"{arrivals.cars} cars"
-    return f"{orders.count} orders" if orders is not None and orders.count else "the site's own orders"
-
-
 def _plan(args: argparse.Namespace, site: Site) -> Plan:
+    """A plan, of which the first seed's customers or orders have been drawn once to see that they can be."""
     _check(args)
-    if site.system in SYSTEMS:
-        return _plan_of_system(args, site)
-    if args.orders is not None:
-        raise DemandError(f"--orders {args.orders}: {site.name} is a car park; write --cars")
-    limit_s = SCENE_LIMIT_S if args.limit is None else args.limit
+    system = simulated_of(site)
     if args.exhaustive is not None:
         scene = Scene(args.scene)
-        return Plan(args.site, args.exhaustive, limit_s, SCENES[scene], out=args.out, scene=scene)
-    apart_s = APART_S if args.apart is None else args.apart
-    return Plan(
-        args.site,
-        args.faults,
-        limit_s,
-        Arrivals(CARS if args.cars is None else args.cars, apart_s, apart_s / 2),
-        out=args.out,
-        faults_an_hour=args.faults_an_hour,
-        has_baseline=not args.no_baseline,
-    )
-
-
-def _plan_of_system(args: argparse.Namespace, site: Site) -> Plan:
-    """A plan for a site that is no car park, of which a seed's orders have been drawn once to see that they can be."""
-    for option, value in (("cars", args.cars), ("exhaustive", args.exhaustive)):
-        if value is not None:
-            raise DemandError(f"--{option} {value}: {site.name} is a {site.system}, and only a car park has it")
+        demand = system.on(Occasion(scene), site)
+        limit_s = args.limit or system.patience_s(site, demand, 1)
+        return Plan(args.site, args.exhaustive, limit_s, demand, out=args.out, scene=scene)
     if args.faults != "none" and not kinds_for(args.faults, site):
-        raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, and only a car park has them")
-    orders = usual_orders(site, args.orders, args.apart)
-    with_orders(site, orders, seed=read_seeds(args.seeds)[0])
+        raise DemandError(f"--faults {args.faults}: {site.name} is a {site.system}, which has none of these")
+    demand = system.usual(site, {"cars": args.cars, "orders": args.orders, "apart": args.apart})
+    system.check(site, demand, read_seeds(args.seeds)[0])
     return Plan(
         args.site,
         args.faults,
         args.limit,
-        orders=orders,
+        demand,
         out=args.out,
         faults_an_hour=args.faults_an_hour,
         has_baseline=not args.no_baseline,
@@ -327,6 +294,8 @@ def _check(args: argparse.Namespace) -> None:
     _check_seconds("limit", args.limit)
     if args.faults_an_hour is not None and not 0 < args.faults_an_hour <= MOST_AN_HOUR:
         raise DemandError(f"--faults-an-hour {args.faults_an_hour:g}: must be above 0, and at most {MOST_AN_HOUR}")
+    if args.scene != str(Scene.ALONE) and args.exhaustive is None:
+        raise DemandError(f"--scene {args.scene}: goes with --exhaustive; add it, or leave this out")
     if args.sample is not None and (args.sample < 1 or (args.exhaustive is None and not args.cold_start)):
         raise DemandError(f"--sample {args.sample}: must be 1 or more, and goes with --exhaustive or --cold-start")
 
@@ -352,7 +321,7 @@ def run_scenario(path: Path, trace: Path | None, json_file: Path | None) -> int:
     scenario, site = load_scenario(path)
     console = Console()
     console.print(
-        f"scenario {path.name}: site {site.name}, {brought(site, scenario.arrivals, scenario.orders)}, "
+        f"scenario {path.name}: site {site.name}, {simulated_of(site).count(scenario.demand)}, "
         f"seed {scenario.seed}, {len(scenario.faults)} faults",
         highlight=False,
         soft_wrap=True,

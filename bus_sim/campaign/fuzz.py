@@ -14,11 +14,12 @@ from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from bus_sim.campaign.systems import SYSTEMS, usual_orders
-from bus_sim.campaign.trial import stage_maker
-from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.campaign.trial import stage_of
+from bus_sim.faults.scenario import Scenario
 from bus_sim.journal import SimulatedJournal
-from bus_sim.run import EventLog, NoWatchdog, RunOptions, run_until
+from bus_sim.run import EventLog, NoWatchdog, run_until
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.controller.shell import Controller, Ports
 from onboard.core.codes import Reason
@@ -86,9 +87,8 @@ def record(site: Site, seed: int) -> tuple[list[Frame], list[Frame]]:
 
 
 async def _record(site: Site, seed: int, loop: VirtualTimeLoop) -> tuple[list[Frame], list[Frame]]:
-    orders = usual_orders(site, None, None) if site.system in SYSTEMS else None
-    scenario = Scenario(site.name, seed, CORPUS_S, Arrivals(2, 30.0, 5.0, 60.0), orders=orders)
-    stage = stage_maker(site)(site, scenario, RunOptions(seed=seed), loop)
+    few = simulated_of(site).on(Occasion.FEW, site)
+    stage = stage_of(site, Scenario(site.name, seed, CORPUS_S, few), loop)
     fleet: list[Frame] = []
     devices: list[Frame] = []
     stage.run.fleet.tap(lambda frame, _time_us, _sender: fleet.append(frame))

@@ -5,6 +5,7 @@ neither finds anything.
 """
 
 from functools import partial
+from typing import Any
 
 from bus_sim.can.medium import Medium
 from bus_sim.run import FLEET, BusRun
@@ -16,7 +17,7 @@ from onboard.trace.check.systems import rules_for
 class Judges:
     """Listens to every bus of a run from before its start. ``disturbed``: frames are lost or doubled on purpose."""
 
-    def __init__(self, run: BusRun, *, disturbed: bool) -> None:
+    def __init__(self, run: BusRun[Any], *, disturbed: bool) -> None:
         self._site = run.site
         #: Rules that say that something must happen in time; all others are rules of safety.
         self._liveness = frozenset(rule.name for rule in rules_for(run.site) if rule.liveness)

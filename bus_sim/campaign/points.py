@@ -8,15 +8,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import partial
-from typing import Final
 
 from bus_sim.campaign.journal_points import journal_faults
 from bus_sim.campaign.trial import STEP_US
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.run import RunOptions, build, run_until
-from bus_sim.systems.car_park.stage import ORIGIN_US, is_over
+from bus_sim.faults.scenario import Scenario
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
+from bus_sim.sites import find_site
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.frame import Frame
 from onboard.core.site import Site
@@ -37,21 +39,10 @@ class Single(StrEnum):
 
 
 class Scene(StrEnum):
-    """Who comes in the reference scene."""
+    """Who comes in the reference scene: an occasion (``bus_sim.systems.system``)."""
 
     ALONE = "alone"
     OVERLAP = "overlap"
-
-
-SCENES: Final[dict[Scene, Arrivals]] = {
-    # One car, fetched two minutes later.
-    Scene.ALONE: Arrivals(cars=1, mean_s=5.0, sigma_s=1.0, min_stay_s=120.0),
-    # Three so close that two robots carry at the same time, and that some are fetched while others come.
-    Scene.OVERLAP: Arrivals(cars=3, mean_s=30.0, sigma_s=10.0, min_stay_s=60.0),
-}
-
-#: The longest that it may take under a fault, s, unless another limit is asked for. Ours.
-SCENE_LIMIT_S = 7_200.0
 
 
 @dataclass
@@ -64,9 +55,12 @@ class Counts:
     longest_wait_s: float
 
 
-def reference(site_name: str, limit_s: float, scene: Scene = Scene.ALONE) -> Scenario:
-    """The scene without a fault."""
-    return Scenario(site_name, 1, limit_s, SCENES[scene])
+def reference(site_name: str, limit_s: float | None, scene: Scene = Scene.ALONE) -> Scenario:
+    """The scene without a fault; ``limit_s`` is the longest that it may take under one, None: as its system has it."""
+    site = find_site(site_name)
+    system = simulated_of(site)
+    demand = system.on(Occasion(scene), site)
+    return Scenario(site_name, 1, limit_s or system.patience_s(site, demand, 1), demand)
 
 
 def count(site: Site, scenario: Scenario) -> Counts:
@@ -76,10 +70,8 @@ def count(site: Site, scenario: Scenario) -> Counts:
 
 
 async def _count(site: Site, scenario: Scenario, loop: VirtualTimeLoop) -> Counts:
-    simulation = build(site, RunOptions(seed=scenario.seed), loop)
-    street = simulation.plant.street
-    street.add_all(scenario.arrivals.demand(scenario.seed), ORIGIN_US)
-    machines = simulation.site.machines
+    stage = simulated_of(site).stage(site, RunOptions(seed=scenario.seed, demand=scenario.demand), loop)
+    run, machines = stage.run, stage.run.site.machines
     found = Counts([], dict.fromkeys((one.name for one in machines.values()), 0), {}, 0.0)
 
     def on_fleet(_frame: Frame, _time_us: int, sender: str) -> None:
@@ -89,14 +81,13 @@ async def _count(site: Site, scenario: Scenario, loop: VirtualTimeLoop) -> Count
         if sender in found.sent:
             found.sent[sender] += 1
 
-    simulation.fleet.tap(on_fleet)
-    for medium in (simulation.fleet, *simulation.devices.values()):
+    run.fleet.tap(on_fleet)
+    for medium in (run.fleet, *run.devices.values()):
         medium.tap_queues(on_queue)
-    simulation.start()
-    await run_until(simulation, lambda: is_over(street), round(scenario.limit_s * 1e6), STEP_US)
-    found.written = {machines[node].name: len(journal.entries) for node, journal in simulation.journals.items()}
-    summary = street.summary()
-    found.longest_wait_s = max((*summary.in_wait_us, *summary.out_wait_us), default=0) / 1e6
+    run.start()
+    await run_until(run, lambda: stage.is_over, round(scenario.limit_s * 1e6), STEP_US)
+    found.written = {machines[node].name: len(journal.entries) for node, journal in run.journals.items()}
+    found.longest_wait_s = stage.tally().longest_wait_s
     return found
 
 

@@ -8,12 +8,11 @@ from typing import Final
 
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.table import TEN_YEARS_MS, Value
-from bus_sim.systems.session import FAULTS
+from bus_sim.systems.registry import simulated_of
 from onboard.core.codes import KindCode
 from onboard.core.site import Site
-from onboard.systems.car_park.site import CarPark
 
-#: Faults begin in this span after power-up, s: all of it while customers come and go, and all end before it is over.
+#: Faults begin in this span after power-up, s, unless a system says otherwise: all end before it is over.
 SPAN_S = (20.0, 900.0)
 #: So many faults a run, unless a profile has a number of its own.
 COUNT = (1, 4)
@@ -139,11 +138,9 @@ _WITHOUT_TIME = frozenset({"lost_ticket", "linger", "oversize"})
 
 
 def kinds_for(profile: str, site: Site) -> dict[str, Draw]:
-    """The kinds of a profile that this site can have: what only a car park has is left out on any other."""
-    kinds = PROFILES[profile]
-    if site.system == CarPark.system:
-        return kinds
-    return {kind: draw for kind, draw in kinds.items() if kind in FAULTS}
+    """The kinds of a profile that are drawn for this site's system."""
+    kinds, drawn = PROFILES[profile], simulated_of(site).drawn
+    return kinds if drawn is None else {kind: draw for kind, draw in kinds.items() if kind in drawn}
 
 
 def draw_faults(profile: str, seed: int, site: Site, span_s: tuple[float, float] = SPAN_S) -> tuple[Injection, ...]:

@@ -6,7 +6,7 @@ Nothing here changes a run: controllers are looked at every ``LOOK_US`` while so
 from collections.abc import Callable, Iterable
 from enum import StrEnum
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from bus_sim.can.faults import Fault, FaultInjector, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
@@ -69,7 +69,7 @@ def is_of_clock(fault: AnyFault) -> bool:
 class Recovery:
     """Measures one run; to be made before ``BusRun.start``. ``longest_us`` and ``counts`` are by measure."""
 
-    def __init__(self, simulation: BusRun, faults: Iterable[AnyFault]) -> None:
+    def __init__(self, simulation: BusRun[Any], faults: Iterable[AnyFault]) -> None:
         self.longest_us: dict[Measure, int] = {}
         self.counts: dict[Measure, int] = {}
         faults = tuple(faults)

@@ -2,25 +2,24 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from bus_sim.campaign.engine import on_cores
-from bus_sim.campaign.points import SCENE_LIMIT_S, Scene, reference
+from bus_sim.campaign.points import Scene, reference
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults
 from bus_sim.campaign.report import FAILURES, Report, Verdict
 from bus_sim.campaign.shared import Crash, can_share, is_shared, play_shared
 from bus_sim.campaign.shrink import shrink
-from bus_sim.campaign.systems import SYSTEMS, patience_s, span_s, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.faults.scenario import Scenario
 from bus_sim.faults.table import KINDS
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.stage import ORIGIN_US
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Coming
 from onboard.core.site import Site
 
 
@@ -30,9 +29,10 @@ class Plan:
 
     site: str
     profile: str
-    #: None: by the site's orders.
-    limit_s: float | None = 7_200.0
-    arrivals: Arrivals = field(default_factory=Arrivals)
+    #: None: as its system has it.
+    limit_s: float | None = None
+    #: What each seed brings; None: what a scenario without a word about it brings.
+    demand: Coming | None = None
     out: Path | None = None
     #: The longest wait without faults, s, where it is known: of the reference scene, for single faults.
     usual_wait_s: float | None = None
@@ -40,8 +40,6 @@ class Plan:
     faults_an_hour: float | None = None
     #: Whether each seed is played without its faults first: a run can be called delayed only then.
     has_baseline: bool = True
-    #: What each seed brings to a site that is no car park.
-    orders: Orders | None = None
     #: Of single faults, in which scene.
     scene: Scene = Scene.ALONE
 
@@ -70,7 +68,7 @@ class Result:
 def run_seed(plan: Plan, seed: int) -> Result:
     """Play one seed: first without its faults, to know how long one usually waits, then with them."""
     site = find_site(plan.site)
-    bare = Scenario(plan.site, seed, _limit_s(plan, site, seed), plan.arrivals, orders=plan.orders)
+    bare = Scenario(plan.site, seed, _limit_s(plan, site, seed), plan.demand)
     scenario = bare.with_faults(_faults(plan, bare, site))
     usual = play(site, bare) if plan.has_baseline or not scenario.faults else None
     if usual is not None and not scenario.faults:
@@ -100,23 +98,15 @@ def _begin_s(fault: AnyFault) -> float:
 
 
 def _limit_s(plan: Plan, site: Site, seed: int) -> float:
-    return plan.limit_s or math.ceil(patience_s(with_orders(site, plan.orders, seed)))
+    return plan.limit_s or math.ceil(simulated_of(site).patience_s(site, plan.demand, seed))
 
 
 def _faults(plan: Plan, bare: Scenario, site: Site) -> tuple[AnyFault, ...]:
-    """At a rate they strike until the last car is fetched, or has come where nobody fetches it."""
-    if site.system in SYSTEMS:
-        span = span_s(with_orders(site, bare.orders, bare.seed))
-        if plan.faults_an_hour is None:
-            return draw_faults(plan.profile, bare.seed, site, span)
-        return draw_at_rate(plan.profile, bare.seed, site, plan.faults_an_hour, span[1])
+    """A few, or at a rate as long as somebody comes or waits."""
+    when = simulated_of(site).faulted(site, bare.demand, bare.seed, bare.limit_s)
     if plan.faults_an_hour is None:
-        return draw_faults(plan.profile, bare.seed, site)
-    stays = bare.arrivals.demand(bare.seed).stays
-    moments = [max(one.arrival_us, one.departure_us or 0) for one in stays]
-    until_s = min(bare.limit_s, (ORIGIN_US + max(moments)) / 1e6)
-    arrivals_s = [(ORIGIN_US + one.arrival_us) / 1e6 for one in stays]
-    return draw_at_rate(plan.profile, bare.seed, site, plan.faults_an_hour, until_s, arrivals_s)
+        return draw_faults(plan.profile, bare.seed, site, when.span_s)
+    return draw_at_rate(plan.profile, bare.seed, site, plan.faults_an_hour, when.until_s, when.arrivals_s)
 
 
 def run_point(plan: Plan, point: Point) -> Result:
@@ -136,7 +126,7 @@ def run_points(plan: Plan, points: Sequence[Point], jobs: int) -> Iterator[Resul
 
 
 def _scene(plan: Plan) -> Scenario:
-    return reference(plan.site, plan.limit_s or SCENE_LIMIT_S, plan.scene)
+    return reference(plan.site, plan.limit_s, plan.scene)
 
 
 def _point_result(plan: Plan, number: int, report: Report) -> Result:

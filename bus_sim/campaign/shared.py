@@ -15,18 +15,19 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from multiprocessing.connection import Connection, wait
 from types import FrameType
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from bus_sim.campaign.limits import WallLimitError, end_after, event_limit, wall_limit_s
 from bus_sim.campaign.report import Report, Verdict
 from bus_sim.campaign.trial import HANGS, hung, play_stage
-from bus_sim.faults.arm import ACTIONS, arm
+from bus_sim.faults.arm import actions_for, arm
 from bus_sim.faults.controllers import lose_power
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.scenario import Scenario
-from bus_sim.run import RunOptions, Simulation
+from bus_sim.options import RunOptions
+from bus_sim.run import BusRun
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.stage import CarPark
+from bus_sim.systems.registry import simulated_of
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.frame import Frame
 
@@ -59,7 +60,7 @@ def is_shared(fault: Injection) -> bool:
 def play_shared(
     scenario: Scenario, crashes: Sequence[Crash], usual_wait_s: float | None, jobs: int
 ) -> Iterator[Answer]:
-    """All points of a scene of a car park, as they come in, ``jobs`` at a time.
+    """All points of a scene, as they come in, ``jobs`` at a time.
 
     ``scenario``: the scene without a fault. Raises ``RuntimeError`` where the process of the scene failed.
     """
@@ -129,8 +130,8 @@ def _play(scenario: Scenario, crashes: Sequence[Crash], usual_wait_s: float | No
     loop.event_limit = event_limit(scenario.limit_s)
 
     async def main() -> Report:
-        stage = CarPark(site, scenario, RunOptions(seed=scenario.seed), loop)
-        actions = {**ACTIONS, "crash": lambda run, _: Moments(run, crashes, copies).watch()}
+        stage = simulated_of(site).stage(site, RunOptions(seed=scenario.seed, demand=scenario.demand), loop)
+        actions = {**actions_for(site), "crash": lambda run, _: Moments(run, crashes, copies).watch()}
         arm(stage.run, scenario.faults, actions)
         return await play_stage(stage, scenario, usual_wait_s, loop)
 
@@ -143,7 +144,7 @@ def _play(scenario: Scenario, crashes: Sequence[Crash], usual_wait_s: float | No
 class Moments:
     """Counts the frames and writes of all machines from now on; at those that are chosen a copy of the process ends."""
 
-    def __init__(self, run: Simulation, crashes: Sequence[Crash], copies: "Copies") -> None:
+    def __init__(self, run: BusRun[Any], crashes: Sequence[Crash], copies: "Copies") -> None:
         self._run = run
         self._copies = copies
         #: By machine and what is counted, and by number.

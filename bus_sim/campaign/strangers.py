@@ -5,21 +5,15 @@ from dataclasses import dataclass
 from functools import partial
 from statistics import fmean
 
-from bus_sim import stranger as car_park
 from bus_sim.campaign.engine import on_cores
 from bus_sim.campaign.judges import Judges
-from bus_sim.campaign.trial import stage_maker
-from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.run import RunOptions, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
-from bus_sim.stranger import Stranger
-from bus_sim.systems import stranger as systems
-from bus_sim.systems.car_park.plant.customer import Customer
-from bus_sim.systems.car_park.stage import CarPark
-from bus_sim.systems.orders import Orders
-from bus_sim.systems.stranger import WORKERS
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.stranger import Stranger
+from bus_sim.systems.system import Coming
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.codes import KindCode
 from onboard.core.recovery_messages import Halted
 from onboard.core.site import Site
 
@@ -35,10 +29,8 @@ class StrangerPlan:
 
     site: str
     how: Stranger
-    arrivals: Arrivals
+    demand: Coming | None
     limit_s: float
-    #: What comes to a site that is no car park.
-    orders: Orders | None = None
 
 
 @dataclass(frozen=True)
@@ -48,7 +40,7 @@ class Outcome:
     served: int
     told: int
     waiting: int
-    #: What each customer of a car park who was served waited in all, s; None for the others.
+    #: What each who was served waited in all, s, None for the others; empty where a system does not tell.
     waits_s: tuple[float | None, ...]
     broken: tuple[str, ...]
     #: Whether a machine said on the bus that the stranger needs a person.
@@ -103,15 +95,12 @@ def _play(plan: StrangerPlan, site: Site, seed: int, *, strange: bool) -> Outcom
 
 
 async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop, *, strange: bool) -> Outcome:
-    kind = WORKERS.get(site.system, KindCode.ROBOT)
-    target = next(one for one in site.machines.values() if one.kind is kind)
-    options = RunOptions(seed=seed, without=frozenset() if strange else frozenset({target.name}))
-    scenario = Scenario(plan.site, seed, plan.limit_s, plan.arrivals, orders=plan.orders)
-    stage = stage_maker(site)(site, scenario, options, loop)
-    if strange and site.system in WORKERS:
-        stage.run.factories = systems.factories_with(site, target.node_id, plan.how)
-    elif strange:
-        stage.run.factories = car_park.factories_with(target.node_id, plan.how)
+    system = simulated_of(site)
+    target = next(one for one in site.machines.values() if one.kind is system.worker)
+    without = frozenset() if strange else frozenset({target.name})
+    stage = system.stage(site, RunOptions(seed=seed, without=without, demand=plan.demand), loop)
+    if strange:
+        stage.run.factories = system.stranger(site, target.node_id, plan.how)
     # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
     stage.run.devices[target.node_id].attach("terminal block", None)
     judges, asked = Judges(stage.run, disturbed=False), list[Halted]()
@@ -127,18 +116,10 @@ async def _run(plan: StrangerPlan, site: Site, seed: int, loop: VirtualTimeLoop,
     finally:
         stage.run.close()
     tally = stage.tally()
-    waits = tuple(map(_wait_s, stage.customers)) if isinstance(stage, CarPark) else ()
+    waits = stage.waits_s()
     broken = (*stage.violations(), *(judges.finish()[0]))
     return Outcome(tally.served, tally.told, tally.waiting, waits, broken, _asks(asked, target.node_id))
 
 
 def _asks(words: list[Halted], node: int) -> bool:
     return any(word.machine == node and word.needs_person for word in words)
-
-
-def _wait_s(customer: Customer) -> float | None:
-    """What a customer waited in all, in and out; None for one who was not served."""
-    visit = customer.visit
-    if visit.in_wait_us is None or visit.out_wait_us is None:
-        return None
-    return (visit.in_wait_us + visit.out_wait_us) / 1e6

@@ -2,18 +2,19 @@
 
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from bus_sim.campaign.journal_points import Held
 from bus_sim.campaign.judges import Judges
 from bus_sim.campaign.limits import WallLimitError, event_limit, wall_limit, wall_limit_s
 from bus_sim.campaign.recovery import Measure, Recovery, clocks_right_us, is_of_clock
 from bus_sim.campaign.report import CLOCKS_SERVED_US, CONVERGED_US, Report, Verdict
-from bus_sim.campaign.stage import Stage, StageMaker
-from bus_sim.campaign.systems import SYSTEMS, SystemStage
-from bus_sim.faults.arm import frame_faults
+from bus_sim.faults.arm import arm, check_faults
 from bus_sim.faults.scenario import Scenario
-from bus_sim.run import BusRun, RunOptions, run_until
-from bus_sim.systems.car_park.stage import CarPark
+from bus_sim.options import RunOptions
+from bus_sim.run import BusRun, run_until
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.stage import Stage
 from bus_sim.virtual_time import EventLimitError, StandstillError, VirtualTimeLoop, run_on
 from onboard.core.site import Site
 
@@ -25,9 +26,14 @@ HANGS = (StandstillError, EventLimitError)
 DELAY_US = 60_000_000
 
 
-def stage_maker(site: Site) -> StageMaker:
-    """What sets up runs of a site's system."""
-    return SystemStage if site.system in SYSTEMS else CarPark
+def stage_of(site: Site, scenario: Scenario, loop: VirtualTimeLoop, trace: Path | None = None) -> Stage[Any]:
+    """A scenario's run, connected and not switched on; only faults of single frames are there.
+
+    Raises ``DemandError`` for orders that the site cannot be brought, and for faults that it cannot have.
+    """
+    check_faults(scenario.faults, site)
+    options = RunOptions(seed=scenario.seed, trace=trace, faults=scenario.faults, demand=scenario.demand)
+    return simulated_of(site).stage(site, options, loop)
 
 
 def play(site: Site, scenario: Scenario, *, usual_wait_s: float | None = None, trace: Path | None = None) -> Report:
@@ -49,13 +55,14 @@ def hung(scenario: Scenario, loop: VirtualTimeLoop, why: BaseException) -> Repor
 async def _play(
     site: Site, scenario: Scenario, usual_wait_s: float | None, trace: Path | None, loop: VirtualTimeLoop
 ) -> Report:
-    options = RunOptions(seed=scenario.seed, trace=trace, faults=frame_faults(scenario.faults, site))
-    stage = stage_maker(site)(site, scenario, options, loop)
-    stage.arm(scenario.faults)
+    stage = stage_of(site, scenario, loop, trace)
+    arm(stage.run, scenario.faults)
     return await play_stage(stage, scenario, usual_wait_s, loop)
 
 
-async def play_stage(stage: Stage, scenario: Scenario, usual_wait_s: float | None, loop: VirtualTimeLoop) -> Report:
+async def play_stage(
+    stage: Stage[Any], scenario: Scenario, usual_wait_s: float | None, loop: VirtualTimeLoop
+) -> Report:
     """The same of a stage whose faults are armed."""
     judges = Judges(stage.run, disturbed=bool(scenario.faults))
     recovery = Recovery(stage.run, scenario.faults)
@@ -86,7 +93,7 @@ async def play_stage(stage: Stage, scenario: Scenario, usual_wait_s: float | Non
 class _End:
     """When a trial is over: safety comes first, then all heals, then everything must converge."""
 
-    def __init__(self, stage: Stage, recovery: Recovery) -> None:
+    def __init__(self, stage: Stage[Any], recovery: Recovery) -> None:
         self._stage = stage
         self._recovery = recovery
         self._over_us: int | None = None
@@ -103,7 +110,7 @@ class _End:
 
 
 def _judge(
-    stage: Stage,
+    stage: Stage[Any],
     scenario: Scenario,
     usual_wait_s: float | None,
     errors: tuple[str, str],
@@ -162,7 +169,7 @@ def _heals_late(scenario: Scenario, recovery: Recovery) -> bool:
     return took_us > CLOCKS_SERVED_US and all(is_of_clock(fault) for fault in scenario.faults)
 
 
-def _struck(run: BusRun) -> tuple[tuple[str, int], ...]:
+def _struck(run: BusRun[Any]) -> tuple[tuple[str, int], ...]:
     """How often faults of single frames struck, by kind of the frame fault."""
     struck: Counter[str] = Counter()
     for injector in run.fleet.injectors:

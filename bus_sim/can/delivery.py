@@ -4,43 +4,17 @@ Delivery is where a bus model spends its time, so the way from a sender's identi
 once and kept until a node comes, goes or changes. All receivers are handed the same ``Frame`` object.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
 from bus_sim.can.faults import FaultInjector, FaultKind
-from bus_sim.can.node import SimulatedBus
+from bus_sim.can.node import Route, SimulatedBus
 from bus_sim.virtual_time import Clock
 from onboard.core.frame import Frame
-from onboard.ports.bus import FrameHandler
 
 #: Where there are more than this many different identifiers (a fuzzer), routes are worked out anew.
 _ROUTES_LIMIT: Final = 16384
-
-
-class Route:
-    """Handlers that hear one identifier of one sender, in order of attachment, and how many frames went this way."""
-
-    __slots__ = ("_victims", "everybody", "frames", "handlers", "owners", "prompt", "slow")
-
-    def __init__(self, nodes: Iterable[SimulatedBus]) -> None:
-        self.frames = 0
-        self.everybody = list(nodes)
-        self.prompt = [node for node in self.everybody if node.is_prompt]
-        # A busy node's handlers run later anyway; only its queue's turn among the prompt ones is lost.
-        self.slow = [node for node in self.everybody if not node.is_prompt]
-        self.handlers: list[FrameHandler] = []
-        self.owners: list[SimulatedBus] = []
-        for node in self.prompt:
-            self.handlers += node.frame_handlers
-            self.owners += [node] * len(node.frame_handlers)
-        self._victims: dict[FaultInjector, list[SimulatedBus]] = {}
-
-    def victims(self, injector: FaultInjector) -> list[SimulatedBus]:
-        """The nodes on this route that a fault may strike."""
-        if injector not in self._victims:
-            self._victims[injector] = [n for n in self.everybody if injector.chooses(n.name, n.node_id)]
-        return self._victims[injector]
 
 
 def _deaf(_frame: Frame, _time_us: int) -> None:

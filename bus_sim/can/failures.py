@@ -5,14 +5,11 @@ follow. Together they take 6 to 12 bits, and the eight bits of the error delimit
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from bus_sim.can import bitstream
 from bus_sim.can.error_frames import BusError
+from bus_sim.can.node import SimulatedBus
 from onboard.core.frame import Frame
-
-if TYPE_CHECKING:
-    from bus_sim.can.node import SimulatedBus
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +22,7 @@ class Failure:
     error: BusError
     detected_bits: int
     flag_bits: int
-    detected_first: tuple["SimulatedBus", ...] = ()
+    detected_first: tuple[SimulatedBus, ...] = ()
 
     @property
     def length_bits(self) -> int:
@@ -55,7 +52,7 @@ def acknowledgement_missing(length_bits: int) -> Failure:
     return Failure(BusError.ACKNOWLEDGEMENT, length_bits - after_slot, bitstream.FLAG_BITS)
 
 
-def wrong_crc(length_bits: int, receivers: tuple["SimulatedBus", ...]) -> Failure:
+def wrong_crc(length_bits: int, receivers: tuple[SimulatedBus, ...]) -> Failure:
     """Some receivers flag a wrong CRC after the ACK delimiter; the rest see a dominant bit in the end of frame.
 
     So theirs begin one bit later, and both together take seven bits.

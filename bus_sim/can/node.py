@@ -1,18 +1,52 @@
 """One node on a simulated CAN bus: acceptance filters, transmit mailboxes, queues, error counters, a busy processor."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 from bus_sim.can.arbitration import is_sendable
 from bus_sim.can.error_counters import ErrorCounters
+from bus_sim.can.faults import FaultInjector
+from bus_sim.virtual_time import Clock
 from onboard.core.frame import Frame
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
 
-if TYPE_CHECKING:
-    from bus_sim.can.delivery import Route
-    from bus_sim.can.medium import Medium
+
+class _Routes(Protocol):
+    """Who hears whom, as the medium works it out and keeps it."""
+
+    def forget_routes(self) -> None:
+        """Something that routes depend on has changed."""
+
+
+class _Counting(Protocol):
+    """Nodes that are off the bus and count before they come back."""
+
+    def begin(self, node: "SimulatedBus") -> None:
+        """A node starts to count."""
+
+
+class Wire(Protocol):
+    """What a node asks of the bus that it is attached to (``Medium``)."""
+
+    clock: Clock
+    #: Called with every frame that a node takes for sending, its time and the node's name.
+    queue_taps: list[Callable[[Frame, int, str], None]]
+
+    @property
+    def delivery(self) -> _Routes:
+        """From the end of a frame to the receivers."""
+
+    @property
+    def recovery(self) -> _Counting:
+        """The way back from bus-off."""
+
+    def load(self, node: "SimulatedBus", frame: Frame) -> None:
+        """A node puts a frame into one of its mailboxes."""
+
+    def detach(self, node: "SimulatedBus", *, in_good_order: bool) -> None:
+        """A node leaves."""
 
 
 class AcceptanceFilter(NamedTuple):
@@ -53,6 +87,31 @@ class NodeOptions:
             raise ValueError("processing_us and restart_after_us must not be negative")
 
 
+class Route:
+    """Handlers that hear one identifier of one sender, in order of attachment, and how many frames went this way."""
+
+    __slots__ = ("_victims", "everybody", "frames", "handlers", "owners", "prompt", "slow")
+
+    def __init__(self, nodes: Iterable["SimulatedBus"]) -> None:
+        self.frames = 0
+        self.everybody = list(nodes)
+        self.prompt = [node for node in self.everybody if node.is_prompt]
+        # A busy node's handlers run later anyway; only its queue's turn among the prompt ones is lost.
+        self.slow = [node for node in self.everybody if not node.is_prompt]
+        self.handlers: list[FrameHandler] = []
+        self.owners: list[SimulatedBus] = []
+        for node in self.prompt:
+            self.handlers += node.frame_handlers
+            self.owners += [node] * len(node.frame_handlers)
+        self._victims: dict[FaultInjector, list[SimulatedBus]] = {}
+
+    def victims(self, injector: FaultInjector) -> "list[SimulatedBus]":
+        """The nodes on this route that a fault may strike."""
+        if injector not in self._victims:
+            self._victims[injector] = [n for n in self.everybody if injector.chooses(n.name, n.node_id)]
+        return self._victims[injector]
+
+
 class SimulatedBus:
     """One node's connection to a ``Medium``; implements ``onboard.ports.bus.Bus``. Made by ``Medium.attach``.
 
@@ -62,7 +121,7 @@ class SimulatedBus:
 
     def __init__(
         self,
-        medium: "Medium",
+        medium: Wire,
         name: str,
         node_id: int | None,
         filters: Sequence[AcceptanceFilter],

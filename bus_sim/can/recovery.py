@@ -1,16 +1,28 @@
 """Nodes that are off the bus and the recessive bits they count before they come back (ISO 11898-1, 12.1.4.4)."""
 
-from typing import TYPE_CHECKING, Final
+from typing import Final, Protocol
 
 from bus_sim.can.error_counters import RECOVERY_BITS, RECOVERY_SEQUENCES
-
-if TYPE_CHECKING:
-    from bus_sim.can.medium import Medium
-    from bus_sim.can.node import SimulatedBus
+from bus_sim.can.node import SimulatedBus
+from bus_sim.virtual_time import Clock
 
 #: Ticks to a bit time: a tick is 1 / (bit rate) microseconds, so that every bit rate counts in whole numbers.
 TICKS_PER_BIT: Final = 1_000_000
 _SEQUENCE_TICKS: Final = RECOVERY_BITS * TICKS_PER_BIT
+
+
+class Idle(Protocol):
+    """What is asked of the bus whose recessive bits are counted (``Medium``)."""
+
+    clock: Clock
+    bit_rate: int
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether no frame is on the wire."""
+
+    def come_back(self, node: SimulatedBus) -> None:
+        """A node has recovered."""
 
 
 class Recovery:
@@ -19,13 +31,13 @@ class Recovery:
     ACK delimiter, end of frame and intermission are eleven recessive bits, as are error delimiter and intermission.
     """
 
-    def __init__(self, medium: "Medium") -> None:
+    def __init__(self, medium: Idle) -> None:
         self._medium = medium
         self._missing: dict[SimulatedBus, int] = {}
         self._recessive_since_ticks = -_SEQUENCE_TICKS
         self._timer_us: int | None = None
 
-    def begin(self, node: "SimulatedBus") -> None:
+    def begin(self, node: SimulatedBus) -> None:
         """A node starts to count."""
         if node in self._missing:
             return
@@ -37,7 +49,7 @@ class Recovery:
         self._missing[node] = RECOVERY_SEQUENCES
         self._set_timer()
 
-    def forget(self, node: "SimulatedBus") -> None:
+    def forget(self, node: SimulatedBus) -> None:
         """A node left before it was back."""
         self._missing.pop(node, None)
 

@@ -18,7 +18,7 @@ class Timers(Protocol):
     def now_us(self) -> int:
         """The present time; never less than the time asked for by the call being made."""
 
-    def call_at(self, when_us: int, callback: Callable[[], None]) -> Timer:
+    def call_at(self, when_us: int, callback: Callable[[], object]) -> Timer:
         """Make one call at ``when_us``, or as soon as possible where that is past."""
 
 
@@ -36,10 +36,10 @@ class LoopTimers:
         """The loop's time, rounded to a microsecond."""
         return max(self._floor_us, round(self._loop.time() * 1e6))
 
-    def call_at(self, when_us: int, callback: Callable[[], None]) -> Timer:
+    def call_at(self, when_us: int, callback: Callable[[], object]) -> Timer:
         """A timer of the loop."""
         return self._loop.call_at(when_us / 1e6, self._fire, when_us, callback)
 
-    def _fire(self, when_us: int, callback: Callable[[], None]) -> None:
+    def _fire(self, when_us: int, callback: Callable[[], object]) -> None:
         self._floor_us = max(self._floor_us, when_us)
         callback()

@@ -1,21 +1,24 @@
 """Puts faults to work: frame faults into the bus when it is built, everything else by timers once it runs."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
-from typing import Final
+from typing import Any, Final
 
 from bus_sim.attacks.launch import attack
-from bus_sim.can.faults import Fault
-from bus_sim.faults import bus, controllers, devices, operators, people
+from bus_sim.demand import DemandError
+from bus_sim.faults import bus, controllers, devices, operators
+from bus_sim.faults.bus import FRAME_FAULTS
 from bus_sim.faults.holon import FaultyHolon
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.table import KINDS
-from bus_sim.run import Simulation
+from bus_sim.run import BusRun
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Action
 from onboard.config.problems import nearest
 from onboard.core.site import Site
 
-#: What each kind does at its time; kinds that are frame faults have nothing here.
-ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
+#: What each kind that any system can have does at its time; kinds that are frame faults have nothing here.
+ACTIONS: Final[dict[str, Action]] = {
     "overflow": controllers.overflow,
     "babble": bus.babble,
     "double_id": bus.double_id,
@@ -29,20 +32,8 @@ ACTIONS: Final[dict[str, Callable[[Simulation, Injection], None]]] = {
     "clock_frozen": controllers.clock_frozen,
     "clock_jump": controllers.clock_jump,
     "sensor_off": devices.sensor_off,
-    "sensor_stuck": devices.sensor_stuck,
     "sensor_flaky": devices.sensor_flaky,
-    "sensor_wrong": devices.sensor_wrong,
     "actuator_stuck": devices.actuator_stuck,
-    "actuator_slow": devices.actuator_slow,
-    "actuator_halfway": devices.actuator_halfway,
-    "lost_ticket": people.lost_ticket,
-    "key_presses": people.key_presses,
-    "cancel": people.cancel,
-    "linger": people.linger,
-    "oversize": people.oversize,
-    "door_forced": people.door_forced,
-    "moved": people.moved,
-    "blocked": operators.blocked,
     "emergency_stop": operators.emergency_stop,
     "operate": operators.operate,
 }
@@ -67,32 +58,39 @@ def check_targets(faults: Iterable[AnyFault], site: Site) -> None:
                         )
 
 
-def frame_faults(faults: Iterable[AnyFault], site: Site) -> tuple[Fault, ...]:
-    """Those faults that act on single frames of the fleet bus, for ``RunOptions.faults``."""
-    found: list[Fault] = []
+def actions_for(site: Site) -> Mapping[str, Action]:
+    """All that can happen on a site at a chosen time, by kind: what happens anywhere, and its system's own."""
+    return {**ACTIONS, **simulated_of(site).actions}
+
+
+def check_faults(faults: Iterable[AnyFault], site: Site) -> None:
+    """Raise ``DemandError`` for a kind of fault that strikes nothing on this site, and for a machine it has not."""
+    known = (*FRAME_FAULTS, *actions_for(site))
     for fault in faults:
-        found += [fault] if isinstance(fault, Fault) else bus.frame_faults(fault, site)
-    return tuple(found)
+        if isinstance(fault, Injection) and fault.kind not in known:
+            what = f"a {site.system} has nothing that this strikes ({KINDS[fault.kind].told})"
+            raise DemandError(f"--fault {fault}: {site.name}: {what}; use {', '.join(sorted(known))}")
+    try:
+        check_targets(faults, site)
+    except ValueError as error:
+        raise DemandError(f"--fault: {error}") from error
 
 
-def arm(
-    simulation: Simulation,
-    faults: Iterable[AnyFault],
-    actions: Mapping[str, Callable[[Simulation, Injection], None]] = ACTIONS,
-) -> None:
-    """Set up all others; before ``Simulation.start``, with the customers on the street."""
+def arm(run: BusRun[Any], faults: Iterable[AnyFault], actions: Mapping[str, Action] | None = None) -> None:
+    """Set up all faults but those of single frames; before ``BusRun.start``. ``actions``: None for the site's own."""
     injections = [fault for fault in faults if isinstance(fault, Injection)]
     if not injections:
         return
-    simulation.holon_class = FaultyHolon
-    for medium in simulation.devices.values():
+    acts = actions_for(run.site) if actions is None else actions
+    run.holon_class = FaultyHolon
+    for medium in run.devices.values():
         # A device bus has several nodes, so that a frame is acknowledged though the controller is off.
         medium.attach("terminal block", None)
     for injection in injections:
-        action = actions.get(injection.kind)
+        action = acts.get(injection.kind)
         if action is None:
             continue
         if "at_s" in KINDS[injection.kind].settings and injection.kind not in _FROM_POWER_UP:
-            simulation.plant.timers.call_at(injection.at_us, partial(action, simulation, injection))
+            run.plant.timers.call_at(injection.at_us, partial(action, run, injection))
         else:
-            action(simulation, injection)
+            action(run, injection)

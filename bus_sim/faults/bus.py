@@ -1,24 +1,33 @@
 """Faults of the fleet bus: those that are frame faults in a window, and nodes that do not belong there."""
 
+from collections.abc import Iterable
 from functools import partial
+from typing import Any
 
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.can.node import SimulatedBus
-from bus_sim.faults.injection import Injection
+from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.journal import SimulatedJournal
-from bus_sim.run import NoWatchdog, Simulation
+from bus_sim.run import BusRun, NoWatchdog
 from onboard.controller.shell import Controller, Ports
 from onboard.core.frame import Frame
 from onboard.core.holon import Holon
 from onboard.core.site import Site
 from onboard.ports.bus import BusHealth, ErrorState, FrameHandler
-from onboard.wire.codec import device_codec, fleet_codec
 
 #: The lowest byte of an identifier is the sender's node-ID.
 SENDER_MASK = 0xFF
 
 
-def frame_faults(injection: Injection, site: Site) -> list[Fault]:
+def frame_faults(faults: Iterable[AnyFault], site: Site) -> tuple[Fault, ...]:
+    """Those faults that act on single frames of the fleet bus, and what others come down to."""
+    found: list[Fault] = []
+    for fault in faults:
+        found += [fault] if isinstance(fault, Fault) else _as_frame_faults(fault, site)
+    return tuple(found)
+
+
+def _as_frame_faults(injection: Injection, site: Site) -> list[Fault]:
     """The faults of single frames that an injection comes down to; none where it is another thing."""
     make = _AS_FRAME_FAULTS.get(injection.kind)
     if make is None or injection.until_us <= injection.at_us:
@@ -117,6 +126,10 @@ _AS_FRAME_FAULTS = {
 }
 
 
+#: Kinds that come down to faults of single frames.
+FRAME_FAULTS = tuple(_AS_FRAME_FAULTS)
+
+
 def _seed(injection: Injection) -> int:
     return injection.count("seed")
 
@@ -128,14 +141,14 @@ def _node(site: Site, name: str) -> int:
 # --- nodes that do not belong there ----------------------------------------------------------------------------
 
 
-def babble(simulation: Simulation, injection: Injection) -> None:
+def babble(simulation: BusRun[Any], injection: Injection) -> None:
     """A node that says one frame of high priority over and over until its time is over."""
     bus = simulation.fleet.attach(f"babbler {injection.at_us}", None)
     frame = Frame(injection.count("id"), b"\x55" * 8)
     _babble_on(simulation, bus, frame, 1_000_000 // injection.count("rate_hz"), injection.until_us)
 
 
-def _babble_on(simulation: Simulation, bus: SimulatedBus, frame: Frame, gap_us: int, until_us: int) -> None:
+def _babble_on(simulation: BusRun[Any], bus: SimulatedBus, frame: Frame, gap_us: int, until_us: int) -> None:
     now_us = simulation.loop.now_us()
     if now_us >= until_us:
         bus.power_off()
@@ -166,13 +179,13 @@ class NoDevices:
         """Nothing to give back."""
 
 
-def double_id(simulation: Simulation, injection: Injection) -> None:
+def double_id(simulation: BusRun[Any], injection: Injection) -> None:
     """A second board with the same machine file, a journal of its own that is empty, and no devices behind it."""
     machine = next(one for one in simulation.site.machines.values() if one.name == injection.target)
     holon = Holon(simulation.site, machine, simulation.factories(simulation.site, machine.kind))
     fleet = simulation.fleet.attach(f"{machine.name} again {injection.at_us}", machine.node_id)
     ports = Ports(fleet, NoDevices(), SimulatedJournal(), simulation.log, NoWatchdog())
-    controller = Controller(holon, ports, fleet_codec(), device_codec())
+    controller = Controller(holon, ports, simulation.codecs.fleet, simulation.codecs.device)
     controller.start()
     simulation.plant.timers.call_at(injection.until_us, partial(_unplug, controller, fleet))
 

@@ -4,16 +4,17 @@ import random
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 from bus_sim.faults.holon import FROZEN_PPM, FaultyHolon
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.journals import hurt
-from bus_sim.run import Simulation
+from bus_sim.run import BusRun
 from onboard.core.frame import Frame
 from onboard.core.site import Machine
 
 
-def crash(simulation: Simulation, injection: Injection) -> None:
+def crash(simulation: BusRun[Any], injection: Injection) -> None:
     """At once, or from now on at the n-th frame that it sends or the n-th entry that it writes."""
     machine = machine_named(simulation, injection.target)
     strike = partial(lose_power, simulation, injection)
@@ -26,7 +27,7 @@ def crash(simulation: Simulation, injection: Injection) -> None:
         strike()
 
 
-def lose_power(simulation: Simulation, injection: Injection) -> None:
+def lose_power(simulation: BusRun[Any], injection: Injection) -> None:
     """Now, and what else this crash brings: the harm to the journal, and the power coming back."""
     machine = machine_named(simulation, injection.target)
     if machine.node_id not in simulation.controllers:
@@ -37,7 +38,7 @@ def lose_power(simulation: Simulation, injection: Injection) -> None:
         restart_later(simulation, machine, simulation.loop.now_us() + round(injection.number("restart_s") * 1e6))
 
 
-def _at_frame(simulation: Simulation, machine: Machine, number: int, strike: Callable[[], None]) -> None:
+def _at_frame(simulation: BusRun[Any], machine: Machine, number: int, strike: Callable[[], None]) -> None:
     """The n-th frame of this machine is queued and never leaves: the power goes while it waits."""
     left = [number]
 
@@ -52,7 +53,7 @@ def _at_frame(simulation: Simulation, machine: Machine, number: int, strike: Cal
 
 
 def _at_write(
-    simulation: Simulation, machine: Machine, number: int, *, durable: bool, strike: Callable[[], None]
+    simulation: BusRun[Any], machine: Machine, number: int, *, durable: bool, strike: Callable[[], None]
 ) -> None:
     journal = simulation.journals[machine.node_id]
     left = [number]
@@ -68,7 +69,7 @@ def _at_write(
     journal.on_write = count
 
 
-def restart_later(simulation: Simulation, machine: Machine, when_us: int) -> None:
+def restart_later(simulation: BusRun[Any], machine: Machine, when_us: int) -> None:
     """Power comes back at a loop time, us; nothing happens where it is back already."""
 
     def power_up() -> None:
@@ -78,7 +79,7 @@ def restart_later(simulation: Simulation, machine: Machine, when_us: int) -> Non
     simulation.plant.timers.call_at(when_us, power_up)
 
 
-def power_cut(simulation: Simulation, injection: Injection) -> None:
+def power_cut(simulation: BusRun[Any], injection: Injection) -> None:
     """All controllers at once; afterwards each comes back by itself at a moment drawn by chance."""
     chance = random.Random(injection.count("seed"))
     for machine in simulation.site.machines.values():
@@ -88,7 +89,7 @@ def power_cut(simulation: Simulation, injection: Injection) -> None:
             restart_later(simulation, machine, when_us)
 
 
-def disk_full(simulation: Simulation, injection: Injection) -> None:
+def disk_full(simulation: BusRun[Any], injection: Injection) -> None:
     """No entry can be written; when there is room again the machine is switched off and on by its supervisor."""
     machine = machine_named(simulation, injection.target)
     simulation.journals[machine.node_id].is_full = True
@@ -101,36 +102,36 @@ def disk_full(simulation: Simulation, injection: Injection) -> None:
     simulation.plant.timers.call_at(injection.until_us, room)
 
 
-def pause(simulation: Simulation, injection: Injection) -> None:
+def pause(simulation: BusRun[Any], injection: Injection) -> None:
     """The process stands still."""
     holon = _holon(simulation, injection)
     if holon is not None:
         holon.pause(injection.until_us)
 
 
-def drift(simulation: Simulation, injection: Injection) -> None:
+def drift(simulation: BusRun[Any], injection: Injection) -> None:
     """The clocks are too fast or too slow from now on, until it is over or the controller is restarted."""
     _set_rate(simulation, injection, injection.count("ppm"))
 
 
-def clock_frozen(simulation: Simulation, injection: Injection) -> None:
+def clock_frozen(simulation: BusRun[Any], injection: Injection) -> None:
     """The clocks stand still: what was due in a moment is not due, and what comes from outside comes at one time."""
     _set_rate(simulation, injection, FROZEN_PPM)
 
 
-def clock_jump(simulation: Simulation, injection: Injection) -> None:
+def clock_jump(simulation: BusRun[Any], injection: Injection) -> None:
     """The clocks jump, forwards or backwards."""
     _set_clocks(simulation, injection, jump_us=injection.count("by_ms") * 1000)
 
 
-def _set_rate(simulation: Simulation, injection: Injection, ppm: int) -> None:
+def _set_rate(simulation: BusRun[Any], injection: Injection, ppm: int) -> None:
     _set_clocks(simulation, injection, ppm=ppm)
     if injection.number("for_s"):
         # At its rate again, whatever it shows.
         simulation.plant.timers.call_at(injection.until_us, lambda: _set_clocks(simulation, injection, ppm=0))
 
 
-def _set_clocks(simulation: Simulation, injection: Injection, *, jump_us: int = 0, ppm: int | None = None) -> None:
+def _set_clocks(simulation: BusRun[Any], injection: Injection, *, jump_us: int = 0, ppm: int | None = None) -> None:
     for name in injection.target.split("|"):
         controller = simulation.controllers.get(machine_named(simulation, name).node_id)
         if controller is not None:
@@ -139,17 +140,17 @@ def _set_clocks(simulation: Simulation, injection: Injection, *, jump_us: int = 
             controller.look_at_clock()
 
 
-def slow_node(simulation: Simulation, injection: Injection) -> None:
+def slow_node(simulation: BusRun[Any], injection: Injection) -> None:
     """Each frame of the fleet bus costs its processor so much, us."""
     _slow(simulation, injection, None)
 
 
-def overflow(simulation: Simulation, injection: Injection) -> None:
+def overflow(simulation: BusRun[Any], injection: Injection) -> None:
     """The same behind a queue that is too short."""
     _slow(simulation, injection, injection.count("queue"))
 
 
-def _slow(simulation: Simulation, injection: Injection, queue: int | None) -> None:
+def _slow(simulation: BusRun[Any], injection: Injection, queue: int | None) -> None:
     bus = simulation.fleet_node(injection.target)
     if bus is None:
         return
@@ -165,12 +166,12 @@ def _slow(simulation: Simulation, injection: Injection, queue: int | None) -> No
     simulation.plant.timers.call_at(injection.until_us, heal)
 
 
-def machine_named(simulation: Simulation, name: str) -> Machine:
+def machine_named(simulation: BusRun[Any], name: str) -> Machine:
     """A machine of the site; ``prepare`` has made sure that there is one."""
     return next(machine for machine in simulation.site.machines.values() if machine.name == name)
 
 
-def _holon(simulation: Simulation, injection: Injection) -> FaultyHolon | None:
+def _holon(simulation: BusRun[Any], injection: Injection) -> FaultyHolon | None:
     controller = simulation.controllers.get(machine_named(simulation, injection.target).node_id)
     if controller is None:
         return None

@@ -1,9 +1,10 @@
 """What a person does at an operator's station: a node of its own on the fleet bus, above all machines."""
 
 from functools import partial
+from typing import Any
 
 from bus_sim.faults.injection import Injection
-from bus_sim.run import Simulation
+from bus_sim.run import BusRun
 from onboard.core.codes import Reason
 from onboard.core.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment
@@ -11,13 +12,12 @@ from onboard.operate.names import OperateError
 from onboard.operate.order import Order
 from onboard.operate.station import Station
 from onboard.operate.wishes import Wish, maker_of
-from onboard.wire.codec import fleet_codec
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
 STATION = 251
 
 
-def blocked(simulation: Simulation, injection: Injection) -> None:
+def blocked(simulation: BusRun[Any], injection: Injection) -> None:
     """Somebody says that a segment cannot be passed, and some time later that it can."""
     where = Segment(injection.count("track"), injection.count("index"))
     _say(simulation, Blocked(STATION, *where, Reason.OPERATOR))
@@ -26,19 +26,19 @@ def blocked(simulation: Simulation, injection: Injection) -> None:
         simulation.plant.timers.call_at(injection.until_us, clear)
 
 
-def emergency_stop(simulation: Simulation, _: Injection) -> None:
+def emergency_stop(simulation: BusRun[Any], _: Injection) -> None:
     """Somebody presses the button: every machine holds for half a minute, or until an operator lets it go on."""
     _say(simulation, EmergencyStop(STATION, Reason.OPERATOR))
 
 
-def operate(simulation: Simulation, injection: Injection) -> None:
+def operate(simulation: BusRun[Any], injection: Injection) -> None:
     """A person gives a command of ``onboard operate`` and answers yes; what it says is in the run's telemetry."""
     task = simulation.loop.create_task(_operate(simulation, injection))
     # An exception in it is a mistake of this program: it ends the run.
     task.add_done_callback(lambda done: None if done.cancelled() else done.result())
 
 
-async def _operate(simulation: Simulation, injection: Injection) -> None:
+async def _operate(simulation: BusRun[Any], injection: Injection) -> None:
     loop, site = simulation.loop, simulation.site
     who = f"operator {injection.text('do')} {loop.now_us()}"
     bus = simulation.fleet.attach(who, None)
@@ -76,7 +76,7 @@ def wish_of(injection: Injection) -> Wish:
     )
 
 
-def _say(simulation: Simulation, message: Message) -> None:
+def _say(simulation: BusRun[Any], message: Message) -> None:
     bus = simulation.fleet.attach(f"operator {simulation.loop.now_us()}", STATION)
-    for frame in fleet_codec().encode(message):
+    for frame in simulation.codecs.fleet.encode(message):
         bus.send(frame)

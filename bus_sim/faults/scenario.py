@@ -24,33 +24,18 @@
 """
 
 import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bus_sim.demand import Demand, DemandError
-from bus_sim.faults.arm import check_targets
+from bus_sim.demand import DemandError
+from bus_sim.faults.arm import check_faults
 from bus_sim.faults.injection import AnyFault, parse_injection
 from bus_sim.sites import SiteNotFoundError, find_site
-from bus_sim.systems.orders import Orders
-from bus_sim.systems.session import check_faults
+from bus_sim.systems.registry import simulated, simulated_names, simulated_of
+from bus_sim.systems.system import Coming
 from onboard.config.problems import ConfigError, Problems, nearest, quoted
 from onboard.core.site import Site
-from onboard.systems.car_park.site import CarPark
-
-
-@dataclass(frozen=True)
-class Arrivals:
-    """Cars at normal intervals, in s, fetched at such intervals ``min_stay_s`` after their coming at the earliest."""
-
-    cars: int = 6
-    mean_s: float = 120.0
-    sigma_s: float = 60.0
-    min_stay_s: float = 200.0
-
-    def demand(self, seed: int) -> Demand:
-        """The stays of one seed. Raises ``DemandError`` for a law that is none."""
-        return Demand.by_mean(self.mean_s, self.sigma_s, seed, count=self.cars, min_stay_s=self.min_stay_s)
 
 
 @dataclass(frozen=True)
@@ -60,10 +45,9 @@ class Scenario:
     site: str
     seed: int = 1
     limit_s: float = 7_200.0
-    arrivals: Arrivals = field(default_factory=Arrivals)
+    #: Who comes, in the words of the site's system; None: as it is where a file says nothing about it.
+    demand: Coming | None = None
     faults: tuple[AnyFault, ...] = ()
-    #: What the seed draws for a site that is no car park; None: nothing, as for a car park.
-    orders: Orders | None = None
 
     def with_faults(self, faults: Iterable[AnyFault]) -> "Scenario":
         """The same with other faults."""
@@ -73,7 +57,7 @@ class Scenario:
         """The text that ``load_scenario`` reads."""
         lines = [f"# {line}" for line in comment.splitlines()]
         lines += ["[scenario]", f"site = {quoted(self.site)}", f"seed = {self.seed}"]
-        lines += [f"limit_s = {self.limit_s:.15g}", "", *self._who_comes()]
+        lines += [f"limit_s = {self.limit_s:.15g}", *self._who_comes()]
         for fault in self.faults:
             kind, _, settings = str(fault).partition(":")
             lines += ["", "[[fault]]", f"kind = {quoted(kind)}"]
@@ -82,16 +66,7 @@ class Scenario:
         return "\n".join(lines) + "\n"
 
     def _who_comes(self) -> list[str]:
-        arrivals, orders = self.arrivals, self.orders
-        if orders is not None:
-            return ["[orders]", f"count = {orders.count}", f"apart_s = {orders.apart_s:.15g}"]
-        return [
-            "[demand]",
-            f"cars = {arrivals.cars}",
-            f"mean_s = {arrivals.mean_s:.15g}",
-            f"sigma_s = {arrivals.sigma_s:.15g}",
-            f"min_stay_s = {arrivals.min_stay_s:.15g}",
-        ]
+        return [] if self.demand is None else ["", *self.demand.to_toml()]
 
 
 def _is_number(text: str) -> bool:
@@ -102,11 +77,7 @@ def _is_number(text: str) -> bool:
     return text[:1].isdigit() or text[:1] == "-"
 
 
-_SECTIONS = {
-    "scenario": {"site": str, "seed": int, "limit_s": float},
-    "demand": {"cars": int, "mean_s": float, "sigma_s": float, "min_stay_s": float},
-    "orders": {"count": int, "apart_s": float},
-}
+_HEAD: Mapping[str, type] = {"site": str, "seed": int, "limit_s": float}
 _WORDS = {str: "a text in quotes", int: "a whole number from 0", float: "a number above 0"}
 
 
@@ -136,24 +107,20 @@ class _Reader:
 
     def read(self) -> tuple[Scenario, Site]:
         """Scenario and site, or ``ConfigError``."""
+        sections = {one.section: one.settings for one in map(simulated, simulated_names())}
         for key in self._table:
-            if key not in (*_SECTIONS, "fault"):
-                self._problems.add(
-                    self._line(f"[{key}"), key, None, "is no part of a scenario", nearest(key, [*_SECTIONS, "fault"])
-                )
-        head, demand, orders = self._section("scenario"), self._section("demand"), self._section("orders")
-        faults = self._faults()
-        site = self._site(head.pop("site", None))
-        wanted = self._orders(site, orders)
-        scenario = Scenario("", arrivals=Arrivals(**demand), faults=tuple(faults), orders=wanted, **head)  # type: ignore[arg-type]  # _section checked each value's type
-        try:
-            scenario.arrivals.demand(scenario.seed)
-        except DemandError as error:
-            self._problems.add(self._line("[demand"), "demand", None, str(error), "correct it")
+            if key not in ("scenario", "fault", *sections):
+                known = ["scenario", *sections, "fault"]
+                self._problems.add(self._line(f"[{key}"), key, None, "is no part of a scenario", nearest(key, known))
+        head = self._section("scenario", _HEAD)
+        given = {name: self._section(name, sections[name]) for name in self._table if name in sections}
+        faults, site = self._faults(), self._site(head.pop("site", None))
+        demand = self._demand(site, given, int(str(head.get("seed", 1)))) if site is not None else None
+        scenario = Scenario("", demand=demand, faults=tuple(faults), **head)  # type: ignore[arg-type]  # _section checked each value's type
         if site is not None:
             try:
-                (check_targets if site.system == CarPark.system else check_faults)(tuple(faults), site)
-            except ValueError as error:
+                check_faults(faults, site)
+            except DemandError as error:
                 self._problems.add(self._line("[[fault"), "fault", None, str(error), "name one of the site's machines")
         self._problems.raise_if_any()
         assert site is not None
@@ -161,23 +128,32 @@ class _Reader:
         assert isinstance(found, dict)
         return replace(scenario, site=found["site"]), site
 
-    def _orders(self, site: Site | None, section: dict[str, object]) -> Orders | None:
-        """Cars come to car parks, orders to all other sites: the wrong section is noted, and one without a count."""
-        if site is None:
+    def _demand(self, site: Site, given: Mapping[str, dict[str, object]], seed: int) -> Coming | None:
+        """Who comes, in the section of the site's system: another one is noted, and what that system cannot bring."""
+        system = simulated_of(site)
+        section = system.section
+        for key in given:
+            if key != section:
+                what, remedy = f"is nothing for a {site.system}", f"write [{section}], or leave it out"
+                self._problems.add(self._line(f"[{key}"), key, None, what, remedy)
+        if section not in given:
             return None
-        is_park = site.system == CarPark.system
-        right, wrong = ("demand", "orders") if is_park else ("orders", "demand")
-        if wrong in self._table:
-            what, remedy = f"is nothing for a {site.system}", f"write [{right}], or leave it out"
-            self._problems.add(self._line(f"[{wrong}"), wrong, None, what, remedy)
-        given = self._table.get("orders")
-        if is_park or given is None:
+        line, table = self._line(f"[{section}"), self._table[section]
+        for name, example in system.needed.items():
+            if isinstance(table, dict) and name not in table:
+                self._problems.add(line, f"{section}.{name}", None, "is missing", f"write {name} = {example}")
+        if not system.needed.keys() <= given[section].keys():
             return None
-        if isinstance(given, dict) and "count" not in given:
-            self._problems.add(self._line("[orders"), "orders.count", None, "is missing", "write count = 12, or 0")
-        return Orders(**{"count": 0, "apart_s": 1.0, **section})  # type: ignore[arg-type]  # _section checked each value's type
+        try:
+            demand: Coming | None = system.read(given[section])
+            system.check(site, demand, seed)
+        except DemandError as error:
+            self._problems.add(line, section, None, str(error), "correct it")
+        else:
+            return demand
+        return None
 
-    def _section(self, name: str) -> dict[str, object]:
+    def _section(self, name: str, settings: Mapping[str, type]) -> dict[str, object]:
         section = self._table.get(name, {})
         line = self._line(f"[{name}")
         if not isinstance(section, dict):
@@ -185,9 +161,9 @@ class _Reader:
             return {}
         kept: dict[str, object] = {}
         for key, value in section.items():
-            wanted = _SECTIONS[name].get(key)
+            wanted = settings.get(key)
             if wanted is None:
-                self._problems.add(line, f"{name}.{key}", value, "is no setting", nearest(key, list(_SECTIONS[name])))
+                self._problems.add(line, f"{name}.{key}", value, "is no setting", nearest(key, list(settings)))
             elif not _fits(value, wanted):
                 self._problems.add(line, f"{name}.{key}", value, "has the wrong value", f"must be {_WORDS[wanted]}")
             else:

@@ -7,12 +7,13 @@ import tempfile
 from asyncio.subprocess import Process
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
 from bus_sim.processes.plan import ProcessPlan, Span, machine_file, spans_of
 from bus_sim.processes.spawn import log_of, start_machine
-from bus_sim.run import Simulation
+from bus_sim.run import BusRun
 
 #: How long a process may take to end once it was told to, s: two closings of a connection and a journal write.
 GRACE_S = 5.0
@@ -37,7 +38,7 @@ class ProcessFleet:
     told in ``failures`` with its last words, and ends the run: ``is_over``. Entering raises ``ProcessesError``.
     """
 
-    def __init__(self, simulation: Simulation, plan: ProcessPlan, outside: frozenset[str], console: Console) -> None:
+    def __init__(self, simulation: BusRun[Any], plan: ProcessPlan, outside: frozenset[str], console: Console) -> None:
         """``outside`` are machines that somebody else runs, or nobody. Raises ``ValueError`` for a bad plan."""
         names = [machine.name for machine in simulation.site.machines.values() if machine.name not in outside]
         self.failures: list[str] = []

@@ -1,14 +1,34 @@
-"""Orders that a seed draws for a site of any system but the car park, and what became of them at the run's end."""
+"""Systems to whose desks orders come: those of the site file, or as many as a seed draws; what became of them."""
 
 import random
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from argparse import Namespace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from bus_sim.demand import DemandError, Law
-from bus_sim.systems.session import PlantMaker, SystemPlant
-from onboard.core.site import Site
+from bus_sim.devices.link import BusDeviceLink
+from bus_sim.devices.timers import LoopTimers, Timers
+from bus_sim.faults.bus import frame_faults
+from bus_sim.options import RunOptions
+from bus_sim.run import BusRun, buses_of, links_of
+from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.system import HAND_SPEED, Faulted, Occasion, PlantT, SimulatedSystem, SiteT
+from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.core.codes import KindCode
+
+#: Faults begin so long after power-up, s: the machines have found each other, and the first orders are there.
+BEGIN_S = 12.0
+#: A run is given up after so many times what an order takes, and once more for each that is usual: they may all wait.
+PATIENCE = 20
+#: Kinds of fault that campaigns draw: those of the buses, of controllers and of their clocks that all machines know.
+DRAWN = frozenset(
+    {
+        *("burst", "bit_errors", "lossy", "reorder", "bus_off", "partition", "overflow", "babble", "attack"),
+        *("crash", "pause", "slow_node", "disk_full", "power_cut", "drift", "clock_jump"),
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -30,33 +50,112 @@ class Orders:
         """The source of everything that is drawn for one seed of a site."""
         return random.Random(f"orders:{site}:{seed}")
 
-
-class Tally(NamedTuple):
-    """What became of everybody who came; times in s. ``full``: those told why for want of room."""
-
-    served: int
-    told: int
-    waiting: int
-    longest_wait_s: float
-    full: int = 0
+    def to_toml(self) -> list[str]:
+        """A scenario's section."""
+        return ["[orders]", f"count = {self.count}", f"apart_s = {self.apart_s:.15g}"]
 
 
 @dataclass(frozen=True)
-class System:
-    """One system in campaigns: its plant, how orders are drawn, when the site's last one comes, how they are counted.
+class OrderedSystem(SimulatedSystem[SiteT, PlantT]):
+    """A system to which orders come.
 
-    ``order_s`` is about what one order takes on a site: faults strike until the last one should be done. ``usual`` are
+    ``order_s`` is about what one order takes on a site: faults strike until the last one should be done. ``most`` are
     the orders of a seed where nothing else is asked for: as many as the machines can just carry out.
     """
 
-    plant: PlantMaker
-    draw: Callable[[Site, Orders, int], Site]
-    last_s: Callable[[Site], float]
-    tally: Callable[[SystemPlant], Tally]
-    order_s: Callable[[Site], float]
-    usual: Callable[[Site], Orders]
-    #: What ``tally`` counts.
-    who: str = "orders"
+    name: str
+    #: The plant from the site, its timers, each machine's link to its device bus, and the seed.
+    plant: Callable[[SiteT, Timers, dict[int, BusDeviceLink], int], PlantT]
+    #: A run that is connected, and what came of it.
+    staged: Callable[[BusRun[PlantT]], Stage[PlantT]]
+    #: The site with orders that a seed draws. Raises ``DemandError`` for orders that it cannot have.
+    draw: Callable[[SiteT, Orders, int], SiteT]
+    #: When the last of the site's orders comes, s after power-up.
+    last_s: Callable[[SiteT], float]
+    order_s: Callable[[SiteT], float]
+    most: Callable[[SiteT], Orders]
+    worker: KindCode | None = None
+    #: The parts of a run, connected.
+    connected: Callable[..., BusRun[PlantT]] = BusRun
+    #: How fast a run goes for somebody who looks on in a terminal, simulated seconds a second; None: at full speed.
+    look_speed: float | None = None
+    attacks: Mapping[str, type[Any]] = field(default_factory=dict)
+    drawn: frozenset[str] | None = DRAWN
+
+    section: ClassVar[str] = "orders"
+    settings: ClassVar[Mapping[str, type]] = {"count": int, "apart_s": float}
+    needed: ClassVar[Mapping[str, str]] = {"count": "12, or 0"}
+
+    def stage(self, site: SiteT, options: RunOptions, loop: VirtualTimeLoop) -> Stage[PlantT]:
+        """See ``SimulatedSystem``."""
+        drawn = self.with_orders(site, options.demand, options.seed)
+        fleet, devices = buses_of(drawn, frame_faults(options.faults, drawn), loop)
+        links = links_of(drawn, devices)
+        plant = self.plant(drawn, LoopTimers(loop), links, options.seed)
+        return self.staged(self.connected(drawn, options, loop, fleet, devices, plant, links))
+
+    def asked(self, site: SiteT, args: Namespace, given: Mapping[str, object], *, live: bool) -> Orders | None:
+        """The site's own; no option says another thing."""
+        for name in given:
+            option = f"--{name.removesuffix('_s').replace('_', '-')}"
+            raise DemandError(
+                f"{option}: is about cars that come and go by the clock of a day; {site.name} is a {site.system}, and "
+                "its orders are those of its site file; leave it out"
+            )
+        return None
+
+    def speed(self, demand: Any, *, web: bool, terminal: bool) -> float | None:
+        """See ``SimulatedSystem``."""
+        return HAND_SPEED if web else self.look_speed if terminal else None
+
+    def with_orders(self, site: SiteT, orders: Orders | None, seed: int) -> SiteT:
+        """The site with what a seed brings. Raises ``DemandError`` for orders that it cannot bring."""
+        return site if orders is None or not orders.count else self.draw(site, orders, seed)
+
+    def read(self, given: Mapping[str, object]) -> Orders:
+        """See ``SimulatedSystem``."""
+        return Orders(**{"apart_s": 1.0, **given})  # type: ignore[arg-type]  # the reader checked each value's type
+
+    def usual(self, site: SiteT, args: Mapping[str, float | None]) -> Orders:
+        """Of what is not asked for, what is usual on the system."""
+        if args.get("cars") is not None:
+            raise DemandError(
+                f"--cars {args['cars']}: {site.name} is a {site.system}, to which no cars come; write --orders"
+            )
+        usual, count, apart_s = self.most(site), args.get("orders"), args.get("apart")
+        return Orders(usual.count if count is None else int(count), usual.apart_s if apart_s is None else apart_s)
+
+    def on(self, occasion: Occasion, site: SiteT) -> Orders:
+        """One, three that overlap, the site's own where it has none, or what is usual."""
+        if occasion in (Occasion.ALONE, Occasion.NOBODY):
+            return Orders(int(occasion is Occasion.ALONE), 1.0)
+        return Orders(3, self.order_s(site) / 4) if occasion is Occasion.OVERLAP else self.most(site)
+
+    def count(self, demand: Orders | None) -> str:
+        """See ``SimulatedSystem``."""
+        return f"{demand.count} orders" if demand is not None and demand.count else "the site's own orders"
+
+    def check(self, site: SiteT, demand: Orders | None, seed: int) -> None:
+        """They are drawn once."""
+        self.with_orders(site, demand, seed)
+
+    def span_s(self, site: SiteT) -> tuple[float, float]:
+        """When faults may begin, s after power-up: from the first order to where the last should be done."""
+        return BEGIN_S, max(BEGIN_S, self.last_s(site)) + self.order_s(site)
+
+    def faulted(self, site: SiteT, demand: Orders | None, seed: int, limit_s: float) -> Faulted:
+        """Until the last order should be done."""
+        span = self.span_s(self.with_orders(site, demand, seed))
+        return Faulted(span, span[1])
+
+    def attacked_s(self, site: SiteT, demand: Orders | None, seed: int) -> tuple[float, float]:
+        """While orders come and are carried out."""
+        return self.span_s(self.with_orders(site, demand, seed))
+
+    def patience_s(self, site: SiteT, demand: Orders | None, seed: int) -> float:
+        """See ``SimulatedSystem``."""
+        drawn = self.with_orders(site, demand, seed)
+        return self.span_s(drawn)[1] + (PATIENCE + self.most(drawn).count) * self.order_s(drawn)
 
 
 class Answered(Protocol):

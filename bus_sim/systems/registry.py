@@ -1,46 +1,51 @@
-"""How sites of all systems but the car park are run: the one place to add a system's plant, picture and indicators."""
+"""The simulator's half of each system: a folder beside this file, or a package that says so by an entry point.
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
+Its parts are modules of that folder, loaded when they are asked for: ``simulated`` describes it, ``commands`` are
+commands of ``bus-sim`` for its sites alone. docs/new-system.md lists what is asked of each.
+"""
 
-from bus_sim.faults.injection import AnyFault
-from bus_sim.systems.cell.run import run_cell
-from bus_sim.systems.graph.run import run_graph
-from bus_sim.systems.mapd.run import run_mapd
-from bus_sim.systems.terminal.show import run_terminal
-from bus_sim.systems.turning.run import run_turning
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Any
+
+from bus_sim import systems
+from bus_sim.systems.system import SimulatedSystem
 from onboard.core.site import Site
+from onboard.systems.folders import Folders
+
+#: Packages of other people have an entry point ``bus_sim.systems``: the system's name, then its package.
+_FOLDERS = Folders(systems)
 
 
-@dataclass(frozen=True)
-class SystemOptions:
-    """What ``bus-sim run`` was asked for, beside the site.
-
-    ``speed`` is in simulated seconds a second, None for as fast as possible; ``epoch_us`` the wall time of loop time 0.
-    ``limit_s`` ends a run that does not end by itself. ``web`` is where its page is served, None for nowhere.
-    """
-
-    seed: int = 1
-    speed: float | None = None
-    limit_s: float | None = None
-    trace: Path | None = None
-    devices: bool = False
-    json: Path | None = None
-    faults: tuple[AnyFault, ...] = ()
-    epoch_us: int = 0
-    quiet: bool = False
-    web: str | None = None
+class UnknownSystemError(ValueError):
+    """There is no simulator for the sites of a system."""
 
 
-#: Runs a site to its end, prints what came of it, and returns the exit status: 0, or 1 where a rule was broken.
-Runner = Callable[[Site, SystemOptions], int]
+def simulated_names() -> tuple[str, ...]:
+    """The names of all systems that can be simulated, as site files say them, in the order of the alphabet."""
+    return _FOLDERS.names()
 
-#: By ``Site.system``.
-RUNNERS: dict[str, Runner] = {
-    "terminal": run_terminal,
-    "cell": run_cell,
-    "graph": run_graph,
-    "mapd": run_mapd,
-    "turning": run_turning,
-}
+
+def simulated(name: str) -> SimulatedSystem[Any, Any]:
+    """The system of this name. Raises ``UnknownSystemError`` for one that cannot be simulated."""
+    module = _FOLDERS.part(name, "simulated")
+    if module is None:
+        raise UnknownSystemError(
+            f"{name}: no simulator for this system; there are {', '.join(simulated_names())}, and packages with an "
+            "entry point bus_sim.systems"
+        )
+    found: SimulatedSystem[Any, Any] = module.SIMULATED
+    return found
+
+
+def simulated_of(site: Site) -> SimulatedSystem[Any, Any]:
+    """The system of a site. Raises ``UnknownSystemError``, as ``simulated``."""
+    return simulated(site.system)
+
+
+def own_commands() -> Iterator[ModuleType]:
+    """The modules that bring commands of ``bus-sim`` for the sites of one system; each has ``add`` and ``RUN``."""
+    for name in simulated_names():
+        module = _FOLDERS.part(name, "commands")
+        if module is not None:
+            yield module

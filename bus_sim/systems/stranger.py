@@ -1,12 +1,12 @@
-"""A machine of any system but the car park that bids what nobody can beat, and does not do what it wins.
+"""A machine of any system that bids what nobody can beat, and does not do what it wins.
 
 It takes the node-ID of a machine of the site and, but for a liar, stands where that one stands.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import Enum
 
-from bus_sim.stranger import Stranger
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet, Plain
 from onboard.core.codes import KindCode, Reason, TaskPhase
@@ -17,13 +17,13 @@ from onboard.core.negotiation import Answer, Awarded, Estimator, Needs, Negotiat
 from onboard.core.site import Machine, Site
 from onboard.systems.registry import factory_for
 
-#: Machines that carry out orders, by system.
-WORKERS = {
-    "graph": KindCode.VEHICLE,
-    "terminal": KindCode.VEHICLE,
-    "cell": KindCode.ARM,
-    "turning": KindCode.LATHE,
-}
+
+class Stranger(Enum):
+    """How it fails."""
+
+    STANDS = "stands"
+    SILENT = "silent"
+    LIAR = "liar"
 
 
 @dataclass
@@ -118,9 +118,10 @@ class _Factory:
         return _Standing(fleet, kind=honest.kind, picture=honest, silent=self.how is Stranger.SILENT)
 
 
-def factories_with(site: Site, target: int, how: Stranger) -> Callable[[Site, KindCode], BehaviourFactory]:
-    """For ``BusRun.factories``: node ``target`` is a stranger, all others are what they are."""
-    worker = WORKERS[site.system]
+def factories_with(
+    site: Site, worker: KindCode, target: int, how: Stranger
+) -> Callable[[Site, KindCode], BehaviourFactory]:
+    """For ``BusRun.factories``: node ``target``, a ``worker``, is a stranger, all others are what they are."""
     stranger = _Factory(target, how, factory_for(site, worker))
 
     def choose(of: Site, kind: KindCode) -> BehaviourFactory:

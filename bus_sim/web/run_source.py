@@ -32,7 +32,7 @@ class RunSource:
 
     mode = "simulated"
 
-    def __init__(self, run: BusRun, zero: datetime | None = None, acts: Mapping[str, Act] | None = None) -> None:
+    def __init__(self, run: BusRun[Any], zero: datetime | None = None, acts: Mapping[str, Act] | None = None) -> None:
         """``zero`` is the local time of loop time 0, None where the site's day has no clock."""
         self.picture = LivePicture(run.site)
         self.chance = random.Random(f"page:{run.options.seed}")

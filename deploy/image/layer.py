@@ -28,6 +28,7 @@ _PLACES = {
     SHARED / "onboard.service": f"{_UNITS}/onboard.service",
     SHARED / "onboard-clock.service": f"{_UNITS}/onboard-clock.service",
     SHARED / "clock": "usr/lib/onboard/clock",
+    SHARED / "network": "usr/lib/onboard/network",
     FILES / "take-over": "usr/lib/onboard/take-over",
     SHARED / "70-can.link": "usr/lib/systemd/network/70-can.link",
     FILES / "image.conf": f"{_UNITS}/onboard.service.d/image.conf",

@@ -11,6 +11,7 @@ from hil.commission.person import ConsolePerson
 from hil.commission.protocol import Protocol
 from hil.commission.setting import Setting
 from hil.commission.walk import walk
+from onboard.config.arguments import Parser
 from onboard.config.machine import MachineConfig, load_machine
 from onboard.config.problems import ConfigError
 from onboard.io.open_bus import BusOpenError, BusSettings, add_bus_arguments, bus_settings, open_bus
@@ -35,7 +36,7 @@ examples:
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``hil commission``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="hil commission",
         description="Walk through a new machine on a live bus, and print a protocol to sign.",
         epilog=HELP,

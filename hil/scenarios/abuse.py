@@ -57,8 +57,8 @@ async def refuses_wrong_site(stage: Stage) -> None:
         Heartbeat, "word that it is an obstacle", JOIN_S, lambda one: one.state is MachineState.OBSTACLE
     )
     since = stage.mark()
-    stage.bring_car()
-    call = await stage.first(CallForProposals, "call for a car", CALL_S, lambda one: one.depth == 0, since)
+    stage.bring()
+    call = await stage.first(CallForProposals, "call", CALL_S, lambda one: one.depth == 0, since)
     await stage.first(Award, "end of the call", AWARD_S, lambda one: one.call == call.message.call, since)
     assert not stage.own(Bid, since), "it has bid for a task of a site that it does not know"
     moved = [one for one in stage.said[since:] if _is_motion(one, stage.machine.node_id)]
@@ -73,8 +73,8 @@ async def survives_flood(stage: Stage) -> None:
     beat = await stage.takes_part(JOIN_S)
     assert beat.boot == boot, f"boot counter {beat.boot} after {boot}: it was started again"
     since = stage.mark()
-    stage.bring_car()
-    call = await stage.first(CallForProposals, "call for a car", CALL_S, lambda one: one.depth == 0, since)
+    stage.bring()
+    call = await stage.first(CallForProposals, "call", CALL_S, lambda one: one.depth == 0, since)
     await is_awarded(stage, call.message.task)
 
 

@@ -1,14 +1,17 @@
 """Every scenario by name."""
 
+from bus_sim.systems.registry import simulated, simulated_names
 from hil.bench import Capability
 from hil.scenarios.abuse import refuses_duplicate_node_id, refuses_wrong_site, survives_flood
 from hil.scenarios.recovery import leaves_bus_off, survives_reset, survives_unplugging
 from hil.scenarios.scenario import Scenario
-from hil.scenarios.work import bids, joins, moves, wins, yields
+from hil.scenarios.work import bids, joins, moves, takes, wins, yields
 from hil.stage import Stage
 from onboard.core.codes import KindCode, Reason
 
 _ROBOT = frozenset({KindCode.ROBOT})
+#: Kinds that carry out what comes, of every system.
+_WORKERS = frozenset(one for one in (simulated(name).worker for name in simulated_names()) if one is not None)
 _BUS = frozenset({Capability.FLEET_BUS})
 _WORK = frozenset({Capability.FLEET_BUS, Capability.DEVICE_BUS})
 #: What a machine drops when others' words reach it late or in part.
@@ -21,7 +24,8 @@ async def _bids(stage: Stage) -> None:
 
 SCENARIOS: tuple[Scenario, ...] = (
     Scenario("joins", joins, _BUS),
-    Scenario("bids", _bids, _WORK, _ROBOT),
+    Scenario("bids", _bids, _WORK, _WORKERS),
+    Scenario("takes what it won", takes, _WORK, _WORKERS),
     Scenario("wins", wins, _WORK, _ROBOT),
     Scenario("moves under authority", moves, _WORK, _ROBOT),
     # The bench itself tells the other robot's plan, and nobody answers for its tokens.
@@ -44,7 +48,7 @@ SCENARIOS: tuple[Scenario, ...] = (
         "refuses another site's file",
         refuses_wrong_site,
         _WORK | {Capability.FILES},
-        _ROBOT,
+        _WORKERS,
         rivals=True,
         drops=frozenset({Reason.OTHER_SITE}),
         late=True,
@@ -53,7 +57,7 @@ SCENARIOS: tuple[Scenario, ...] = (
         "survives a flood",
         survives_flood,
         _WORK,
-        _ROBOT,
+        _WORKERS,
         drops=_LATE | {Reason.UNKNOWN_IDENTIFIER},
         late=True,
     ),

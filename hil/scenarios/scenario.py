@@ -3,6 +3,7 @@
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 
+from bus_sim.systems.registry import simulated_of
 from hil.bench import Capability
 from hil.stage import Stage
 from onboard.core.codes import MOBILE_KINDS, KindCode, Reason
@@ -30,7 +31,8 @@ class Scenario:
 
     def without(self, site: Site, machine: Machine) -> frozenset[str]:
         """Machines of the site that the simulated fleet does without: the device itself, and who could do its work."""
-        alike = [one.name for one in site.machines.values() if one.kind is machine.kind and one.kind in MOBILE_KINDS]
+        can_work = (*MOBILE_KINDS, simulated_of(site).worker)
+        alike = [one.name for one in site.machines.values() if one.kind is machine.kind and one.kind in can_work]
         return frozenset([machine.name] if self.rivals else [machine.name, *alike])
 
     @property

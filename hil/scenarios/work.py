@@ -50,12 +50,12 @@ async def joins(stage: Stage) -> None:
 
 
 async def bids(stage: Stage) -> Reference:
-    """A car comes, and the device bids in time; the task that is called for."""
+    """A car or an order comes, and the device bids in time; the task that is called for."""
     await stage.power_on()
     await stage.takes_part(JOIN_S)
     since = stage.mark()
-    stage.bring_car()
-    task = (await stage.first(CallForProposals, "call for a car", CALL_S, _is_outer, since)).message.task
+    stage.bring()
+    task = (await stage.first(CallForProposals, "call", CALL_S, _is_outer, since)).message.task
     calls: dict[int, int] = {}
 
     def answers(bid: Bid) -> bool:
@@ -76,6 +76,13 @@ async def is_awarded(stage: Stage, task: Reference) -> None:
         Award, "award", AWARD_S, lambda one: one.task == task and one.result is CallResult.AWARDED
     )
     assert award.message.winner == stage.machine.node_id, f"node {award.message.winner} has won"
+
+
+async def takes(stage: Stage) -> None:
+    """With no rival the device is awarded the task, and reports it as its own."""
+    task = await bids(stage)
+    await is_awarded(stage, task)
+    await stage.first_own(TaskReport, "report", MOTION_S, lambda one: one.task == task)
 
 
 async def wins(stage: Stage) -> None:

@@ -3,21 +3,26 @@
 A package offers its folder of site files under the entry point ``onboard.sites``; what boards carry offers none.
 """
 
-from importlib.metadata import entry_points
-from importlib.resources import files
-from importlib.resources.abc import Traversable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from onboard.config.files import read_text
 from onboard.config.problems import ConfigError, Problem, nearest
+
+if TYPE_CHECKING:
+    from importlib.resources.abc import Traversable
 
 #: Under this name packages say which of their folders holds site files.
 GROUP = "onboard.sites"
 _SUFFIX = ".toml"
 
 
-def shipped_sites() -> dict[str, Traversable]:
+def shipped_sites() -> dict[str, "Traversable"]:
     """Site files of all installed packages by their names, in the order of these."""
+    # A board names a file, and would wait for what reads archives and e-mail headers of packages.
+    from importlib.metadata import entry_points  # noqa: PLC0415  # see above
+    from importlib.resources import files  # noqa: PLC0415  # see above
+
     folders = [files(entry.load()) for entry in entry_points(group=GROUP)]
     found = {file.name.removesuffix(_SUFFIX): file for folder in folders for file in folder.iterdir() if _is_site(file)}
     return dict(sorted(found.items()))
@@ -39,5 +44,5 @@ def site_source(path: Path) -> tuple[str, str]:
     raise ConfigError([Problem(str(path), 0, "", None, "no such file, and no such shipped site", remedy)])
 
 
-def _is_site(file: Traversable) -> bool:
+def _is_site(file: "Traversable") -> bool:
     return file.name.endswith(_SUFFIX)

@@ -14,8 +14,9 @@ from onboard.config.problems import Problems
 from onboard.config.reader import Common, Table
 from onboard.config.shipped import site_source
 from onboard.core.site import Site
-from onboard.systems.registry import FIRST_SYSTEM, part, system_names
+from onboard.systems.registry import FIRST_SYSTEM, own_names, part, system_names
 
+_ZONE = re.compile(r"[A-Za-z][A-Za-z0-9_+-]*(/[A-Za-z0-9_+-]+){0,2}")
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 
@@ -37,11 +38,15 @@ def parse_site(text: str, file: str, *, crowded: bool = False) -> Site:
     root = root_table(text, problems)
     head = root.table("site", required=True)
     common = Common(_read_name(head), head.integer("bitrate", 10_000, 1_000_000, 500_000), crowded)
-    system = head.choice("system", system_names(), FIRST_SYSTEM)
+    zone = _read_time_zone(head)
+    own = own_names()
+    # Packages of other people are asked for where the word is none of ours: that takes a board long.
+    known = own if head.values.get("system", FIRST_SYSTEM) in own else system_names()
+    system = head.choice("system", known, FIRST_SYSTEM)
     site = _read_system(root, common, system)
     root.check_unknown()
     problems.raise_if_any()
-    return replace(site, digest=site_digest(site))
+    return replace(site, digest=site_digest(site), time_zone=zone)
 
 
 def _read_system(root: Table, common: Common, system: str) -> Site:
@@ -54,7 +59,9 @@ def _read_system(root: Table, common: Common, system: str) -> Site:
 
 def site_digest(site: Site) -> int:
     """1 to 65535, over what a site is and not what comes to it; docs/site-file.md says how to compute it."""
-    text = json.dumps(_meaning(site, {"digest", *site.demand}), sort_keys=True, separators=(",", ":"), default=_plain)
+    text = json.dumps(
+        _meaning(site, {"digest", "time_zone", *site.demand}), sort_keys=True, separators=(",", ":"), default=_plain
+    )
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:2], "big") or 1
 
 
@@ -81,6 +88,14 @@ def _plain(value: object) -> object:
     if isinstance(value, Enum):
         return value.value
     raise TypeError(f"a site holds a {type(value).__name__}, which has no canonical text")
+
+
+def _read_time_zone(head: Table) -> str:
+    """Its form alone: a board need not know any zone, as no machine does anything by it."""
+    zone = head.text("time_zone", "") if head.has("time_zone") else ""
+    if zone and not _ZONE.fullmatch(zone):
+        head.bad("time_zone", zone, "no name of a time zone", 'write one such as "Europe/Berlin"')
+    return zone
 
 
 def _read_name(head: Table) -> str:

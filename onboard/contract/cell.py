@@ -42,15 +42,6 @@ class GripMode(IntEnum):
     NOTHING_THERE = 3
 
 
-class OrderResult(IntEnum):
-    """What became of an order at the goal manager's counter."""
-
-    RECEIVED = 0
-    IN_HAND = 1
-    DONE = 2
-    REFUSED = 3
-
-
 @message(frozen=True, slots=True)
 class GoalStart(Message):
     """Where the part of a goal is, or will be handed over.

@@ -4,7 +4,8 @@ Written by ``make docs`` from ``dbc/cell.dbc``: change that file, never this one
 """
 
 from onboard.contract.base import Message, Reference, message
-from onboard.contract.cell import ArmMode, GripAction, GripMode, OrderResult
+from onboard.contract.cell import ArmMode, GripAction, GripMode
+from onboard.contract.codes import OrderResult
 
 
 @message(frozen=True, slots=True)

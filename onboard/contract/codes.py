@@ -279,3 +279,12 @@ class DeskInput(IntEnum):
     KEY = 0
     TICKET = 1
     CANCEL = 2
+
+
+class OrderResult(IntEnum):
+    """What became of an order, as a desk tells its counter."""
+
+    RECEIVED = 0
+    IN_HAND = 1
+    DONE = 2
+    REFUSED = 3

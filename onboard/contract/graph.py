@@ -47,15 +47,6 @@ class BodyPlace(IntEnum):
     AT_LINE = 2
 
 
-class VisitResult(IntEnum):
-    """What became of an order."""
-
-    RECEIVED = 0
-    IN_HAND = 1
-    DONE = 2
-    REFUSED = 3
-
-
 @message(frozen=True, slots=True)
 class NodeAnswer(Message):
     """A node agent answers a robot's signal: go, stop, or take another edge.

@@ -4,7 +4,8 @@ Written by ``make docs`` from ``dbc/graph.dbc``: change that file, never this on
 """
 
 from onboard.contract.base import Message, message
-from onboard.contract.graph import BodyPlace, RouteAction, VisitResult
+from onboard.contract.codes import OrderResult
+from onboard.contract.graph import BodyPlace, RouteAction
 
 
 @message(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class VisitAnswer(Message):
     #: Serial number of the order. 0 to 65535.
     order: int
     #: What became of it.
-    visit_result: VisitResult
+    visit_result: OrderResult
     #: Node-ID of the robot that has it, 0 for none. 0 to 250.
     robot: int
 

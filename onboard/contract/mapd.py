@@ -16,14 +16,6 @@ class CartAction(IntEnum):
     UNLOAD = 2
 
 
-class TransportResult(IntEnum):
-    """What became of a transport."""
-
-    RECEIVED = 0
-    DONE = 1
-    REFUSED = 2
-
-
 @message(frozen=True, slots=True)
 class StepRound(Message):
     """Step begins: sent when all robots have told that they have come to it.

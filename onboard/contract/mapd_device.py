@@ -4,7 +4,8 @@ Written by ``make docs`` from ``dbc/mapd.dbc``: change that file, never this one
 """
 
 from onboard.contract.base import Message, message
-from onboard.contract.mapd import CartAction, TransportResult
+from onboard.contract.codes import OrderResult
+from onboard.contract.mapd import CartAction
 
 
 @message(frozen=True, slots=True)
@@ -34,7 +35,7 @@ class TransportAnswer(Message):
     #: Serial number of the order. 0 to 65534.
     task: int
     #: What became of it.
-    transport_result: TransportResult
+    transport_result: OrderResult
 
 
 @message(frozen=True, slots=True)

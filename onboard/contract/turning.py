@@ -33,15 +33,6 @@ class NcMode(IntEnum):
     ALARM = 3
 
 
-class JobResult(IntEnum):
-    """What became of an order at the desk."""
-
-    RECEIVED = 0
-    IN_HAND = 1
-    DONE = 2
-    REFUSED = 3
-
-
 @message(frozen=True, slots=True)
 class TurningOrder(Message):
     """What is to be turned.

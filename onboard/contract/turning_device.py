@@ -4,7 +4,8 @@ Written by ``make docs`` from ``dbc/turning.dbc``: change that file, never this 
 """
 
 from onboard.contract.base import Message, message
-from onboard.contract.turning import JobResult, LatheAction, NcMode
+from onboard.contract.codes import OrderResult
+from onboard.contract.turning import LatheAction, NcMode
 
 
 @message(frozen=True, slots=True)
@@ -58,7 +59,7 @@ class JobAnswer(Message):
     #: Serial number of the order. 0 to 65535.
     number: int
     #: What became of it.
-    job_result: JobResult
+    job_result: OrderResult
     #: Node-ID of the lathe, 0 for none. 0 to 255.
     winner: int
     #: Price of one part, cents; 0 before it is known. 0 to 1048575 ct.

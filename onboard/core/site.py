@@ -167,6 +167,8 @@ class Site:
     carrier_turn_us: int = 0
     lift: Axis = _NO_AXIS
     floor_height_mm: int = 0
+    #: IANA name of the site's local time, for people who look at it; empty where the file has none. Not in the digest.
+    time_zone: str = ""
 
     @cached_property
     def compartments(self) -> dict[int, Station]:

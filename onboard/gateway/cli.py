@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Machine, Site
@@ -48,7 +49,7 @@ NEWS_S = 1.0
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``onboard gateway``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="onboard gateway",
         description="Publish a site over MQTT: VDA 5050 for every machine that travels, JSON for the fleet.",
         epilog=EXAMPLES,
@@ -86,7 +87,7 @@ def main(argv: Sequence[str]) -> int:
             print(line if isinstance(error, ConfigError) else f"onboard gateway: {line}", file=sys.stderr)
         return 1 if isinstance(error, BusOpenError) and error.may_come else 2
     except OSError as error:
-        print(f"onboard gateway: --spool {args.spool}: {error.strerror or error}", file=sys.stderr)
+        print(f"onboard gateway: --spool {args.spool}: {error.strerror or error}; name another folder", file=sys.stderr)
         return 2
 
 

@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Awaitable, Callable, Sequence
 
+from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
@@ -37,7 +38,7 @@ This bus is no safety channel: machines that can hurt somebody have an emergency
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``onboard operate``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="onboard operate",
         description="Tell a site what a person has decided, on its own bus (docs/operate.md).",
         epilog=EXAMPLES,

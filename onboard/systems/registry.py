@@ -4,11 +4,8 @@ A part of a system is a module of its folder (``system``, ``reader``, ``checks``
 asked for: a board loads the machines of its own system and nothing of the others. docs/new-kind.md lists the parts.
 """
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Iterable
-from functools import cache, partial
-from importlib import metadata, util
+from functools import partial
 from types import ModuleType
 
 from onboard import systems
@@ -18,13 +15,13 @@ from onboard.core.compaction import compact
 from onboard.core.journal_records import Entry
 from onboard.core.journal_state import JournalCondition, condition_of
 from onboard.core.site import Site
+from onboard.systems.folders import Folders
 from onboard.systems.system import System
 
 #: What a site file is that does not say: those of version 0.1 had no other system.
 FIRST_SYSTEM = "car-park"
-#: Entry points of packages of other people: the system's name, then its package.
-GROUP = "onboard.systems"
-
+#: Packages of other people have an entry point ``onboard.systems``: the system's name, then its package.
+_FOLDERS = Folders(systems)
 #: Systems that are only tried, in this process.
 _ADDED: dict[str, System] = {}
 
@@ -41,29 +38,19 @@ def remove_system(name: str) -> None:
     del _ADDED[name]
 
 
-@cache
+def own_names() -> tuple[str, ...]:
+    """The names of the systems that are folders beside this file, in the order of the alphabet."""
+    return _FOLDERS.own_names()
+
+
 def system_names() -> tuple[str, ...]:
     """The names of all systems as site files say them, in the order of the alphabet."""
-    own = (module.name.replace("_", "-") for module in pkgutil.iter_modules(systems.__path__) if module.ispkg)
-    return tuple(sorted({*own, *(entry.name for entry in metadata.entry_points(group=GROUP))}))
+    return _FOLDERS.names()
 
 
-@cache
 def part(system: str, noun: str) -> ModuleType | None:
     """The module of this name in a system's folder; None where the system has none, or where nobody knows it."""
-    package = _package(system)
-    if package is None or util.find_spec(f"{package}.{noun}") is None:
-        return None
-    return importlib.import_module(f"{package}.{noun}")
-
-
-@cache
-def _package(system: str) -> str | None:
-    """The folder is looked for first: to read the entry points of all packages takes a board long."""
-    folder = f"{systems.__name__}.{system.replace('-', '_')}"
-    if "_" not in system and system.replace("-", "").isalnum() and util.find_spec(folder) is not None:
-        return folder
-    return next((entry.value for entry in metadata.entry_points(group=GROUP, name=system)), None)
+    return _FOLDERS.part(system, noun)
 
 
 def find_system(name: str) -> System:

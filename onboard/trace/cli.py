@@ -5,6 +5,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 
+from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.trace.commands import charts, check, convert, dissector, dump, load, replay, story
 from onboard.trace.commands.common import Register, TraceError
@@ -41,7 +42,7 @@ _COMMANDS: tuple[Register, ...] = (
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``onboard trace``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="onboard trace",
         description="Look at what was on a bus: from the log and the DBC alone.",
         epilog=HELP,

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from onboard.config.arguments import Parser
 from onboard.config.problems import ConfigError
 from onboard.config.site import load_site
 from onboard.core.site import Site
@@ -32,7 +33,7 @@ examples:
 
 def build_parser() -> argparse.ArgumentParser:
     """The command line of ``onboard web``."""
-    parser = argparse.ArgumentParser(
+    parser: argparse.ArgumentParser = Parser(
         prog="onboard web",
         description="Show a site as its bus tells it, on a page of this computer.",
         epilog=EXAMPLES,

@@ -38,7 +38,7 @@ class Film:
     """Read it once with ``read``; then ``show(time_us)`` gives the picture of a moment. ``close`` frees the file."""
 
     def __init__(self, site: Site, codecs: Codecs) -> None:
-        self._site = site
+        self.site = site
         self._codecs = codecs
         self._file: BinaryIO = TemporaryFile(prefix="onboard-web-")  # noqa: SIM115  # closed by close()
         self._channels: list[str] = []
@@ -51,7 +51,7 @@ class Film:
         self.first_us = self.last_us = 0
 
     def _empty(self) -> _State:
-        return _State(LivePicture(self._site), Listener(self._codecs))
+        return _State(LivePicture(self.site), Listener(self._codecs))
 
     def __enter__(self) -> Self:
         return self
@@ -103,7 +103,7 @@ class Film:
 
     def _copy(self, state: _State) -> _State:
         """A copy that shares what never changes."""
-        fixed = (self._site, self._codecs, self._codecs.fleet, self._codecs.device)
+        fixed = (self.site, self._codecs, self._codecs.fleet, self._codecs.device)
         return copy.deepcopy(state, {id(one): one for one in fixed})
 
     def _feed(self, raw: RawFrame, classic: Frame) -> bool:

@@ -9,6 +9,7 @@ from onboard.core.frame import Frame
 from onboard.core.site import Site
 from onboard.web.app import CommandError, number
 from onboard.web.film import Film
+from onboard.web.local_time import offset_s, zone_of
 from onboard.web.picture import LivePicture
 from onboard.wire.codec import Codecs
 from onboard.wire.decoder import Decoder
@@ -29,9 +30,9 @@ class LiveSource:
         self._codecs = codecs
         self._fleet, self._device = Decoder(codecs.fleet, site.machines), Decoder(codecs.device)
         self._loop = asyncio.get_running_loop()
-        local = time.localtime()
+        now_s = time.time()
         # The page tells the time of day: what the loop's clock lacks to it.
-        self._zero_s = local.tm_hour * 3600 + local.tm_min * 60 + local.tm_sec - round(self._loop.time())
+        self._zero_s = round(now_s) + offset_s(zone_of(site), round(now_s * 1e6)) - round(self._loop.time())
 
     def on_frame(self, frame: Frame, time_us: int) -> None:
         """One frame of the bus, at a time of the loop; a machine's devices may be on the same wires."""
@@ -68,12 +69,16 @@ class LiveSource:
 
 
 class LogSource:
-    """A recorded log, played from its beginning. ``film`` is read already."""
+    """A recorded log, played from its beginning, by the site's local time. ``film`` is read already.
+
+    Raises ``WebError`` for a time zone that this computer does not know.
+    """
 
     mode = "log"
 
     def __init__(self, film: Film) -> None:
         self._film = film
+        self._zone = zone_of(film.site)
         self._first_us, self._last_us = film.first_us, film.last_us
         self._pace, self._paused = LOG_PACE, False
         self._now_us = self._first_us
@@ -97,7 +102,8 @@ class LogSource:
     def snapshot(self) -> dict[str, Any]:
         """As in the port, with the log's span for the slider."""
         pace = 0.0 if self._paused or self._now_us >= self._last_us else self._pace
-        return {**self.picture.snapshot(), "pace": pace, "span_us": [self._first_us, self._last_us]}
+        zero_s = offset_s(self._zone, self._now_us)
+        return {**self.picture.snapshot(), "pace": pace, "zero_s": zero_s, "span_us": [self._first_us, self._last_us]}
 
     def figures(self) -> dict[str, Any]:
         """As in the port."""

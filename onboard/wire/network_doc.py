@@ -2,12 +2,19 @@
 
 import sys
 from collections.abc import Iterable
-from enum import IntEnum
+from functools import cache
 from pathlib import Path
 
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
-from onboard.core import codes
-from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts, read_nodes, system_layouts
+from onboard.wire.dbc_file import (
+    MessageLayout,
+    SignalLayout,
+    device_layouts,
+    fleet_layouts,
+    read_annotations,
+    read_nodes,
+    system_layouts,
+)
 
 _HEAD = """\
 # The network
@@ -49,10 +56,12 @@ def _link(name: str) -> str:
     return f"[{name}](#{name.lower()})"
 
 
+@cache
 def _value_tables() -> dict[tuple[tuple[int, str], ...], str]:
-    """Name of each value table: that of the enumeration in ``core/codes.py`` with the same content."""
-    enums = [kind for kind in vars(codes).values() if isinstance(kind, type) and issubclass(kind, IntEnum)]
-    named = {tuple((int(code), code.name) for code in kind): kind.__name__ for kind in enums if kind is not IntEnum}
+    """Name of each value table of the two contracts of all (``VAL_TABLE_``), by its content."""
+    named: dict[tuple[tuple[int, str], ...], str] = {}
+    for text in (fleet_dbc_text(), device_dbc_text()):
+        named |= {choices: name for name, choices in read_annotations(text).tables.items()}
     return {**named, ((0, "NO"), (1, "YES")): "Answer"}
 
 

@@ -9,14 +9,14 @@ import pytest
 from bus_sim.attacks.catalogue import ATTACKS
 from bus_sim.attacks.trials import Plan, run_attack
 from bus_sim.cli import main
-from bus_sim.faults.scenario import Arrivals
+from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.orders import Orders
 from onboard.core.admission import Admission
 from onboard.core.codes import Reason
 from tests.mapd.sites import drawn, site_text
 
-PARK = Plan("small", arrivals=Arrivals(3, 60.0, 30.0))
-PLANS = {name: Plan(name, orders=Orders(4, 10.0)) for name in ("cell", "graph", "terminal", "turning")}
+PARK = Plan("small", demand=Arrivals(3, 60.0, 30.0))
+PLANS = {name: Plan(name, demand=Orders(4, 10.0)) for name in ("cell", "graph", "terminal", "turning")}
 
 
 def play(attack: str, plan: Plan, seed: int = 1) -> list[str]:
@@ -40,12 +40,12 @@ def test_other_systems_get_over_it(attack: str, site: str) -> None:
 
 def test_bids_of_machines_that_have_no_plans_to_tell_count_again_after_a_stop() -> None:
     """Who says OBSTACLE is one; robots of a graph were for ever, as they tell no itinerary, and no call had a bid."""
-    assert play("stop", replace(PLANS["graph"], orders=Orders(12, 17.0), limit_s=900.0), seed=11) == []
+    assert play("stop", replace(PLANS["graph"], demand=Orders(12, 17.0), limit_s=900.0), seed=11) == []
 
 
 def test_arms_that_were_held_in_the_middle_of_a_goal_go_on_with_it() -> None:
     """The first that was let go took the rest of its goal from one still held, which kept its own successor waiting."""
-    assert play("stop", replace(PLANS["cell"], orders=Orders(6, 20.0)), seed=4) == []
+    assert play("stop", replace(PLANS["cell"], demand=Orders(6, 20.0)), seed=4) == []
 
 
 def test_a_floor_of_robots_in_step_gets_over_it(tmp_path: Path) -> None:

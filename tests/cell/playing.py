@@ -2,14 +2,15 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
+from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
+from bus_sim.session import play
 from bus_sim.sites import find_site
-from bus_sim.systems.cell.plant import CellPlant, Entry, make_plant
+from bus_sim.systems.cell.plant import CellPlant, Entry
 from bus_sim.systems.cell.view import CellView
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.systems.stage import Stage
 from onboard.core.codes import KindCode
 from onboard.core.messages import Message
 from onboard.core.site import Machine, Segment
@@ -42,16 +43,16 @@ def cell(
 class Scene:
     """A cell that was played to its end."""
 
-    def __init__(self, site: Cell, prepare: Callable[[BusRun], None] | None = None, limit_s: float = 600) -> None:
+    def __init__(self, site: Cell, prepare: Callable[[BusRun[Any]], None] | None = None, limit_s: float = 600) -> None:
         self.site = site
         self.view = CellView(site)
 
-        def before(run: BusRun) -> None:
+        def before(run: BusRun[Any]) -> None:
             run.observers.append(lambda message, _: self.view.feed(message))
             if prepare is not None:
                 prepare(run)
 
-        self.played: Played = play(site, SystemOptions(limit_s=limit_s), make_plant, prepare=before)
+        self.played: Stage[Any] = play(site, RunOptions(limit_s=limit_s), prepare=before)
 
     @property
     def plant(self) -> CellPlant:

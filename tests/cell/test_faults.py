@@ -2,9 +2,8 @@
 
 import pytest
 
-from bus_sim.systems.cell.plant import make_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import play
+from bus_sim.options import RunOptions
+from bus_sim.session import play
 from onboard.core.messages import Bid, CallForProposals, Message, Reference
 from onboard.systems.cell.checks import RULES
 from onboard.systems.cell.messages import ArmPhase, ArmProgress, GoalPath, PartAt
@@ -20,7 +19,7 @@ def test_the_cell_under_faults(seed: int) -> None:
 
 
 def test_no_checker_finds_anything_where_nothing_is_disturbed() -> None:
-    verdict = judged(SITE, play(SITE, SystemOptions(limit_s=1200), make_plant).messages)
+    verdict = judged(SITE, play(SITE, RunOptions(limit_s=1200)).messages)
     assert verdict.is_good, verdict.lines()
     assert all(verdict.seen[rule.name] for rule in RULES)
 
@@ -44,7 +43,7 @@ def test_each_checker_finds_what_it_is_for(rule: str, said: list[Message]) -> No
 
 
 def test_a_predecessor_that_bids_is_found() -> None:
-    messages = play(SITE, SystemOptions(limit_s=1200), make_plant).messages
+    messages = play(SITE, RunOptions(limit_s=1200)).messages
     path_us, path = next((time_us, one) for time_us, one in messages if isinstance(one, GoalPath) and one.node1)
     call = next(
         one for _, one in messages if isinstance(one, CallForProposals) and one.task == (path.sender, path.goal)

@@ -1,6 +1,7 @@
 """Several goals, deadlines, joining robots, goals that cannot be achieved, faults (rows C02, C15 to C17, C19)."""
 
 from functools import partial
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,7 @@ from tests.cell.playing import Scene, cell, wish
 from tests.cell.witness import ARMS, DESK, arm, metres
 
 
-def _late(node: int, after_s: float, run: BusRun) -> None:
+def _late(node: int, after_s: float, run: BusRun[Any]) -> None:
     """One robot's controller is off at first and is switched on later."""
     machine = run.site.machines[node]
     run.loop.call_at(0.001, partial(run.crash, machine))

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main
-from bus_sim.compare.plays import POLICIES
-from bus_sim.compare.table import BOUND
+from bus_sim.systems.car_park.compare.plays import POLICIES
+from bus_sim.systems.car_park.compare.table import BOUND
 
 
 def test_p56_one_command_makes_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

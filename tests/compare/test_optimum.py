@@ -4,11 +4,11 @@ import dataclasses
 
 import pytest
 
-from bus_sim.compare.optimum import OptimumError, is_available, least_waiting_ms
-from bus_sim.compare.plays import POLICIES
-from bus_sim.compare.small_case import Case, Visitor, earliest_finish, play_case
-from bus_sim.compare.small_table import RULES, SmallTable, small_demand, solve_case
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available, least_waiting_ms
+from bus_sim.systems.car_park.compare.plays import POLICIES
+from bus_sim.systems.car_park.compare.small_case import Case, Visitor, earliest_finish, play_case
+from bus_sim.systems.car_park.compare.small_table import RULES, SmallTable, small_demand, solve_case
 
 SITE = find_site("small")
 needs_solver = pytest.mark.skipif(not is_available(), reason="OR-Tools is not installed (extra: optimum)")

@@ -5,12 +5,12 @@ from functools import cache
 
 import pytest
 
-from bus_sim.compare.free_flow import bounds_us
-from bus_sim.compare.plays import MIP, POLICIES, Play, play
-from bus_sim.compare.policies import AnyFirst, JointChoice, NearestFirst
-from bus_sim.compare.table import BOUND, tabulate
-from bus_sim.demand import Demand
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.compare.free_flow import bounds_us
+from bus_sim.systems.car_park.compare.plays import MIP, POLICIES, Play, play
+from bus_sim.systems.car_park.compare.policies import AnyFirst, JointChoice, NearestFirst
+from bus_sim.systems.car_park.compare.table import BOUND, tabulate
+from bus_sim.systems.car_park.demand import Demand
 
 SITE = find_site("small")
 #: One car a minute in and one out: the compartment of this site serves fewer, so queues grow.

@@ -168,3 +168,13 @@ def test_a_dbc_that_is_not_fit_for_code_is_refused_with_its_place(line: str, ins
 def test_annotations_keep_the_order_of_the_file() -> None:
     order = read_annotations(TEXTS["device"]).order["ShuttleState"]
     assert order == ("sequence", "mode", "extension_mm", "side", "load_kg", "wheelbase_mm")
+
+
+def test_a_table_that_two_systems_name_alike_is_one_and_must_be_alike(monkeypatch: pytest.MonkeyPatch) -> None:
+    tables = [one for contract in contracts() for one in contract.tables if one.name == "OrderResult"]
+    assert len(tables) == 4 and {one.module for one in tables} == {"codes"}
+    texts = {name: system_dbc_text(name) or "" for name in systems()}
+    texts["cell"] = texts["cell"].replace('2 "DONE" 1 "IN_HAND"', '2 "ENDED" 1 "IN_HAND"')
+    monkeypatch.setattr("onboard.contract.generate.modules.system_dbc_text", texts.get)
+    with pytest.raises(ContractError, match=re.escape("value table OrderResult is another than that of cell.dbc")):
+        contracts()

@@ -3,8 +3,10 @@
 import pytest
 
 from bus_sim.faults.journals import hurt
-from bus_sim.run import RunOptions, build, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import build
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.controller.shell import Controller
 from onboard.core.effects import Effect, Record, Renew, Send

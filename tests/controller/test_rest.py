@@ -8,9 +8,10 @@ from bus_sim.campaign.limits import wall_limit
 from bus_sim.campaign.report import FAILURES, Verdict
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
-from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.faults.scenario import Scenario
 from bus_sim.run import NoWatchdog
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.virtual_time import EventLimitError, StandstillError, VirtualTimeLoop
 from onboard.controller.rest import MOST_WAKES, Rest
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.demand import Demand, DemandError, Law
+from bus_sim.demand import DemandError, Law
+from bus_sim.systems.car_park.demand import Demand
 
 HEAD = "arrival,departure,station_id,session_id\n"
 GOOD = "2019-07-24 05:35:06-07:00,2019-07-24 15:39:33-07:00,AG-1F11,one\n"

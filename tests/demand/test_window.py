@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.demand import WHOLE_DAY, Demand, DemandError, Stay
+from bus_sim.demand import DemandError
+from bus_sim.systems.car_park.demand import WHOLE_DAY, Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody
-from bus_sim.window import (
+from bus_sim.systems.car_park.window import (
     DAY_US,
     EVE_US,
     HOUR_US,

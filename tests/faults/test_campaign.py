@@ -13,8 +13,9 @@ from bus_sim.campaign.table import lines, to_json
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Arrivals, Scenario, load_scenario
+from bus_sim.faults.scenario import Scenario, load_scenario
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
 from onboard.core.site import Site
 
 SCENARIOS = Path(__file__).parent / "scenarios"

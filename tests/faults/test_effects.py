@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import pytest
 
-from bus_sim.run import Simulation
 from bus_sim.systems.car_park.plant.customer import Outcome, State
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import DeskInput, DoorName, DoorPosition, MachineState, Reason
 from onboard.core.frame import Frame
 from onboard.core.journal_state import JournalState

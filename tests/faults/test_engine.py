@@ -8,7 +8,7 @@ import pytest
 from bus_sim.campaign.engine import on_cores, on_dask
 from bus_sim.campaign.runner import Plan, run_seed
 from bus_sim.cli import main
-from bus_sim.faults.scenario import Arrivals
+from bus_sim.systems.car_park.demand import Arrivals
 
 PLAN = Plan("level1", "bus", 3_600.0, Arrivals(cars=1))
 

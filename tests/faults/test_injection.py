@@ -4,7 +4,8 @@ import pytest
 
 from bus_sim.campaign.profiles import PROFILES, draw_at_rate, draw_faults
 from bus_sim.can.faults import Fault
-from bus_sim.faults.arm import ACTIONS, check_targets, frame_faults
+from bus_sim.faults.arm import actions_for, check_targets
+from bus_sim.faults.bus import frame_faults
 from bus_sim.faults.injection import Injection, parse_injection
 from bus_sim.faults.table import KINDS, Value
 from bus_sim.sites import find_site
@@ -54,7 +55,7 @@ def test_every_kind_of_the_table_does_something() -> None:
     for name, kind in KINDS.items():
         given = {key: values[key] for key, setting in kind.settings.items() if setting.default is None}
         injection = Injection(name, given)
-        assert (name in ACTIONS) is not bool(frame_faults([injection], site))
+        assert (name in actions_for(site)) is not bool(frame_faults([injection], site))
 
 
 def test_frame_faults_keep_their_own_settings() -> None:

@@ -6,8 +6,9 @@ import pytest
 
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import Injection
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import CallResult, Reason, TokenKind
 from onboard.core.frame import Frame
 from onboard.core.messages import Award, Diagnostic, Heartbeat, Message, Reference, TokenGrant

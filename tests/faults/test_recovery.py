@@ -9,10 +9,11 @@ from bus_sim.campaign.report import Report, Verdict
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.planted.registry import BUGS
-from bus_sim.run import Simulation
+from bus_sim.faults.scenario import Scenario
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
+from bus_sim.systems.car_park.planted.registry import BUGS
+from bus_sim.systems.car_park.simulation import Simulation
 
 
 def trial(*faults: str, cars: int = 1, limit_s: float = 1_200.0) -> Report:
@@ -99,7 +100,7 @@ def test_a_trial_hears_what_the_checkers_find(monkeypatch: pytest.MonkeyPatch) -
     def plant(simulation: Simulation, _: object) -> None:
         BUGS["custody-first"].plant(simulation)
 
-    monkeypatch.setattr("bus_sim.systems.car_park.stage.arm", plant)
+    monkeypatch.setattr("bus_sim.campaign.trial.arm", plant)
     report = trial(cars=2)
     assert report.verdict is Verdict.VIOLATION
     assert "one-custodian" in report.violations[0]

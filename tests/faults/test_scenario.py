@@ -6,7 +6,8 @@ import pytest
 
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Arrivals, Scenario, load_scenario
+from bus_sim.faults.scenario import Scenario, load_scenario
+from bus_sim.systems.car_park.demand import Arrivals
 from onboard.config.problems import ConfigError
 
 

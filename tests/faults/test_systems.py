@@ -2,24 +2,25 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bus_sim.campaign.profiles import draw_at_rate, draw_faults, kinds_for
 from bus_sim.campaign.report import Verdict
 from bus_sim.campaign.runner import Plan, run_seed
-from bus_sim.campaign.systems import SYSTEMS, span_s, usual_orders, with_orders
 from bus_sim.campaign.trial import play
 from bus_sim.cli import main
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Scenario, load_scenario
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
 from bus_sim.sites import find_site
-from bus_sim.systems.orders import Orders
-from bus_sim.systems.registry import RUNNERS
-from bus_sim.systems.session import FAULTS
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
+from bus_sim.systems.orders import DRAWN, OrderedSystem, Orders
+from bus_sim.systems.registry import simulated_names, simulated_of
+from onboard.core.site import Site
+from onboard.systems.registry import system_names
 from tests.faults.systems import PLANTS
 
 SHIPPED = ("cell", "graph", "terminal", "turning")
@@ -33,29 +34,38 @@ def hotel(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(path)
 
 
-def test_every_system_that_can_be_run_has_campaigns() -> None:
-    assert SYSTEMS.keys() == RUNNERS.keys()
+def ordered(site: Site) -> OrderedSystem[Any, Any]:
+    """The system of a site to which orders come."""
+    system = simulated_of(site)
+    assert isinstance(system, OrderedSystem)
+    return system
+
+
+def test_every_system_of_the_boards_can_be_simulated() -> None:
+    assert simulated_names() == system_names()
 
 
 @pytest.mark.parametrize("name", [*SHIPPED, "hotel"])
 def test_a_seed_draws_orders_of_its_own_and_they_are_carried_out(name: str, hotel: str) -> None:
     site = find_site(hotel if name == "hotel" else name)
-    orders = Orders(3, usual_orders(site, None, None).apart_s)
-    drawn = [with_orders(site, orders, seed) for seed in (1, 1, 2)]
+    system = ordered(site)
+    orders = Orders(3, system.most(site).apart_s)
+    drawn = [system.with_orders(site, orders, seed) for seed in (1, 1, 2)]
     assert drawn[0] == drawn[1] != drawn[2]
-    assert with_orders(site, Orders(0, 1.0), 1) is site
-    report = play(site, Scenario(site.name, 1, 4 * 3_600.0, orders=orders))
+    assert system.with_orders(site, Orders(0, 1.0), 1) is site
+    report = play(site, Scenario(site.name, 1, 4 * 3_600.0, demand=orders))
     assert report.verdict is Verdict.SERVED, report.why()
     assert report.served >= 3 and report.waiting == 0
-    assert report.simulated_s < 3 * span_s(with_orders(site, orders, 1))[1]
+    assert report.simulated_s < 3 * system.span_s(drawn[0])[1]
 
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_faults_strike_while_orders_are_carried_out(name: str) -> None:
-    site = with_orders(find_site(name), Orders(4, 30.0), 1)
-    first_s, last_s = span_s(site)
+    system = ordered(find_site(name))
+    site = system.with_orders(find_site(name), Orders(4, 30.0), 1)
+    first_s, last_s = system.span_s(site)
     for profile in ("bus", "crash", "all"):
-        assert kinds_for(profile, site).keys() <= FAULTS
+        assert kinds_for(profile, site).keys() <= DRAWN
         faults = [fault for seed in range(30) for fault in draw_faults(profile, seed, site, (first_s, last_s))]
         assert all(first_s <= fault.number("at_s") <= last_s for fault in faults)
     assert kinds_for("people", site) == {}
@@ -90,10 +100,10 @@ def test_a_failure_is_shrunk_kept_and_played_again(
         for text in ("burst:at_s=14", "crash:target=OD,at_s=16,restart=no", "drift:target=R1,at_s=9")
     )
     monkeypatch.setattr("bus_sim.campaign.runner.draw_faults", lambda *_: faults)
-    result = run_seed(Plan("graph", "all", 120.0, out=tmp_path, orders=Orders(2, 5.0)), 3)
+    result = run_seed(Plan("graph", "all", 120.0, out=tmp_path, demand=Orders(2, 5.0)), 3)
     assert result.report.verdict is Verdict.NOT_SERVED
     kept, site = load_scenario(tmp_path / "graph-all-3.toml")
-    assert kept == result.shrunk and kept.faults == faults[1:2] and kept.orders == Orders(2, 5.0)
+    assert kept == result.shrunk and kept.faults == faults[1:2] and kept.demand == Orders(2, 5.0)
     assert play(site, kept).waiting == result.report.waiting
     trace = tmp_path / "again.log"
     assert main(["run", "--scenario", str(tmp_path / "graph-all-3.toml"), "--trace", str(trace)]) == 1
@@ -104,8 +114,7 @@ def test_a_failure_is_shrunk_kept_and_played_again(
 @pytest.mark.parametrize(
     ("arguments", "told"),
     [
-        (("graph", "--cars", "3"), "--cars 3: graph is a graph, and only a car park has it"),
-        (("graph", "--exhaustive", "crash"), "--exhaustive crash: graph is a graph"),
+        (("graph", "--cars", "3"), "--cars 3: graph is a graph, to which no cars come; write --orders"),
         (("graph", "--faults", "people"), "--faults people: graph is a graph"),
         (("graph", "--orders", "-1"), "--orders -1: must be from 0"),
         (("terminal", "--orders", "40"), "--orders 40: terminal has boxes for 11 missions at most"),
@@ -129,7 +138,11 @@ def test_a_mistake_is_one_line(arguments: tuple[str, ...], told: str, capsys: py
             "[orders]\ncount = -3\n",
             ":5: orders.count = -3: has the wrong value; must be a whole number from 0",
         ),
-        ("graph", '[[fault]]\nkind = "lost_ticket"\ncar = 1\n', "only a car park has it, and graph is a graph"),
+        (
+            "graph",
+            '[[fault]]\nkind = "lost_ticket"\ncar = 1\n',
+            "a graph has nothing that this strikes (a customer comes back",
+        ),
     ],
 )
 def test_a_mistake_in_a_scenario_is_one_line(

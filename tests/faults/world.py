@@ -4,9 +4,11 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bus_sim.faults.arm import arm, frame_faults
+from bus_sim.faults.arm import arm
+from bus_sim.faults.bus import frame_faults
 from bus_sim.faults.injection import parse_injection
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.options import RunOptions
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop, run
 from onboard.core.frame import Frame
 from onboard.core.messages import Message

@@ -1,10 +1,11 @@
 """Graph sites made for tests."""
 
 import random
+from typing import Any
 
-from bus_sim.systems.graph.plant import make_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.options import RunOptions
+from bus_sim.session import play
+from bus_sim.systems.stage import Stage
 from onboard.config.site import parse_site
 from onboard.systems.graph.network import Graph, grid
 from onboard.systems.graph.rules import Rules
@@ -52,6 +53,6 @@ def hall(length_mm: int = 6000) -> Graph:
     return grid(3, 3, length_mm)
 
 
-def played(site: FactoryGraph, **options: object) -> Played:
+def played(site: FactoryGraph, **options: object) -> Stage[Any]:
     """A run to its end, quiet and without a trace."""
-    return play(site, SystemOptions(quiet=True, **options), make_plant)  # type: ignore[arg-type]  # options by name
+    return play(site, RunOptions(quiet=True, **options))  # type: ignore[arg-type]  # options by name

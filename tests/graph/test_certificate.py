@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.certify.certificate import certify, count_stuck, sampled
-from bus_sim.certify.model import Model
-from bus_sim.certify.search import Search, Tasks, task_sets
-from bus_sim.certify.throughput import Pace, measure
 from bus_sim.cli import main
+from bus_sim.systems.graph.certify.certificate import certify, count_stuck, sampled
+from bus_sim.systems.graph.certify.model import Model
+from bus_sim.systems.graph.certify.search import Search, Tasks, task_sets
+from bus_sim.systems.graph.certify.throughput import Pace, measure
 from onboard.systems.graph.network import Graph, complete, edge, grid, ring
 from onboard.systems.graph.rules import Rules
 from tests.graph.brute_force import can_stick

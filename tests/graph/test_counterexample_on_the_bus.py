@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.certify.certificate import certify
-from bus_sim.certify.on_the_bus import Scene, play_scene
 from bus_sim.cli import main
-from bus_sim.systems.registry import SystemOptions
+from bus_sim.options import RunOptions
+from bus_sim.systems.graph.certify.certificate import certify
+from bus_sim.systems.graph.certify.on_the_bus import Scene, play_scene
 from onboard.systems.graph.network import Graph, grid, ring
 from onboard.systems.graph.rules import Rules
 
@@ -27,12 +27,12 @@ def test_g29_a_counterexample_sticks_on_the_bus_and_not_with_edge_and_node(
     graph: Graph, robots: int, rules: Rules
 ) -> None:
     scene = scene_of(graph, robots, rules)
-    ending = play_scene(scene, SystemOptions(quiet=True, limit_s=600))
+    ending = play_scene(scene, RunOptions(quiet=True, limit_s=600))
     assert ending.played_moves == len(scene.moves)
     assert ending.is_stuck
     assert ending.played.plant.violations == []
     assert any("between" in where for where in ending.where.values())
-    certified = play_scene(scene.under(Rules.EDGE_AND_NODE, robots), SystemOptions(quiet=True, limit_s=600))
+    certified = play_scene(scene.under(Rules.EDGE_AND_NODE, robots), RunOptions(quiet=True, limit_s=600))
     assert not certified.is_stuck
     assert certified.played.is_good
     assert list(certified.where.values()) == [f"in N{goal}" for goal in scene.goals]

@@ -1,16 +1,17 @@
 """Rows of Gnatowski's graph on the bus: robots, node agents and the order desk over CAN, and the plant beneath."""
 
 from collections.abc import Iterator
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
 from bus_sim.cli import main
+from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
+from bus_sim.session import play
 from bus_sim.sites import find_site
-from bus_sim.systems.graph.plant import GraphPlant, make_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.systems.graph.plant import GraphPlant
+from bus_sim.systems.stage import Stage
 from onboard.controller.shell import Controller
 from onboard.core.codes import KindCode, TokenKind
 from onboard.core.messages import Bid, CallForProposals, Message, TokenGrant
@@ -21,11 +22,11 @@ from onboard.systems.graph.messages import (
     EdgeState,
     NodeAnswer,
     NodeVerdict,
+    OrderResult,
     RobotAt,
     RobotMode,
     TurnSignal,
     VisitList,
-    VisitResult,
 )
 from onboard.systems.graph.network import Graph, complete, ring
 from onboard.systems.graph.robot import GraphRobot
@@ -42,7 +43,7 @@ class Scene:
 
     def __init__(self, site: FactoryGraph, limit_s: float = 600, seed: int = 1) -> None:
         self.site = site
-        self.played: Played = play(site, SystemOptions(seed=seed, limit_s=limit_s), make_plant)
+        self.played: Stage[Any] = play(site, RunOptions(seed=seed, limit_s=limit_s))
         assert isinstance(self.played.plant, GraphPlant)
         self.plant: GraphPlant = self.played.plant
 
@@ -55,7 +56,7 @@ class Scene:
         assert self.plant.violations == []
         assert self.played.halted == []
         assert self.played.is_over
-        assert all(entry.result is VisitResult.DONE for entry in self.plant.entries)
+        assert all(entry.result is OrderResult.DONE for entry in self.plant.entries)
         checks = Checks(self.site, rules=RULES)
         for time_us, message in self.played.messages:
             checks.feed_message(time_us, message)
@@ -268,15 +269,15 @@ def test_g27_a_robot_with_another_map_does_not_drive() -> None:
             assert isinstance(holon.behaviour, GraphRobot)
             holon.site = holon.behaviour.fleet.site = stale
 
-    def prepare(run: BusRun) -> None:
+    def prepare(run: BusRun[Any]) -> None:
         run.before_start.append(swap)
 
-    played = play(site, SystemOptions(limit_s=120), make_plant, prepare=prepare)
+    played = play(site, RunOptions(limit_s=120), prepare=prepare)
     assert played.plant.violations == []
     assert isinstance(played.plant, GraphPlant)
     assert [entry.robot for entry in played.plant.entries[:2]] == [22, 22]
     # Among strangers it does not even answer: the order is with the desk for a person to see.
-    assert played.plant.entries[2].result is VisitResult.RECEIVED
+    assert played.plant.entries[2].result is OrderResult.RECEIVED
     assert played.plant.bodies[21].stays == []
 
 

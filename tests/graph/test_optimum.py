@@ -1,9 +1,9 @@
 """Makespan on the bus over the exact optimum, and the optimum itself."""
 
-from bus_sim.certify.optimum import least_steps, some_tasks
-from bus_sim.certify.search import Tasks
 from bus_sim.sites import find_site
 from bus_sim.systems.graph.against_optimum import compare
+from bus_sim.systems.graph.certify.optimum import least_steps, some_tasks
+from bus_sim.systems.graph.certify.search import Tasks
 from onboard.systems.graph.network import complete, grid, ring
 from onboard.systems.graph.site import FactoryGraph
 

@@ -9,9 +9,9 @@ from hil.bench import Bench, TargetKind, load_bench
 BENCHES = Path(hil.__file__).parent / "benches"
 
 
-def simulated() -> Bench:
-    """The default bench, with the device in this process and in virtual time."""
-    bench = load_bench(BENCHES / "simulated.toml")
+def simulated(name: str = "simulated") -> Bench:
+    """A bench that ships, with the device in this process and in virtual time."""
+    bench = load_bench(BENCHES / f"{name}.toml")
     return replace(bench, targets=tuple(replace(target, kind=TargetKind.SIMULATED) for target in bench.targets))
 
 

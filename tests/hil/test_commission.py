@@ -6,7 +6,8 @@ from collections.abc import Callable
 import pytest
 
 from bus_sim.can.node import SimulatedBus
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.options import RunOptions
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.commission.ears import Ears
 from hil.commission.person import PersonGoneError
@@ -84,11 +85,11 @@ class Scene:
 
     def press_emergency_stop(self) -> None:
         """The circuit takes the orders away from the drive; it is pressed three seconds after the question."""
-        incoming = self.simulation.plant.links[self.node_id()].incoming
+        incoming = self.simulation.links[self.node_id()].incoming
         asyncio.get_running_loop().call_later(3, incoming.append, no_orders)
 
     def release_emergency_stop(self) -> None:
-        self.simulation.plant.links[self.node_id()].incoming.remove(no_orders)
+        self.simulation.links[self.node_id()].incoming.remove(no_orders)
 
 
 def no_orders(message: Message) -> Message | None:
@@ -203,7 +204,7 @@ def test_an_emergency_stop_that_does_not_stop_the_drive_is_found() -> None:
 def test_a_drive_that_goes_on_without_orders_is_found() -> None:
     def deaf_timeout(scene: Scene) -> None:
         # The same order again and again, from somewhere behind the bus: as if the drive needed no fresh ones.
-        link = scene.simulation.plant.links[scene.node_id()]
+        link = scene.simulation.links[scene.node_id()]
         carrier = scene.simulation.plant.carriers[scene.node_id()]
 
         def keep(message: Message) -> Message | None:

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from bus_sim.options import RunOptions
 from bus_sim.processes.plan import machine_file
-from bus_sim.run import RunOptions, build
 from bus_sim.serve.socketcand import SocketcandServer
+from bus_sim.systems.car_park.simulation import build
 from bus_sim.virtual_time import VirtualTimeLoop
 from hil.cli import main
 from hil.play import stop_fleet

@@ -57,12 +57,20 @@ def cases_of(bench: Bench) -> Iterator[tuple[Target, Scenario]]:
                 yield replace(bench.targets[0], machine=machine), scenario
 
 
-TESTS = list(cases_of(simulated()))
+TESTS = [(simulated(), *case) for case in cases_of(simulated())]
+#: Of other systems the one machine that their bench names.
+TESTS += [
+    (bench, bench.targets[0], scenario)
+    for bench in map(simulated, ("cell", "graph", "turning"))
+    for target, scenario in cases_of(bench)
+    if target.machine == bench.targets[0].machine
+]
+NAMES = [f"{bench.name} {target.machine.name} {scenario.name}" for bench, target, scenario in TESTS]
 
 
-@pytest.mark.parametrize(("target", "scenario"), TESTS, ids=[f"{one.machine.name} {two.name}" for one, two in TESTS])
-def test_a_good_controller_passes(target: Target, scenario: Scenario, tmp_path: Path) -> None:
-    outcome = play(simulated(), target, scenario, tmp_path)
+@pytest.mark.parametrize(("bench", "target", "scenario"), TESTS, ids=NAMES)
+def test_a_good_controller_passes(bench: Bench, target: Target, scenario: Scenario, tmp_path: Path) -> None:
+    outcome = play(bench, target, scenario, tmp_path)
     assert outcome.is_good, "\n".join(outcome.lines())
     assert (tmp_path / "trace.log").stat().st_size > 0
     assert outcome.properties()["sent"] > 0

@@ -9,12 +9,14 @@ from functools import cache
 
 import pytest
 
-from bus_sim.campaign.systems import SYSTEMS, patience_s
-from bus_sim.campaign.trial import STEP_US, stage_maker
+from bus_sim.campaign.trial import STEP_US, stage_of
+from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Arrivals, Scenario
-from bus_sim.run import RunOptions, run_until
+from bus_sim.faults.scenario import Scenario
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
+from bus_sim.systems.registry import simulated_of
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.compaction import NUMBERS_KEPT, compact
 from onboard.core.holon import Holon
@@ -34,20 +36,20 @@ CUTS = 12
 def played(name: str) -> tuple[Site, dict[int, list[Entry]]]:
     """A site's journals after a run in which machines lose power, by node-ID."""
     site = made(3, drawn(12, seed=1)) if name == "mapd" else find_site(name)
-    if site.system in SYSTEMS:
+    if name != "small":
         victims = [machine.name for machine in site.machines.values()][:3]
         faults = [
             parse_injection(f"crash:target={one},at_s={40 + 9 * at},restart_s=2") for at, one in enumerate(victims)
         ]
-        scenario = Scenario(name, 1, patience_s(site), faults=tuple(faults))
+        scenario = Scenario(name, 1, simulated_of(site).patience_s(site, None, 1), faults=tuple(faults))
     else:
         faults = [parse_injection(f"crash:target={one},at_s={at},restart_s=2") for one, at in CRASHES]
         scenario = Scenario(name, 3, 3_600, Arrivals(4, 60.0, 20.0, 90.0), faults=tuple(faults))
     loop = VirtualTimeLoop()
 
     async def play() -> dict[int, list[Entry]]:
-        stage = stage_maker(site)(site, scenario, RunOptions(seed=scenario.seed), loop)
-        stage.arm(scenario.faults)
+        stage = stage_of(site, scenario, loop)
+        arm(stage.run, scenario.faults)
         stage.run.start()
         await run_until(stage.run, lambda: stage.is_over, round(scenario.limit_s * 1e6), STEP_US)
         assert stage.is_over
@@ -197,8 +199,8 @@ def test_a_machine_at_rest_writes_its_journal_anew_and_goes_on(at_s: float) -> N
     identities: dict[int, set[str]] = {node: set() for node in site.machines}
 
     async def play() -> list[str]:
-        stage = stage_maker(site)(site, scenario, RunOptions(seed=3), loop)
-        stage.arm(faults)
+        stage = stage_of(site, scenario, loop)
+        arm(stage.run, faults)
         stage.run.start()
         for journal in stage.run.journals.values():
             journal.least_bytes = SLOTS_BYTES

@@ -9,7 +9,9 @@ from typing import Any, ClassVar
 
 import pytest
 
-from bus_sim.run import BusRun, RunOptions, buses_of
+from bus_sim.devices.timers import LoopTimers
+from bus_sim.options import RunOptions
+from bus_sim.run import BusRun, buses_of
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.behaviour import Fleet, NoEstimator, Plain
@@ -60,6 +62,9 @@ class DeskFactory:
 
 
 class NoPlant:
+    def __init__(self) -> None:
+        self.timers = LoopTimers(asyncio.get_running_loop())
+
     def start(self) -> None:
         """Nothing outside the controllers."""
 
@@ -92,7 +97,7 @@ def test_p22_the_machine_of_the_tutorial_works_as_it_is_written(shop: Shop) -> N
     loop = VirtualTimeLoop()
 
     async def play() -> None:
-        run = BusRun(shop, RunOptions(), loop, *buses_of(shop, RunOptions(), loop), NoPlant())
+        run = BusRun(shop, RunOptions(), loop, *buses_of(shop, (), loop), NoPlant())
         run.observers.append(lambda message, time_us: said.append((time_us, message)))
         run.start()
         await asyncio.sleep(120)

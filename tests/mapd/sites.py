@@ -1,11 +1,12 @@
 """Small pick-up and delivery sites made for tests."""
 
 import random
+from typing import Any
 
+from bus_sim.options import RunOptions
+from bus_sim.session import play
 from bus_sim.systems.mapd.plant import UnitPlant
-from bus_sim.systems.mapd.run import play_day
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played
+from bus_sim.systems.stage import Stage
 from onboard.config.site import parse_site
 from onboard.systems.mapd.site import Mapd
 
@@ -44,8 +45,8 @@ def made(robots: int, tasks: list[tuple[int, str, str]]) -> Mapd:
     return site
 
 
-def played(site: Mapd, **options: object) -> tuple[Played, UnitPlant]:
+def played(site: Mapd, **options: object) -> tuple[Stage[Any], UnitPlant]:
     """A run to its end, quiet and judged, and its plant."""
-    run = play_day(site, SystemOptions(quiet=True, **options))  # type: ignore[arg-type]  # options by name
+    run = play(site, RunOptions(quiet=True, **options))  # type: ignore[arg-type]  # options by name
     assert isinstance(run.plant, UnitPlant)
     return run, run.plant

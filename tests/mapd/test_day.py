@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import bus_sim
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
 from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.steps import Day
 from onboard.config.site import parse_site

@@ -2,9 +2,9 @@
 
 import pytest
 
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
 from onboard.config.site import parse_site
 from onboard.core.messages import Bid, Message
 from onboard.systems.mapd.auction import Task

@@ -2,16 +2,16 @@
 
 import random
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from bus_sim.cli import main as bus_sim
+from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
-from bus_sim.systems.mapd.plant import make_plant
+from bus_sim.session import play
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.steps import Day
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import play
 from onboard.cli import main as onboard
 from onboard.core.messages import Award, Bid, CallForProposals, Reference
 from onboard.systems.mapd.messages import StepRound, StepState
@@ -104,7 +104,7 @@ def test_whatever_is_on_the_bus_no_machine_raises() -> None:
     chance, both = random.Random(4), codecs(frames_of("mapd"))
     site = made(3, drawn(4, 1))
 
-    def babble(run: BusRun) -> None:
+    def babble(run: BusRun[Any]) -> None:
         bus = run.fleet.attach("noise", None)
         for number in range(400):
             layout = chance.choice(system_layouts("mapd")[0])
@@ -113,5 +113,5 @@ def test_whatever_is_on_the_bus_no_machine_raises() -> None:
             for frame in both.fleet.encode(message_of(layout.name, 77, values)):
                 run.loop.call_at(3 + number / 100, bus.send, frame)
 
-    run = play(site, SystemOptions(quiet=True, limit_s=200), make_plant, prepare=babble)
+    run = play(site, RunOptions(quiet=True, limit_s=200), prepare=babble)
     assert run.is_good

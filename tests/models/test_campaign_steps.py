@@ -6,8 +6,9 @@ import pytest
 
 from bus_sim.campaign.profiles import draw_faults
 from bus_sim.campaign.trial import play
-from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.faults.scenario import Scenario
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
 from onboard.core.authority import TokenBook
 from tests.models.recorder import Recorder
 from tests.models.refused import refused_calls, refused_tokens

@@ -7,7 +7,8 @@ from functools import partial
 from typing import Any
 
 from bus_sim.can.node import SimulatedBus
-from bus_sim.run import BusRun, Simulation
+from bus_sim.run import BusRun
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.gateway.gateway import Gateway
@@ -59,7 +60,7 @@ class Ordered:
         self._task: asyncio.Future[None] | None = None
         self._bus: SimulatedBus | None = None
 
-    def attach(self, run: BusRun) -> None:
+    def attach(self, run: BusRun[Any]) -> None:
         """Power up, and let what shall happen happen. On the running loop."""
         self._start(run)
         for at_s, topic, payload in self._orders:
@@ -70,7 +71,7 @@ class Ordered:
         if isinstance(self.journal, FatalJournal):
             self.journal.die = partial(self._die, run)
 
-    def _start(self, run: BusRun) -> None:
+    def _start(self, run: BusRun[Any]) -> None:
         bus = self._bus = run.fleet.attach(f"gateway {len(self.gateways)}", NODE)
         settings = GatewaySettings(version=self._version, epoch_us=EPOCH_US, node_id=NODE)
         gateway = Gateway(
@@ -80,7 +81,7 @@ class Ordered:
         self.gateways.append(gateway)
         self._task = asyncio.ensure_future(gateway.run())
 
-    def _die(self, run: BusRun) -> None:
+    def _die(self, run: BusRun[Any]) -> None:
         """What is not in the journal is lost; then it starts again."""
         assert self._task is not None
         self._task.cancel()

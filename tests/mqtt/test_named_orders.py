@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 from bus_sim.faults.injection import parse_injection
+from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
-from bus_sim.systems.graph.plant import make_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.session import play
+from bus_sim.systems.stage import Stage
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import TaskReport
 from onboard.systems.graph.messages import RobotAt, RobotMode, VisitList
@@ -65,22 +65,21 @@ def topic(name: str = "order", serial: str = "R1", version: str = "2.1") -> str:
 
 def run(
     orders: Sequence[tuple[float, str, Any]], *, faults: Sequence[str] = (), **options: Any
-) -> tuple[Played, Ordered]:
+) -> tuple[Stage[Any], Ordered]:
     ordered = Ordered(orders, **options)
 
-    def prepare(simulated: BusRun) -> None:
+    def prepare(simulated: BusRun[Any]) -> None:
         ordered.attach(simulated)
         simulated.loop.call_at(END_S, ordered.stop)
 
     return play(
         SITE,
-        SystemOptions(quiet=True, limit_s=300, faults=tuple(parse_injection(one) for one in faults)),
-        make_plant,
+        RunOptions(quiet=True, limit_s=300, faults=tuple(parse_injection(one) for one in faults)),
         prepare=prepare,
     ), ordered
 
 
-def ends(played: Played) -> list[tuple[int, TaskPhase]]:
+def ends(played: Stage[Any]) -> list[tuple[int, TaskPhase]]:
     """Ends of the gateway's tasks as robots told them, each once."""
     reports = [one for _, one in played.messages if isinstance(one, TaskReport) and one.task.origin == NODE]
     over = [(one.sender, one.phase) for one in reports if one.phase in (TaskPhase.DONE, TaskPhase.REFUSED)]
@@ -172,7 +171,7 @@ def update(number: int, start: int, *nodes: tuple[int, str], horizon: int = 0) -
     return told
 
 
-def loadings(played: Played) -> list[int]:
+def loadings(played: Stage[Any]) -> list[int]:
     """Nodes at which R1 loaded, in turn."""
     told = [one for _, one in played.messages if isinstance(one, RobotAt) and one.sender == 21]
     nodes = [one.node for one in told if one.robot_mode is RobotMode.LOADING]

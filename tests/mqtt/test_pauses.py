@@ -6,13 +6,14 @@ from typing import Any
 
 import pytest
 
-from bus_sim.run import BusRun, RunOptions
+from bus_sim.options import RunOptions
+from bus_sim.run import BusRun
+from bus_sim.session import play
 from bus_sim.systems.graph.plant import make_plant as graph_plant
 from bus_sim.systems.mapd.plant import make_plant as mapd_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.systems.stage import Stage
+from bus_sim.systems.terminal.playing import play as play_terminal
 from bus_sim.systems.terminal.run import TerminalRun
-from bus_sim.systems.terminal.run import play as play_terminal
 from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode
 from onboard.core.messages import Heartbeat, ManualOrder, ManualState
 from onboard.core.site import Site
@@ -49,14 +50,14 @@ def actions(ordered: Ordered, serial: str, version: str = "2.1") -> list[tuple[s
 
 def on(
     site: Site, make_plant: Any, orders: Sequence[tuple[float, str, Any]], stop_s: float = 140.0
-) -> tuple[Played, Ordered]:
+) -> tuple[Stage[Any], Ordered]:
     ordered = Ordered(orders)
 
-    def prepare(run: BusRun) -> None:
+    def prepare(run: BusRun[Any]) -> None:
         ordered.attach(run)
         run.loop.call_at(stop_s, ordered.stop)
 
-    return play(site, SystemOptions(quiet=True, limit_s=300), make_plant, prepare=prepare), ordered
+    return play(site, RunOptions(quiet=True, limit_s=300), prepare=prepare), ordered
 
 
 @pytest.mark.parametrize("version", VERSIONS)

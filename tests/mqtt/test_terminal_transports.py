@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from bus_sim.run import RunOptions
-from bus_sim.systems.terminal.run import Outcome, TerminalRun, play
+from bus_sim.options import RunOptions
+from bus_sim.systems.terminal.playing import play
+from bus_sim.systems.terminal.run import Outcome, TerminalRun
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import CallForProposals, Message, TaskReport
 from onboard.systems.terminal.messages import BoxOrder, TaskTerms

@@ -3,7 +3,7 @@
 import asyncio
 from dataclasses import dataclass, field
 
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.operate.order import Order
 from onboard.operate.station import Station
 from onboard.operate.wishes import Maker

@@ -3,8 +3,8 @@
 from functools import partial
 from itertools import pairwise
 
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import MachineState, ManualMode, Reason
 from onboard.core.messages import Blocked, Clear, Heartbeat, ManualOrder
 from onboard.core.site import Segment

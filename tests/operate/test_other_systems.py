@@ -4,16 +4,18 @@ from pathlib import Path
 
 import pytest
 
-from bus_sim.campaign.systems import usual_orders
-from bus_sim.campaign.trial import stage_maker
+from bus_sim.campaign.trial import stage_of
+from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.faults.scenario import Scenario
-from bus_sim.importers.command import import_files
-from bus_sim.importers.draft import site_text
-from bus_sim.importers.mapf import Wanted
-from bus_sim.run import RunOptions, run_until
+from bus_sim.run import run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.mapd.importers.command import import_files
+from bus_sim.systems.mapd.importers.draft import site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted
 from bus_sim.systems.orders import Orders
+from bus_sim.systems.registry import simulated_of
+from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.codes import MachineState, Reason
 from onboard.core.messages import Award, Bid, CallForProposals, Heartbeat, Message, TokenGrant, TokenHeld, TokenRequest
@@ -42,11 +44,11 @@ def said_by(site: Site, name: str, journal: str) -> tuple[list[tuple[int, Messag
     """What a machine says after it came back with its journal so, and what an operator's station heard of all."""
     loop, said, park = VirtualTimeLoop(), list[tuple[int, Message]](), Park(site)
     faults = (parse_injection(f"crash:target={name},at_s={AT_S},restart_s={OFF_S},journal={journal}"),)
-    orders = Orders(4, usual_orders(site, None, None).apart_s)
-    stage = stage_maker(site)(site, Scenario(site.name, 1, END_S, orders=orders, faults=faults), RunOptions(), loop)
+    orders = Orders(4, simulated_of(site).on(Occasion.FEW, site).apart_s)
+    stage = stage_of(site, Scenario(site.name, 1, END_S, orders, faults), loop)
 
     async def play() -> None:
-        stage.arm(faults)
+        arm(stage.run, faults)
         stage.run.observers.append(lambda message, time_us: said.append((time_us, message)))
         stage.run.observers.append(park.feed)
         stage.run.start()

@@ -4,8 +4,8 @@ import pytest
 
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import MachineState, Reason, RegenerationPhase
 from onboard.core.journal_state import JournalState
 from onboard.core.messages import BusTime, Diagnostic, DriveOrder, Heartbeat, Message, ShuttleOrder, SyncRequest

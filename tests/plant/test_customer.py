@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from bus_sim.demand import Demand, Stay
+from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
 from bus_sim.systems.car_park.plant.customer import Outcome, State
 from onboard.core.codes import DeskText

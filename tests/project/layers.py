@@ -7,7 +7,7 @@ type checkers. Reports are one line each: file, line, what, and the rule it brea
 import ast
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 #: What holds no decision: values and names that every layer may share.
@@ -84,7 +84,7 @@ class Layer:
 def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
     """The layers of one system's folder: its machines decide and nothing else; reader, judges and drawing do not."""
     own = f"onboard.systems.{system}"
-    machines = ("onboard.contract", "onboard.core", "onboard.ways", "onboard.work", "onboard.systems.system")
+    machines = ("onboard.core", "onboard.ways", "onboard.work", "onboard.systems.system")
     yield own, Layer(machines, only_stdlib=PURE_STDLIB, pure=True)
     config = Layer(
         ("onboard.config", "onboard.core", "onboard.ways", own), not_stdlib=CLOCK_AND_CHANCE | {"asyncio", "socket"}
@@ -113,17 +113,17 @@ def _is_part(place: Path) -> bool:
 
 
 #: The one file that loads modules by computed names: parts of systems.
-FINDER = "onboard/systems/registry.py"
+FINDER = "onboard/systems/folders.py"
 
 #: The longest name that fits decides. ``onboard`` itself is the composition root: ``cli``, ``life``, ``__main__``.
 LAYERS: dict[str, Layer] = {
     # Until the mirror knows no way, it and what reads it lean on them.
     "onboard.contract": Layer(only_stdlib=PURE_STDLIB),
     # Writes the rest of it; runs where somebody changes a DBC, never on a board.
-    "onboard.contract.generate": Layer(("onboard.contract", "onboard.wire.dbc_file", "dbc")),
-    "onboard.core": Layer(("onboard.contract", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.ways": Layer(("onboard.contract", "onboard.core"), only_stdlib=PURE_STDLIB, pure=True),
-    "onboard.work": Layer(("onboard.contract", "onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.contract.generate": Layer(("onboard.wire.dbc_file", "dbc")),
+    "onboard.core": Layer(("onboard.ways",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.ways": Layer(("onboard.core",), only_stdlib=PURE_STDLIB, pure=True),
+    "onboard.work": Layer(("onboard.core", "onboard.ways"), only_stdlib=PURE_STDLIB, pure=True),
     # It knows no system by name; a system's parts are found by the name of their folder.
     "onboard.systems": Layer(("onboard.core",)),
     "onboard.systems.contract": Layer(("onboard.core.site", "onboard.systems.registry", "onboard.wire")),
@@ -184,7 +184,7 @@ LAYERS: dict[str, Layer] = {
         (
             *CORE_TYPES,
             "onboard.config.problems",
-            *(f"onboard.core.{name}" for name in ("authority", "holding", "regeneration")),
+            *(f"onboard.core.{name}" for name in ("assignments", "authority", "holding", "regeneration")),
             "onboard.ways.lifts",
             "onboard.gateway.edge",
             "onboard.gateway.pauses",
@@ -226,13 +226,19 @@ LAYERS: dict[str, Layer] = {
     "hil": Layer(("onboard", "onboard.cli", "onboard.trace", *ALL_OF_ONBOARD, "bus_sim", "dbc"), ("pytest",)),
 }
 
+#: What is said on a bus is everybody's to name; only ``dbc``, of which it is made, is below it.
+LAYERS = {
+    name: replace(rule, projects=("onboard.contract", *rule.projects)) if name.startswith("onboard.") else rule
+    for name, rule in LAYERS.items()
+}
+
 #: Libraries that exactly one file may know, because their interfaces move.
 EXCLUSIVE: dict[str, str] = {
     "aiomqtt": "onboard/io/mqtt.py",
     "can": "onboard/io/pycan.py",
     "cantools": "onboard/wire/dbc_file.py",
     "distributed": "bus_sim/campaign/engine.py",
-    "ortools": "bus_sim/compare/optimum.py",
+    "ortools": "bus_sim/systems/car_park/compare/optimum.py",
 }
 
 

@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[2]
 #: Where awards are decided, sent and acted on, or written down as messages.
 DECIDES = ("onboard/core/", "onboard/contract/", "onboard/systems/", "onboard/work/")
 #: Simulated machines that call or obey on the bus themselves, and bugs planted into machines: they fold nothing.
-SPEAKERS = ("bus_sim/baselines/", "bus_sim/compare/", "bus_sim/planted/")
+SPEAKERS = tuple(f"bus_sim/systems/car_park/{folder}/" for folder in ("baselines", "compare", "planted"))
 #: A bench that waits for one award on real buses.
 BENCHES = ("hil/scenarios/",)
 #: The fold; and judges, which must not believe what they judge.

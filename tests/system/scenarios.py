@@ -5,8 +5,9 @@ from pathlib import Path
 from bus_sim.campaign.report import Report
 from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Arrivals, Scenario
+from bus_sim.faults.scenario import Scenario
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
 
 
 def played(

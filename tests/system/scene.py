@@ -6,9 +6,11 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from bus_sim.can.faults import Fault
-from bus_sim.demand import Demand, Stay
-from bus_sim.run import FLEET, RunOptions, Simulation, build, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import FLEET, run_until
+from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
 from onboard.core.messages import Message

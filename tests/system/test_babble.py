@@ -5,7 +5,8 @@ import random
 
 import pytest
 
-from bus_sim.run import RunOptions, Simulation, build
+from bus_sim.options import RunOptions
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import run
 from onboard.core.codes import Reason
 from onboard.core.frame import Frame

@@ -4,8 +4,9 @@ from functools import partial
 
 import pytest
 
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import MachineState, Reason
 from onboard.core.messages import (
     DoorOrder,

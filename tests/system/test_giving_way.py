@@ -1,6 +1,6 @@
 """An idle machine that stands in the way of another's task gives way (row P38; design, section 5)."""
 
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.core.codes import Grade, LegAction, TaskPhase
 from onboard.core.messages import CallForProposals, Itinerary, TaskReport

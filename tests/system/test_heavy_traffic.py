@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import pytest
 
-from bus_sim.demand import Demand
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Demand
 from onboard.core.codes import Grade, TaskPhase
 from onboard.core.messages import Bid, Itinerary, Stamp, TaskReport
 from tests.system.scene import Scene, play

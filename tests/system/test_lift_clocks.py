@@ -7,9 +7,9 @@ import pytest
 from bus_sim.campaign.report import Verdict
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
-from bus_sim.faults.scenario import Arrivals
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Arrivals
+from bus_sim.systems.car_park.simulation import Simulation
 from tests.system.scenarios import played
 from tests.system.scene import play, stays
 

@@ -7,8 +7,8 @@ import pytest
 
 from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.controller.shell import Controller
 from onboard.core import holon
 from onboard.core.authority import genesis_holder, segment_token, station_token

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import CallResult, DriveMode, Grade, LegAction, TaskPhase
 from onboard.core.messages import (
     Award,

@@ -11,8 +11,8 @@ from types import BuiltinFunctionType, CodeType, FunctionType, GetSetDescriptorT
 
 import pytest
 
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.codes import ANY_STATION, CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
 from onboard.core.holon import Holon

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import DriveMode, KindCode, LegAction, ShuttleAction, ShuttleMode
 from onboard.core.messages import DriveState, Itinerary, PlatformState, Progress, ShuttleOrder, ShuttleState
 from onboard.core.site import Site

@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.core.codes import Grade, LegAction, MachineState, Operation, Side, TaskPhase
 from onboard.core.messages import CallForProposals, Heartbeat, Itinerary, TaskReport

@@ -4,8 +4,8 @@ import dataclasses
 
 import pytest
 
-from bus_sim.baselines.session_lock import SessionLocks
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.baselines.session_lock import SessionLocks
 from onboard.core.codes import ANY_STATION, Criterion, Grade, KindCode, LegAction, Operation, Side
 from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.mirror import Mirror

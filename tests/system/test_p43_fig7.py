@@ -10,7 +10,7 @@ from functools import cache
 
 import pytest
 
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.core.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Side
 from onboard.core.messages import Bid, CallForProposals, Heartbeat, Itinerary, Leg, Message, Stamp

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 import pytest
 
 from bus_sim.can.node import SimulatedBus
-from bus_sim.planted.tools import replace
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.planted.tools import replace
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import CallResult, Grade, KindCode, Operation, Reason, TaskPhase
 from onboard.core.frame import Frame
 from onboard.core.messages import (

@@ -8,10 +8,12 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from bus_sim.run import FLEET, RunOptions, Simulation, build, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import FLEET, run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.plant.bodies import Aboard
 from bus_sim.systems.car_park.show import Clock, draw
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.codes import KindCode, MachineState
 from onboard.core.site import Station

@@ -11,8 +11,11 @@ import pytest
 
 from bus_sim.cli import build_parser
 from bus_sim.cli import main as bus_sim
+from bus_sim.options import RunOptions
+from bus_sim.session import run_site
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import DayOptions, run_day
+from bus_sim.systems.car_park.day import Day
+from bus_sim.systems.car_park.summary import RunSummary
 from onboard.core.codes import CallResult, Operation, TaskPhase
 from onboard.core.messages import Award, Bid, CallForProposals, Progress, TaskReport
 from onboard.trace.candump_reader import CandumpReader
@@ -79,7 +82,9 @@ def test_p55_promises_are_compared_with_the_end_that_the_bus_saw(run: tuple[Scen
 def test_p55_any_log_of_the_fleet_bus_gives_the_same_figures(tmp_path: Path) -> None:
     trace = tmp_path / "trace.log"
     site = find_site("small")
-    summary = run_day(site, DayOptions(random_s=(120.0, 30.0), cars=3, limit_s=600, trace=trace, quiet=True))
+    day = Day(random_s=(120.0, 30.0), cars=3)
+    summary = run_site(site, RunOptions(demand=day, limit_s=600, trace=trace, quiet=True))
+    assert isinstance(summary, RunSummary)
     with trace.open("rb") as lines:
         records = list(CandumpReader(lines))
     epoch_us = 946_684_800_000_000 - 10_000_000 + summary_first_us(site)
@@ -99,7 +104,7 @@ def test_p55_any_log_of_the_fleet_bus_gives_the_same_figures(tmp_path: Path) -> 
 
 def summary_first_us(site: object) -> int:
     """The first arrival of the run above, us after its time zero."""
-    from bus_sim.demand import Demand
+    from bus_sim.systems.car_park.demand import Demand
 
     return Demand.by_mean(120.0, 30.0, 1, count=3).stays[0].arrival_us
 
@@ -149,18 +154,18 @@ def test_without_a_terminal_a_window_is_told_line_by_line_at_its_pace(
     assert [line[:8] for line in shown.splitlines() if re.match(r"06:2", line)] == ["06:20:01", "06:25:00"]
 
 
-def options_of(*words: str, monkeypatch: pytest.MonkeyPatch) -> tuple[str, DayOptions]:
+def options_of(*words: str, monkeypatch: pytest.MonkeyPatch) -> tuple[str, RunOptions]:
     """What ``bus-sim run`` with these words would play: the site's name and the options."""
-    taken: list[tuple[str, DayOptions]] = []
+    taken: list[tuple[str, RunOptions]] = []
 
     class Enough(BaseException):
         """Raised instead of a run."""
 
-    def take(site: object, options: DayOptions) -> None:
+    def take(site: object, options: RunOptions) -> None:
         taken.append((getattr(site, "name", ""), options))
         raise Enough
 
-    monkeypatch.setattr("bus_sim.cli.run_day", take)
+    monkeypatch.setattr("bus_sim.cli.run_site", take)
     with pytest.raises(Enough):
         bus_sim(["run", *words])
     return taken[0]
@@ -186,7 +191,7 @@ def test_what_is_played_where_little_is_said(
     words: tuple[str, ...], site: str, window: str | None, speed: float | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     name, options = options_of(*words, monkeypatch=monkeypatch)
-    assert (name, options.window, options.speed) == (site, window, speed)
+    assert (name, options.demand.window, options.speed) == (site, window, speed)
 
 
 @pytest.mark.parametrize(
@@ -219,7 +224,9 @@ def test_the_help_names_the_window_and_its_default() -> None:
 
 
 def test_who_waits_at_the_end_of_a_window_is_no_failure_but_at_the_end_of_a_day_is() -> None:
-    summary = run_day(find_site("level1"), DayOptions(one_car_s=3_600.0, limit_s=15, quiet=True))
+    options = RunOptions(demand=Day(one_car_s=3_600.0), limit_s=15, quiet=True)
+    summary = run_site(find_site("level1"), options)
+    assert isinstance(summary, RunSummary)
     assert summary.unserved + summary.cars_in <= 1
     assert not replace(summary, unserved=1).is_good
     assert replace(summary, unserved=1, window="06:00 to 07:00").is_good
@@ -227,7 +234,8 @@ def test_who_waits_at_the_end_of_a_window_is_no_failure_but_at_the_end_of_a_day_
 
 
 def test_a_run_that_was_ended_at_once_has_no_figures_and_no_line_is_wider_than_the_terminal() -> None:
-    summary = run_day(find_site("level1"), DayOptions(one_car_s=60.0, quiet=True))
+    summary = run_site(find_site("level1"), RunOptions(demand=Day(one_car_s=60.0), quiet=True))
+    assert isinstance(summary, RunSummary)
     assert replace(summary, simulated_s=0.5).lines() == ["site level1, seed 1: ended in its first second; no figures"]
     folded = summary.lines(80)
     assert max(map(len, folded)) <= 80 < max(map(len, summary.lines()))

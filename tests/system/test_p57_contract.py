@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from bus_sim.run import FLEET, Simulation
+from bus_sim.run import FLEET
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from dbc import device_dbc_text, fleet_dbc_text
 from onboard.core.codes import CallResult, Criterion, KindCode, Operation, TaskPhase
 from onboard.core.frame import Frame

@@ -8,9 +8,11 @@ from functools import cache
 
 import pytest
 
-from bus_sim.planted.registry import BUGS
-from bus_sim.run import FLEET, RunOptions, Simulation, build, run_until
+from bus_sim.options import RunOptions
+from bus_sim.run import FLEET, run_until
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.planted.registry import BUGS
+from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
 from onboard.core.frame import Frame
 from onboard.core.site import Site

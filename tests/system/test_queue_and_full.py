@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import pytest
 
-from bus_sim.run import Simulation
 from bus_sim.systems.car_park.plant.customer import Outcome, State
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.core.codes import DeskText, Operation, TaskPhase
 from onboard.core.messages import CallForProposals, CarAt, DeskOrder, TaskReport

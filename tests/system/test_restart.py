@@ -4,8 +4,8 @@ import asyncio
 
 import pytest
 
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.codes import TaskPhase
 from onboard.core.messages import TaskReport
 from tests.system.scene import Scene, play, stays

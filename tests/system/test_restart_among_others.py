@@ -7,7 +7,7 @@ import pytest
 from bus_sim import sites
 from bus_sim.campaign.report import Verdict
 from bus_sim.cli import main as bus_sim
-from bus_sim.faults.scenario import Arrivals
+from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.plant.customer import TABLE, Event, State
 from onboard.cli import main as onboard
 from onboard.core.messages import Progress

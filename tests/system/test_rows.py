@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from bus_sim.demand import Demand, Stay
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.demand import Demand, Stay
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import Fleet
 from onboard.core.codes import (

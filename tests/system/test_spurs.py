@@ -7,10 +7,10 @@ from functools import cache
 
 import pytest
 
-from bus_sim.demand import Demand
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.show import draw_floor
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
 from onboard.core.authority import segment_token
 from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, TaskPhase

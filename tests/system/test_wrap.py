@@ -2,8 +2,8 @@
 
 import pytest
 
-from bus_sim.run import Simulation
 from bus_sim.sites import find_site
+from bus_sim.systems.car_park.simulation import Simulation
 from onboard.controller.shell import Controller
 from onboard.core.bus_time import BUS_TIME_MODULUS
 from onboard.core.codes import Grade

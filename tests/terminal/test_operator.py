@@ -5,8 +5,9 @@ from functools import partial
 
 import pytest
 
-from bus_sim.run import RunOptions
-from bus_sim.systems.terminal.run import Outcome, TerminalRun, play
+from bus_sim.options import RunOptions
+from bus_sim.systems.terminal.playing import play
+from bus_sim.systems.terminal.run import Outcome, TerminalRun
 from onboard.config.problems import ConfigError
 from onboard.core.codes import ManualMode
 from onboard.core.messages import Bid, CallForProposals, ManualState, Message

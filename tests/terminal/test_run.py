@@ -7,10 +7,11 @@ from typing import TypeVar
 import pytest
 
 from bus_sim.cli import main
-from bus_sim.run import RunOptions
+from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.central import at_one_desk, play_auction, play_central
-from bus_sim.systems.terminal.run import Outcome, TerminalRun, play
+from bus_sim.systems.terminal.playing import play
+from bus_sim.systems.terminal.run import Outcome, TerminalRun
 from bus_sim.systems.terminal.show import summary_lines
 from bus_sim.systems.terminal.table import picture
 from onboard.core.codes import CallResult, TaskPhase
@@ -80,7 +81,7 @@ def seen(tmp_path_factory: pytest.TempPathFactory) -> Seen:
         found.ends.append({owner: run.spectator.traffic.end_of(owner, now_us) for owner in run.spectator.traffic.plans})
         found.pictures.append(picture(SITE, run.spectator, now_us))
 
-    options = RunOptions(seed=1, trace=trace, trace_devices=True)
+    options = RunOptions(seed=1, trace=trace, devices=True)
     found.outcome = play(SITE, options, prepare=prepare, show=look)
     return found
 

@@ -2,15 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
+from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
+from bus_sim.session import play
 from bus_sim.sites import find_site
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import Played, play
+from bus_sim.systems.stage import Stage
 from bus_sim.systems.turning.nc import ProgramError, run_program
-from bus_sim.systems.turning.plant import TurningPlant, make_plant
+from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
 from onboard.core.codes import Criterion, KindCode, Operation
 from onboard.core.holon import Holon
@@ -19,7 +21,7 @@ from onboard.systems.turning.checks import RULES
 from onboard.systems.turning.generation import LatheGeneration
 from onboard.systems.turning.lathe import Job, LatheState
 from onboard.systems.turning.machine import LatheMachine
-from onboard.systems.turning.messages import BillBar, BillCutting, JobResult, LathePhase, LatheProgress, TurningOrder
+from onboard.systems.turning.messages import BillBar, BillCutting, LathePhase, LatheProgress, OrderResult, TurningOrder
 from onboard.systems.turning.process import generate
 from onboard.systems.turning.site import Turning, Wanted
 from tests.faults.systems import judged, withstands
@@ -31,31 +33,31 @@ def _site(*orders: Wanted) -> Turning:
     return replace(site, orders=orders or site.orders)
 
 
-def _play(site: Turning, prepare: Callable[[BusRun], None] | None = None, **options: object) -> Played:
-    return play(site, SystemOptions(limit_s=20_000, **options), make_plant, prepare=prepare)  # type: ignore[arg-type]  # as given
+def _play(site: Turning, prepare: Callable[[BusRun[Any]], None] | None = None, **options: object) -> Stage[Any]:
+    return play(site, RunOptions(limit_s=20_000, **options), prepare=prepare)  # type: ignore[arg-type]  # as given
 
 
-def _plant(played: Played) -> TurningPlant:
+def _plant(played: Stage[Any]) -> TurningPlant:
     assert isinstance(played.plant, TurningPlant)
     return played.plant
 
 
-def _sound(played: Played) -> None:
+def _sound(played: Stage[Any]) -> None:
     assert played.plant.violations == [] and played.halted == [] and played.is_over
 
 
 @pytest.fixture(scope="module")
-def shipped() -> Played:
+def shipped() -> Stage[Any]:
     """The shipped site, once."""
     return _play(_site())
 
 
-def test_p27_three_lathes_and_the_winner_that_is_known(shipped: Played) -> None:
+def test_p27_three_lathes_and_the_winner_that_is_known(shipped: Stage[Any]) -> None:
     """The cheapest by the five terms worked out here wins: thin pins L3, the shaft L2, only L1 holds the flange."""
     _sound(shipped)
     site = _site()
     entries = _plant(shipped).entries
-    assert [(entry.winner, entry.result) for entry in entries] == [(node, JobResult.DONE) for node in (3, 2, 1, 3)]
+    assert [(entry.winner, entry.result) for entry in entries] == [(node, OrderResult.DONE) for node in (3, 2, 1, 3)]
     calls = {one.task.number: one for _, one in shipped.messages if isinstance(one, CallForProposals)}
     assert {(one.operation, one.kind, one.criterion) for one in calls.values()} == {
         (Operation.MACHINE, KindCode.LATHE, Criterion.MONEY)
@@ -71,7 +73,7 @@ def test_p27_three_lathes_and_the_winner_that_is_known(shipped: Played) -> None:
         assert entries[number - 1].total_ct == min(cents.values())
 
 
-def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipped: Played) -> None:
+def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipped: Stage[Any]) -> None:
     plant = _plant(shipped)
     assert set(plant.programs) == {(3, 1), (2, 2), (1, 3)}
     assert set(plant.errors_mm) == {1, 2, 3} and max(plant.errors_mm.values()) <= 0.01
@@ -83,7 +85,7 @@ def test_p25_the_control_runs_the_winners_program_and_the_part_is_as_drawn(shipp
         run_program(plant.programs[2, 2].replace("M30", "M0"))
 
 
-def test_p26_the_five_terms_are_on_the_bus_and_sum_to_the_bid(shipped: Played) -> None:
+def test_p26_the_five_terms_are_on_the_bus_and_sum_to_the_bid(shipped: Stage[Any]) -> None:
     verdict = judged(_site(), shipped.messages)
     assert verdict.is_good, verdict.lines()
     assert all(verdict.seen[rule.name] for rule in RULES)
@@ -97,7 +99,7 @@ def test_p24_a_worn_edge_changes_the_bid_and_here_the_winner() -> None:
     site = _site(Wanted(0, Job(2, 1, 45, 1)))
     site = replace(site, lathes={**site.lathes, 1: replace(site.lathes[1], hourly_eur=49.0)})
 
-    def worn(run: BusRun) -> None:
+    def worn(run: BusRun[Any]) -> None:
         assert isinstance(run.plant, TurningPlant)
         run.plant.devices[2].used_min[1] = 19.95
 
@@ -113,10 +115,10 @@ def test_p24_edges_are_changed_before_they_are_worn_out() -> None:
     played = _play(_site(Wanted(0, Job(2, 1, 45, 60))))
     _sound(played)
     plant = _plant(played)
-    assert plant.entries[0].result is JobResult.DONE and sum(one.edges_changed for one in plant.devices.values()) >= 1
+    assert plant.entries[0].result is OrderResult.DONE and sum(one.edges_changed for one in plant.devices.values()) >= 1
 
 
-def test_p21_a_lathe_looks_at_no_other_machine(shipped: Played) -> None:
+def test_p21_a_lathe_looks_at_no_other_machine(shipped: Stage[Any]) -> None:
     """What the others do, and the mirror of it, changes nothing: a lathe alone bids what it bid beside the others."""
     site = _site()
     alone = LatheGeneration(site, site.machines[3])
@@ -129,7 +131,7 @@ def test_p21_a_lathe_looks_at_no_other_machine(shipped: Played) -> None:
     assert found is not None and found.cost == bid.cost and found.itinerary is None
 
 
-def test_p59_the_same_holon_drives_lathes(shipped: Played) -> None:
+def test_p59_the_same_holon_drives_lathes(shipped: Stage[Any]) -> None:
     controllers = shipped.run.controllers
     assert {type(one.holon) for one in controllers.values()} == {Holon}
     assert {type(one.holon.behaviour) for node, one in controllers.items() if node != 9} == {LatheMachine}
@@ -140,7 +142,7 @@ def test_what_no_lathe_can_make_is_refused() -> None:
     # A bar of 300 mm is in nobody's jaws.
     played = _play(_site(Wanted(0, Job(3, 1, 300, 1))))
     _sound(played)
-    assert [one.result for one in _plant(played).entries] == [JobResult.REFUSED]
+    assert [one.result for one in _plant(played).entries] == [OrderResult.REFUSED]
     assert not any(isinstance(one, Bid) for _, one in played.messages)
 
 

@@ -21,7 +21,11 @@ from tests.mapd.sites import drawn, site_text
 ROOT = Path(__file__).parents[2]
 SITE_FILES = ROOT / "bus_sim" / "sites"
 #: What a site's run is asked for, where it is not its own day.
-_WORDS = {"small": ["--one-car", "60"], "turning": ["--for", "900"]}
+_WORDS = {
+    "standard": ["--random", "20", "5", "--cars", "8", "--for", "420"],
+    "small": ["--one-car", "60"],
+    "turning": ["--for", "900"],
+}
 #: Where no site of a system ships, one that is made for tests.
 _MADE = {"mapd": lambda: site_text(4, drawn(8, 5))}
 

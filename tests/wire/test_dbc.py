@@ -8,7 +8,8 @@ import pytest
 
 from dbc import device_dbc_text, fleet_dbc_text
 from onboard.config.site import parse_site
-from onboard.core import codes, messages
+from onboard.core.codes import CONTRACT, CONTRACT_VERSION, MAX_NODE_ID, OperatorAction
+from onboard.core.messages import OperatorOrder, Reference
 from onboard.wire import network_doc
 from onboard.wire.codec import fleet_codec
 from onboard.wire.dbc_file import read_layouts
@@ -51,9 +52,9 @@ def test_periods_and_version_are_those_of_a_site_that_sets_none() -> None:
     assert (order.name, order.cycle_ms * 1000) == ("DriveOrder", timing.drive_refresh_us)
     assert order.timeout_ms > 2 * order.cycle_ms, "one lost order stops no drive"
     for text in TEXTS.values():
-        assert f'BA_ "ContractVersion" {codes.CONTRACT};' in text
+        assert f'BA_ "ContractVersion" {CONTRACT};' in text
     lines = [line for line in TEXTS["fleet"].splitlines() if line.startswith(("BO_ ", " SG_ "))]
-    assert zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80 == codes.CONTRACT_VERSION, "as docs/contract-2.md says"
+    assert zlib.crc32("\n".join(lines).encode()) & 0x7F | 0x80 == CONTRACT_VERSION, "as docs/contract-2.md says"
 
 
 def test_the_sites_dbc_has_one_message_for_each_machine() -> None:
@@ -80,8 +81,8 @@ def test_the_sites_dbc_keeps_signals_comments_tables_and_cycles() -> None:
 def test_an_operators_orders_decode_with_the_sites_dbc() -> None:
     """The gateways' nodes, 251 to 255, are in no site file."""
     database = judge_of(site_dbc(one_floor(robots=2)))
-    for node_id in range(codes.MAX_NODE_ID + 1, 256):
-        order = messages.OperatorOrder(node_id, 1, codes.OperatorAction.INSERT_TICKET, messages.Reference(1, 7))
+    for node_id in range(MAX_NODE_ID + 1, 256):
+        order = OperatorOrder(node_id, 1, OperatorAction.INSERT_TICKET, Reference(1, 7))
         (frame,) = fleet_codec().encode(order)
         found = database.get_message_by_frame_id(frame.arbitration_id)
         assert found.name == f"Gateway{node_id}_OperatorOrder"

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbc import device_dbc_text, fleet_dbc_text
-from onboard.core import messages
 from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Reason, Side, TokenKind
 from onboard.core.frame import Frame
 from onboard.core.messages import (
@@ -21,6 +20,7 @@ from onboard.core.messages import (
     Message,
     Reference,
     Stamp,
+    SyncRequest,
     TokenHeld,
 )
 from onboard.core.recovery_messages import Go
@@ -345,4 +345,4 @@ def test_a_message_of_several_frames_with_a_wrong_value_is_refused() -> None:
     with pytest.raises(ValueError, match=r"CallLoad\.wheelbase_mm = 4060"):
         fleet_codec().encode(dataclasses.replace(a_call(1, 1), wheelbase_mm=4_060))
     with pytest.raises(KeyError):
-        device_codec().encode(messages.SyncRequest(1, 0))
+        device_codec().encode(SyncRequest(1, 0))

@@ -5,10 +5,10 @@ import re
 from datetime import datetime
 from typing import Any
 
-from bus_sim.by_hand import Hand
 from bus_sim.demand import Law
 from bus_sim.faults.operators import STATION
-from bus_sim.run import Simulation
+from bus_sim.systems.car_park.by_hand import Hand
+from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.web.run_source import Arguments, RunSource
 from onboard.core.codes import Reason
 from onboard.core.messages import Blocked, Clear

@@ -1,91 +1,272 @@
-"""Trials of a car park: customers come and go by the scenario's arrivals."""
+"""A car park's run: customers come and go, of a whole day or by chance; what came of them."""
 
 from collections import Counter
-from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING
 
-from bus_sim.faults.arm import arm
-from bus_sim.faults.injection import AnyFault
-from bus_sim.faults.scenario import Scenario
-from bus_sim.run import RunOptions, Simulation, build
-from bus_sim.systems.car_park.plant.customer import Customer, Outcome, State
-from bus_sim.systems.car_park.plant.street import Street
-from bus_sim.systems.orders import Tally
-from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.site import Site
+from rich.console import Console
 
-#: Customers come so long after power-up, us.
+from bus_sim.systems.car_park.by_hand import ByHand
+from bus_sim.systems.car_park.demand import Demand, Stay
+from bus_sim.systems.car_park.plant.bodies import random_car
+from bus_sim.systems.car_park.plant.customer import Customer, Event, Outcome, State
+from bus_sim.systems.car_park.plant.plant import Plant, looks_for_ticket
+from bus_sim.systems.car_park.show import Clock, TerminalShow
+from bus_sim.systems.car_park.simulation import Simulation
+from bus_sim.systems.car_park.summary import BurstFigures, RunSummary, bus_figures, unserved
+from bus_sim.systems.car_park.window import BURST_US, Window, densest
+from bus_sim.systems.stage import Ended, Hand, Show, Stage, Tally
+from onboard.systems.car_park.site import CarPark
+from onboard.trace.durations import Durations
+from onboard.trace.indicators import Indicators
+
+if TYPE_CHECKING:  # the page's libraries are an extra
+    from bus_sim.web.run_source import RunSource
+
+#: Customers come so long after power-up, us: the machines find their places first.
 ORIGIN_US = 10_000_000
+#: Somebody who waits so long after the last departure was lost, us: the run ends and says so.
+PATIENCE_US = 2 * 3_600_000_000
+#: Without a terminal a window is told line by line, one in so long, us of virtual time.
+WINDOW_LINE_US = 300_000_000
+
+#: A customer who is hurried does not walk or drive: these states end at once.
+_HURRIED = (State.DRIVING_IN, State.WALKING_OUT)
 
 
-class CarPark:
+@dataclass(frozen=True)
+class Coming:
+    """Who comes when: ``origin_us`` is the loop time of the demand's time zero; ``window`` is what is shown of it."""
+
+    demand: Demand
+    origin_us: int = ORIGIN_US
+    window: Window | None = None
+    by_hand: bool = False
+
+    @property
+    def zero(self) -> datetime:
+        """Local time of loop time 0."""
+        return (self.demand.zero or datetime(2000, 1, 1, tzinfo=UTC)) - timedelta(microseconds=self.origin_us)
+
+
+class CarParkStage(Stage[Plant]):
     """See ``Stage``."""
 
     who = "customers"
+    step_us = 1_000_000
+    #: After the last customer the machines may finish what they do, us.
+    tail_us = 30_000_000
+    #: A day is told whole, with all that the oracle saw in it.
+    goes_on_broken = True
+    #: A day ends by itself, whoever watches.
+    goes_on_watched = False
+    run: Simulation
 
-    def __init__(self, site: Site, scenario: Scenario, options: RunOptions, loop: VirtualTimeLoop) -> None:
-        self.run: Simulation = build(site, options, loop)
-        self._street, self._oracle = self.run.plant.street, self.run.plant.oracle
-        self._street.add_all(scenario.arrivals.demand(scenario.seed), ORIGIN_US)
+    def __init__(self, run: Simulation, coming: Coming) -> None:
+        super().__init__(run)
+        self._coming = coming
+        self._street = run.plant.street
+        self._street.add_all(coming.demand, coming.origin_us)
+        self._clock = Clock(coming.zero)
+        self._indicators = Indicators(run.site)
+        self._hurried: list[Customer] = []
 
-    @property
-    def is_broken(self) -> bool:
-        """See ``Stage``."""
-        return bool(self._oracle.violations)
+    # --- how it stands -----------------------------------------------------------------------------------------
 
     @property
     def customers(self) -> list[Customer]:
         """All who come."""
         return self._street.customers
 
-    @property
-    def is_over(self) -> bool:
-        """See ``Stage``."""
-        return is_over(self._street)
-
-    def arm(self, faults: Sequence[AnyFault]) -> None:
-        """See ``Stage``."""
-        arm(self.run, faults)
-
-    def violations(self) -> list[str]:
-        """See ``Stage``."""
-        return [str(one) for one in self._oracle.finish()]
+    def judge_end(self) -> None:
+        """The oracle looks at the motions that are under way, and counts the cars."""
+        self.plant.oracle.finish()
 
     def waits_since(self, time_us: int) -> int:
         """See ``Stage``."""
-        return sum(_waits_since(customer, time_us) for customer in self._street.customers)
+        return sum(_waits_since(customer, time_us) for customer in self.customers)
+
+    def waits_s(self) -> tuple[float | None, ...]:
+        """In and out together."""
+        return tuple(map(_wait_s, self.customers))
 
     def tally(self) -> Tally:
         """Whoever has lost the ticket does not count as waiting: no machine can help there."""
-        customers, summary = self._street.customers, self._street.summary()
+        customers, summary = self.customers, self._street.summary()
         outcomes = Counter(customer.visit.outcome for customer in customers)
         still = (State.COMING, State.PARKED, State.GONE)
         return Tally(
             outcomes[Outcome.SERVED] + outcomes[Outcome.CANCELLED],
             sum(outcomes[one] for one in (Outcome.FULL, Outcome.TOO_LARGE, Outcome.TICKET_UNKNOWN)),
-            sum(one.state not in still and not _looks_for_ticket(one) for one in customers),
+            sum(one.state not in still and not looks_for_ticket(one) for one in customers),
             max((*summary.in_wait_us, *summary.out_wait_us), default=0) / 1e6,
             outcomes[Outcome.FULL],
         )
 
+    # --- a machine under test ----------------------------------------------------------------------------------
 
-def is_over(street: Street) -> bool:
-    """Whoever has lost the ticket is not waited for: no machine can help there."""
-    return all(
-        customer.state is State.GONE
-        or (customer.state is State.PARKED and customer.stay.departure_us is None)
-        or _looks_for_ticket(customer)
-        for customer in street.customers
-    )
+    def bring(self, site: CarPark, node: int) -> None:
+        """A customer who does not walk or drive brings a car; it is not fetched again."""
+        if not self._hurried:
+            for compartment in self.plant.compartments.values():
+                compartment.watch(self._soon_hurry)
+                compartment.watch_desk(lambda _text, _car: self._soon_hurry())
+        stay = Stay(0, None, random_car(f"car {len(self._hurried) + 1}", self.run.options.seed))
+        self._hurried.append(self._street.add(stay, self.run.loop.now_us()))
+
+    def _soon_hurry(self) -> None:
+        """After the step that is under way."""
+        self.run.loop.call_soon(self._hurry)
+
+    def _hurry(self) -> None:
+        for customer in self._hurried:
+            if customer.state in _HURRIED:
+                customer.on(Event.TIMER)
+
+    def power_up(self, node: int) -> None:
+        """See ``Stage``."""
+        plant = self.plant
+        for devices in (plant.shuttles, plant.carriers, plant.lifts, plant.compartments):
+            if node in devices:
+                devices[node].start()
+
+    # --- a person who watches ----------------------------------------------------------------------------------
+
+    @property
+    def limit_us(self) -> int:
+        """See ``Stage``."""
+        last_us = max((stay.departure_us or stay.arrival_us for stay in self._coming.demand.stays), default=0)
+        return last_us + self._coming.origin_us + PATIENCE_US
+
+    @property
+    def shown_us(self) -> tuple[int, int] | None:
+        """See ``Stage``."""
+        window, origin_us = self._coming.window, self._coming.origin_us
+        return None if window is None else (window.begin_us + origin_us, window.end_us + origin_us)
+
+    def head(self) -> list[str]:
+        """See ``Stage``."""
+        options, stays = self.run.options, self._coming.demand.stays
+        told = (
+            f"site {self.run.site.name}, {len(stays)} cars, seed {options.seed}, speed {options.speed or 'unlimited'}"
+        )
+        return [told + "".join(f", fault {fault}" for fault in options.faults)]
+
+    def warming_up(self, wall_s: float | None) -> str:
+        """See ``Stage``."""
+        window, demand = self._coming.window, self._coming.demand
+        assert window is not None and self.shown_us is not None, "only what comes before a window is hurried"
+        if wall_s is not None:
+            speed = self.run.options.speed or "unlimited"
+            return f"warmed up in {wall_s:.1f} s; now {window.told(demand)} at speed {speed}"
+        before, until = sum(stay.arrival_us < window.begin_us for stay in demand.stays), self.shown_us[0]
+        span = f"from {self._clock.at(0)} to {self._clock.at(until)}"
+        return f"warm-up {span}, as fast as possible: {before} cars come before"
+
+    def measure_from(self, now_us: int) -> None:
+        """See ``Stage``."""
+        super().measure_from(now_us)
+        self._indicators.begin(now_us)
+        self._show.every(WINDOW_LINE_US)
+
+    def listen(self) -> None:
+        """The indicators are made as it goes on: a day has too many messages to keep."""
+        self.run.observers.append(self._indicators.feed)
+
+    def show(self, console: Console) -> Show:
+        """See ``Stage``."""
+        self._show = TerminalShow(self.run.site, self.run.view, self._clock, self._line, console)
+        return self._show
+
+    def _line(self) -> str:
+        street, load, view = self._street.summary(), self.run.fleet.statistics(), self.run.view
+        return (
+            f"cars in {street.parked}  out {street.served}  inside {street.inside}  waiting {unserved(street)}"
+            f"  calls {view.calls_opened}  bids {view.bids}  bus load {load.mean_load:.2%}"
+        )
+
+    def hand(self, console: Console) -> Hand | None:
+        """See ``Stage``."""
+        if not self._coming.by_hand:
+            return None
+        options = self.run.options
+        return ByHand(self._street, options.seed, console, ends_with_pipe=options.web is None)
+
+    def source(self) -> "RunSource":
+        """See ``Stage``."""
+        from bus_sim.systems.car_park.page import CarParkSource  # noqa: PLC0415  # its libraries are an extra
+
+        return CarParkSource(self.run, self._coming.zero)
+
+    def summary(self, ended: Ended) -> RunSummary:
+        """See ``Stage``."""
+        run, now_us = self.run, self.run.loop.now_us()
+        street, fleet = self._street.summary(ended.begin_us), self._indicators.figures(now_us)
+        frames, errors, mean_load, worst_load = bus_figures(run.fleet.statistics())
+        trace = run.options.trace
+        drops: Counter[str] = Counter()
+        for controller in run.controllers.values():
+            drops.update({reason.name: count for reason, count in controller.all_drops().items()})
+        return RunSummary(
+            site=run.site.name,
+            seed=run.options.seed,
+            window=self._played(ended),
+            simulated_s=(now_us - ended.begin_us) / 1e6,
+            wall_s=ended.wall_s,
+            cars_in=street.parked,
+            cars_out=street.served,
+            inside=street.inside,
+            refused_full=street.refused_full,
+            refused_too_large=street.refused_too_large,
+            unserved=unserved(street),
+            wait_in=Durations.of(street.in_wait_us),
+            wait_out=Durations.of(street.out_wait_us),
+            burst=self._burst(ended),
+            fleet=fleet,
+            messages=sum(fleet.messages.values()),
+            frames=frames,
+            error_frames=errors,
+            bus_load_mean=mean_load,
+            bus_load_worst_second=worst_load,
+            wire_drops=dict(drops),
+            violations=tuple(self.violations()),
+            halted=(*self.halted, *ended.failures),
+            trace=str(trace) if trace is not None else None,
+        )
+
+    def _played(self, ended: Ended) -> str | None:
+        """What of the window the figures are of, as far as it was played; None for a whole run."""
+        coming = self._coming
+        if coming.window is None:
+            return None
+        begin_us = coming.window.begin_us if ended.is_warm else ended.begin_us - coming.origin_us
+        played = Window(begin_us, self.run.loop.now_us() - coming.origin_us).told(coming.demand)
+        return played if ended.is_warm else f"warm-up, {played}"
+
+    def _burst(self, ended: Ended) -> BurstFigures | None:
+        coming = self._coming
+        played = Window(ended.begin_us - coming.origin_us, self.run.loop.now_us() - coming.origin_us)
+        burst = densest(coming.demand, played if coming.window is not None else None)
+        if burst is None:
+            return None
+        begin_us = burst.begin_us + coming.origin_us
+        waits_us = self._street.in_waits_us(begin_us, begin_us + BURST_US)
+        return BurstFigures(self._clock.at(begin_us), BURST_US / 1e6, burst.count, Durations.of(waits_us))
+
+
+def _wait_s(customer: Customer) -> float | None:
+    """What a customer waited in all, in and out; None for one who was not served."""
+    visit = customer.visit
+    if visit.in_wait_us is None or visit.out_wait_us is None:
+        return None
+    return (visit.in_wait_us + visit.out_wait_us) / 1e6
 
 
 def _waits_since(customer: Customer, time_us: int) -> bool:
     """Whether a customer waits who waited at this time: to bring the car, or to have it back."""
-    if customer.state is State.GONE or _looks_for_ticket(customer):
+    if customer.state is State.GONE or looks_for_ticket(customer):
         return False
     visit = customer.visit
     since_us = visit.arrived_us if visit.parked_us is None else visit.asked_us
     return since_us is not None and since_us <= time_us
-
-
-def _looks_for_ticket(customer: Customer) -> bool:
-    return customer.state is State.AT_DESK and customer.has_lost_ticket

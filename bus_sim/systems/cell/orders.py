@@ -2,12 +2,10 @@
 
 import random
 from dataclasses import replace
-from typing import cast
 
-from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant, make_plant
-from bus_sim.systems.orders import Orders, System, Tally, last_of, tally_of
-from bus_sim.systems.session import SystemPlant
-from onboard.core.site import Site
+from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant
+from bus_sim.systems.orders import Orders, last_of, tally_of
+from bus_sim.systems.stage import Tally
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.messages import OrderResult
 from onboard.systems.cell.site import Cell, Wish
@@ -20,9 +18,8 @@ ATTEMPTS = 100
 ORDER_S = 60.0
 
 
-def draw(site: Site, orders: Orders, seed: int) -> Cell:
+def draw(site: Cell, orders: Orders, seed: int) -> Cell:
     """The site with drawn goals; none has a deadline, as faults may last longer than any."""
-    assert isinstance(site, Cell)
     chance = orders.chance(site.name, seed)
     wishes = [Wish(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
     return replace(site, wishes=tuple(wishes))
@@ -44,17 +41,12 @@ def _is_on(point: Point, x0_mm: int, y0_mm: int, x1_mm: int, y1_mm: int) -> bool
     return x0_mm - MARGIN_MM < point.x_mm < x1_mm + MARGIN_MM and y0_mm - MARGIN_MM < point.y_mm < y1_mm + MARGIN_MM
 
 
-def last_s(site: Site) -> float:
+def last_s(site: Cell) -> float:
     """When the last order comes, s after power-up."""
-    assert isinstance(site, Cell)
     return last_of((one.at_ms for one in site.wishes), ORIGIN_US)
 
 
-def count(plant: SystemPlant) -> Tally:
+def count(plant: CellPlant) -> Tally:
     """What became of the goals."""
-    cell = cast("CellPlant", plant)
-    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(cell.site.wishes)
-    return tally_of(cell.entries, done, refused, expected, cell.timers.now_us())
-
-
-CELL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(6, 20.0), who="goals")
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.wishes)
+    return tally_of(plant.entries, done, refused, expected, plant.timers.now_us())

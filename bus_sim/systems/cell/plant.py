@@ -11,7 +11,6 @@ from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
 from onboard.core.messages import Message, Reference
 from onboard.core.serial import is_newer
-from onboard.core.site import Site
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
 from onboard.systems.cell.messages import (
@@ -330,7 +329,6 @@ def _inside_of(here: tuple[float, float], there: tuple[float, float], obstacle: 
     return first < last
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> CellPlant:
+def make_plant(site: Cell, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> CellPlant:
     """The plant of a cell; nothing in it is drawn by chance."""
-    assert isinstance(site, Cell)
     return CellPlant(site, timers, links)

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, replace
 from statistics import fmean
-from typing import cast
 
-from bus_sim.certify.optimum import least_steps, some_tasks
-from bus_sim.certify.search import Tasks
-from bus_sim.systems.graph.plant import GraphPlant, make_plant
-from bus_sim.systems.registry import SystemOptions
-from bus_sim.systems.session import play
+from bus_sim.options import RunOptions
+from bus_sim.session import play
+from bus_sim.systems.graph.certify.optimum import least_steps, some_tasks
+from bus_sim.systems.graph.certify.search import Tasks
+from bus_sim.systems.graph.plant import GraphPlant
 from onboard.core.codes import KindCode, Side
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.graph.network import Graph
@@ -53,10 +52,11 @@ def case_site(site: FactoryGraph, graph: Graph, tasks: Tasks) -> FactoryGraph:
 def ratio(site: FactoryGraph, graph: Graph, tasks: Tasks) -> float:
     """One case, from the first departure to the last arrival. All edges are of one length."""
     best = least_steps(graph, tasks)
-    played = play(case_site(site, graph, tasks), SystemOptions(limit_s=900, quiet=True), make_plant)
+    played = play(case_site(site, graph, tasks), RunOptions(limit_s=900, quiet=True))
     if best is None or not played.is_good:
         raise RuntimeError(f"{tasks}: {played.plant.violations or 'not over'}")
-    bodies = cast("GraphPlant", played.plant).bodies.values()
+    plant: GraphPlant = played.plant
+    bodies = plant.bodies.values()
     begin_us = min(body.stays[0][2] for body in bodies)
     end_us = max(body.since_us for body in bodies)
     step_us = max(graph.lengths_mm.values()) * 1_000_000 / site.speed_mm_s

@@ -1,26 +1,39 @@
 """Drive, body and sensors of one robot: along an edge at constant speed, on to the next or into the node ahead."""
 
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from bus_sim.devices.link import DeviceLink
-from bus_sim.devices.timers import Timer
+from bus_sim.devices.timers import Timer, Timers
 from onboard.core.messages import Message
 from onboard.core.site import Machine
 from onboard.systems.graph.messages import NO_NODE, ApproachSensor, BodyPlace, BodyState, RouteAction, RouteOrder
-from onboard.systems.graph.site import edge
-
-if TYPE_CHECKING:
-    from bus_sim.systems.graph.plant import GraphPlant
+from onboard.systems.graph.site import FactoryGraph, edge
 
 #: A moving drive that hears no order for this long stops (dbc/graph.dbc).
 DRIVE_TIME_OUT_US = 500_000
 WORD_US = 10_000_000
 
 
+class Hall(Protocol):
+    """What a body asks of the plant that it drives in (``GraphPlant``)."""
+
+    site: FactoryGraph
+    timers: Timers
+
+    def holds(self, body: "Body") -> bool:
+        """Whether it is kept before its approach sensor for now."""
+
+    def check_onto(self, body: "Body", start: int, end: int) -> None:
+        """It drives onto an edge."""
+
+    def check_into(self, body: "Body") -> None:
+        """It has come into a node."""
+
+
 class Body:
     """One robot's body. ``offset_mm`` counts from the beginning of its edge, as of when it began to move last."""
 
-    def __init__(self, machine: Machine, plant: "GraphPlant", link: DeviceLink) -> None:
+    def __init__(self, machine: Machine, plant: Hall, link: DeviceLink) -> None:
         self.machine = machine
         self.node = machine.home.track
         self.behind = NO_NODE
@@ -31,7 +44,7 @@ class Body:
         self._plant = plant
         self._timers = plant.timers
         self._link = link
-        #: Whether the plant keeps it before the approach sensor (``GraphPlant.holds``).
+        #: Whether the plant keeps it before the approach sensor (``Hall.holds``).
         self.is_held = False
         self._offset_mm = 0.0
         self._began_us: int | None = None

@@ -11,8 +11,7 @@ from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.graph.body import Body
 from onboard.core.messages import Message
-from onboard.core.site import Site
-from onboard.systems.graph.messages import BodyPlace, VisitAnswer, VisitKey, VisitResult, five
+from onboard.systems.graph.messages import BodyPlace, OrderResult, VisitAnswer, VisitKey, five
 from onboard.systems.graph.site import FactoryGraph, Order, Rules, edge
 
 #: Orders begin so long after power-up, us: the machines find each other first.
@@ -27,7 +26,7 @@ class Entry:
     number: int
     order: Order
     begun_us: int
-    result: VisitResult | None = None
+    result: OrderResult | None = None
     robot: int = 0
     ended_us: int | None = None
 
@@ -61,7 +60,7 @@ class Counter:
         if entry.ended_us is not None:
             return
         entry.result, entry.robot = message.visit_result, message.robot
-        if message.visit_result in (VisitResult.DONE, VisitResult.REFUSED):
+        if message.visit_result in (OrderResult.DONE, OrderResult.REFUSED):
             entry.ended_us = self._plant.timers.now_us()
             self._plant.check_end(entry)
 
@@ -134,7 +133,7 @@ class GraphPlant:
 
     def check_end(self, entry: Entry) -> None:
         """What was told to be done was done: the robot stood in every node in turn, as long as loading takes."""
-        if entry.result is not VisitResult.DONE:
+        if entry.result is not OrderResult.DONE:
             return
         body = self.bodies.get(entry.robot)
         stays = [] if body is None else [*body.stays, (body.node, body.since_us, self.timers.now_us())]
@@ -148,7 +147,6 @@ class GraphPlant:
             self.note(f"order {entry.number} was for node-ID {entry.order.robot}, and {entry.robot} did it")
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> GraphPlant:
+def make_plant(site: FactoryGraph, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> GraphPlant:
     """The plant of a graph; nothing in it is drawn by chance."""
-    assert isinstance(site, FactoryGraph)
     return GraphPlant(site, timers, links)

@@ -2,22 +2,19 @@
 
 from dataclasses import replace
 from statistics import fmean
-from typing import cast
 
-from bus_sim.systems.mapd.plant import UnitPlant, make_plant
-from bus_sim.systems.orders import Ended, Orders, System, Tally, nothing_to_draw, tally
-from bus_sim.systems.session import SystemPlant
-from onboard.core.site import Site
-from onboard.systems.mapd.messages import TransportResult
+from bus_sim.systems.mapd.plant import UnitPlant
+from bus_sim.systems.orders import Ended, Orders, nothing_to_draw, tally
+from bus_sim.systems.stage import Tally
+from onboard.systems.mapd.messages import OrderResult
 from onboard.systems.mapd.site import FAR, Mapd, Task
 
 #: So many endpoints are looked at to see how long ways are. Ours.
 SAMPLE = 12
 
 
-def draw(site: Site, orders: Orders, seed: int) -> Mapd:
+def draw(site: Mapd, orders: Orders, seed: int) -> Mapd:
     """The site with drawn tasks. Raises ``DemandError`` for one with fewer than two endpoints."""
-    assert isinstance(site, Mapd)
     if len(site.endpoints) < 2:
         raise nothing_to_draw(site.name, "fewer than two endpoints")
     chance = orders.chance(site.name, seed)
@@ -28,36 +25,28 @@ def draw(site: Site, orders: Orders, seed: int) -> Mapd:
     return replace(site, tasks=tuple(tasks))
 
 
-def last_s(site: Site) -> float:
+def last_s(site: Mapd) -> float:
     """When the last order comes, s after power-up."""
-    assert isinstance(site, Mapd)
     return max((one.release for one in site.tasks), default=0) * site.step_us / 1e6
 
 
-def count(plant: SystemPlant) -> Tally:
-    """What became of the tasks, after the oracle has gone over the whole run once more, step by step."""
-    mapd = cast("UnitPlant", plant)
-    mapd.check_steps()
+def count(plant: UnitPlant) -> Tally:
+    """What became of the tasks."""
     ended = []
-    for one in mapd.goods.values():
-        refused = one.answer is TransportResult.REFUSED and one.served_step is None
+    for one in plant.goods.values():
+        refused = one.answer is OrderResult.REFUSED and one.served_step is None
         ended.append(Ended(one.served_step is not None, refused, one.ordered_us, one.served_us))
-    return tally(ended, len(mapd.site.tasks), mapd.timers.now_us())
+    return tally(ended, len(plant.site.tasks), plant.timers.now_us())
 
 
-def order_s(site: Site) -> float:
+def order_s(site: Mapd) -> float:
     """Twice the mean way between endpoints: to the pick-up and with the load; half as much again for the others."""
-    assert isinstance(site, Mapd)
     some = site.endpoints[:: -(-len(site.endpoints) // SAMPLE)]
     ways = [site.floor.steps_to(end)[start] for end in some for start in some if start != end]
     known = [way for way in ways if way < FAR]
     return max(1.0, 3 * fmean(known or [1]) * site.step_us / 1e6)
 
 
-def usual(site: Site) -> Orders:
+def usual(site: Mapd) -> Orders:
     """As the robots can just carry out."""
-    assert isinstance(site, Mapd)
     return Orders(16, order_s(site) / max(1, len(site.robots)))
-
-
-MAPD = System(make_plant, draw, last_s, count, order_s, usual, who="tasks")

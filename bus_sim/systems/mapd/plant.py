@@ -10,15 +10,15 @@ from functools import partial
 from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
 from onboard.core.messages import Message
-from onboard.core.site import Machine, Site
+from onboard.core.site import Machine
 from onboard.systems.mapd.messages import (
     NO_TASK,
     CartAction,
     CartOrder,
     CartState,
+    OrderResult,
     TransportAnswer,
     TransportKey,
-    TransportResult,
 )
 from onboard.systems.mapd.site import Mapd, Task
 
@@ -79,7 +79,7 @@ class Goods:
 
     task: Task
     ordered_us: int
-    answer: TransportResult | None = None
+    answer: OrderResult | None = None
     aboard: int = 0
     served_step: int | None = None
     served_us: int | None = None
@@ -127,14 +127,14 @@ class UnitPlant:
             return
         goods = self.goods[message.task]
         goods.answer = message.transport_result
-        if message.transport_result is TransportResult.DONE and goods.served_step is None:
+        if message.transport_result is OrderResult.DONE and goods.served_step is None:
             self.note(f"task {message.task} was told done and is not")
 
     @property
     def is_over(self) -> bool:
         """Whether every task has come and was served."""
         return len(self.goods) == len(self.site.tasks) and all(
-            one.served_step is not None or one.answer is TransportResult.REFUSED for one in self.goods.values()
+            one.served_step is not None or one.answer is OrderResult.REFUSED for one in self.goods.values()
         )
 
     # --- the oracle --------------------------------------------------------------------------------------------
@@ -213,7 +213,6 @@ class UnitPlant:
         return [tuple(row.values()) for row in rows]
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> UnitPlant:
+def make_plant(site: Mapd, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> UnitPlant:
     """The plant of a pick-up and delivery site; nothing in it is drawn by chance."""
-    assert isinstance(site, Mapd)
     return UnitPlant(site, timers, links)

@@ -7,8 +7,9 @@ a violated plan is made anew by the same search on board.
 
 from dataclasses import dataclass, replace
 
-from bus_sim.run import RunOptions
-from bus_sim.systems.terminal.run import Outcome, TerminalRun, play
+from bus_sim.options import RunOptions
+from bus_sim.systems.terminal.playing import play
+from bus_sim.systems.terminal.run import Outcome, TerminalRun
 from onboard.core.behaviour import BehaviourFactory, Fleet
 from onboard.core.codes import KindCode
 from onboard.core.effects import Effect, Record, Send

@@ -2,17 +2,14 @@
 
 import random
 from dataclasses import dataclass, field, replace
-from typing import cast
 
 from bus_sim.demand import DemandError
-from bus_sim.systems.orders import Orders, System, Tally
-from bus_sim.systems.session import SystemPlant
+from bus_sim.systems.orders import Orders
+from bus_sim.systems.stage import Tally
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
-from bus_sim.systems.terminal.plant import TerminalPlant, make_plant
+from bus_sim.systems.terminal.plant import TerminalPlant
 from onboard.core.codes import KindCode
-from onboard.core.site import Site
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, StationKind, Terminal
-from onboard.systems.terminal.vehicle import terminal
 
 #: Boxes of a mission at most; the first missions come so long after power-up, us. Ours.
 MOST_BOXES, ORIGIN_US = 3, 5_000_000
@@ -64,12 +61,11 @@ class _Yard:
         return sum(len(boxes) for one, boxes in self.standing.items() if self._targets(one))
 
 
-def draw(site: Site, orders: Orders, seed: int) -> Terminal:
+def draw(site: Terminal, orders: Orders, seed: int) -> Terminal:
     """The site with drawn missions and, in some seeds, a blocked lane. Raises ``DemandError`` for too many of them."""
-    place = terminal(site)
-    chance, yard, missions = orders.chance(site.name, seed), _Yard(place), []
+    chance, yard, missions = orders.chance(site.name, seed), _Yard(site), []
     yard.by_type = {one for one in yard.standing if chance.random() < 0.5}
-    desks = [node for node, one in place.machines.items() if one.kind is KindCode.DESK]
+    desks = [node for node, one in site.machines.items() if one.kind is KindCode.DESK]
     moments = orders.moments_ms(chance)
     most = yard.left
     for number, at_ms in enumerate(moments):
@@ -79,11 +75,11 @@ def draw(site: Site, orders: Orders, seed: int) -> Terminal:
         source, boxes, target = yard.take(chance, min(MOST_BOXES, spare + 1))
         at_us, desk, urgent = ORIGIN_US + at_ms * 1000, chance.choice(desks), chance.random() < URGENT
         if source in yard.by_type:
-            kind = place.boxes[boxes[0] - 1].type
+            kind = site.boxes[boxes[0] - 1].type
             missions.append(Mission(at_us, desk, target, len(boxes), kind, source, urgent=urgent))
         else:
             missions.append(Mission(at_us, desk, target, boxes=tuple(boxes), urgent=urgent))
-    return replace(place, missions=tuple(missions), blockages=_blockages(place, chance, moments), presses=())
+    return replace(site, missions=tuple(missions), blockages=_blockages(site, chance, moments), presses=())
 
 
 def _blockages(site: Terminal, chance: random.Random, moments_ms: list[int]) -> tuple[Blockage, ...]:
@@ -94,21 +90,17 @@ def _blockages(site: Terminal, chance: random.Random, moments_ms: list[int]) -> 
     return (Blockage(chance.choice(lanes), at_us, at_us + chance.randint(*FOR_US)),)
 
 
-def last_s(site: Site) -> float:
+def last_s(site: Terminal) -> float:
     """When the last order comes, s after power-up."""
-    return max((one.at_us for one in terminal(site).missions), default=0) / 1e6
+    return max((one.at_us for one in site.missions), default=0) / 1e6
 
 
-def count(plant: SystemPlant) -> Tally:
+def count(plant: TerminalPlant) -> Tally:
     """What became of the boxes."""
-    run = cast("TerminalPlant", plant)
-    found = deliveries(run.site, run.world.handled)
-    told = ordered(run.site) - ordered(run.site, run.refused)
-    left = ordered(run.site) - told - len(found)
+    found = deliveries(plant.site, plant.world.handled)
+    told = ordered(plant.site) - ordered(plant.site, plant.refused)
+    left = ordered(plant.site) - told - len(found)
     waits_us = [one.finished_us for one in found]
     if left:
-        waits_us.append(run.now_us() - min((one.at_us for one in run.site.missions), default=0))
+        waits_us.append(plant.now_us() - min((one.at_us for one in plant.site.missions), default=0))
     return Tally(len(found), told, left, max(waits_us, default=0) / 1e6)
-
-
-TERMINAL = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(5, 30.0), who="boxes")

@@ -10,7 +10,6 @@ from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.world import VehicleBody, World
 from onboard.core.codes import KindCode, ManualMode
 from onboard.core.messages import Message
-from onboard.core.site import Site
 from onboard.systems.terminal.messages import (
     Action,
     HandlerMode,
@@ -27,7 +26,6 @@ from onboard.systems.terminal.messages import (
 )
 from onboard.systems.terminal.missions import types_of
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press, Terminal
-from onboard.systems.terminal.vehicle import terminal
 
 #: What a person presses, by the words of a site file.
 PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMode.AUTOMATIC}
@@ -280,9 +278,11 @@ class TerminalPlant:
             (self.taken if message.is_taken else self.refused).add(message.mission)
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> TerminalPlant:
+def make_plant(
+    site: Terminal, timers: Timers, links: dict[int, BusDeviceLink], seed: int, noise: float = NOISE
+) -> TerminalPlant:
     """The plant of a terminal; the seed draws how much slower than planned everything really is."""
-    return TerminalPlant(terminal(site), timers, links, seed)
+    return TerminalPlant(site, timers, links, seed, noise=noise)
 
 
 def _call(function: Callable[..., None], *arguments: object) -> Callable[[], None]:

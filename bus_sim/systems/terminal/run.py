@@ -1,34 +1,22 @@
-"""One run of a terminal: built, run to the end of its missions, and its indicators."""
+"""A terminal that can be run, and its indicators."""
 
-import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from bus_sim.devices.timers import LoopTimers
-from bus_sim.run import BusRun, RunOptions, buses_of, run_until
-from bus_sim.systems.session import links_of
+from bus_sim.run import BusRun
 from bus_sim.systems.terminal.deliveries import Delivery, deliveries, ordered
-from bus_sim.systems.terminal.plant import NOISE, TerminalPlant
-from bus_sim.systems.watched import watched
-from bus_sim.virtual_time import VirtualTimeLoop
+from bus_sim.systems.terminal.plant import TerminalPlant
 from onboard.core.messages import CarAt, Message
 from onboard.core.mirror import Mirror
 from onboard.systems.terminal.desk import Desk
 from onboard.systems.terminal.mirror import TerminalMirror
-from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.vehicle import Vehicle
-
-#: Looks whether it is over, us.
-STEP_US = 1_000_000
-#: A run that does not end by itself ends here, us.
-LIMIT_US = 3_600_000_000
 
 
 @dataclass
-class TerminalRun(BusRun):
+class TerminalRun(BusRun[TerminalPlant]):
     """A terminal that can be run. ``spectator`` is what somebody who only listens to the fleet bus knows."""
 
-    plant: TerminalPlant
     spectator: TerminalMirror = field(init=False)
 
     def __post_init__(self) -> None:
@@ -68,13 +56,6 @@ class Outcome:
         return sum(map(what, self.deliveries)) / max(1, len(self.deliveries)) / 1e6
 
 
-def build(site: Terminal, options: RunOptions, loop: VirtualTimeLoop, *, noise: float = NOISE) -> TerminalRun:
-    """All parts of a run, connected but not switched on."""
-    fleet, devices = buses_of(site, options, loop)
-    plant = TerminalPlant(site, LoopTimers(loop), links_of(site, devices), options.seed, noise=noise)
-    return TerminalRun(site, options, loop, fleet, devices, plant)
-
-
 def outcome(run: TerminalRun) -> Outcome:
     """The indicators of a run so far."""
     site = run.plant.site
@@ -96,55 +77,3 @@ def outcome(run: TerminalRun) -> Outcome:
         halted,
         sum(desk.interrupted for desk in desks),
     )
-
-
-def is_ended(plant: TerminalPlant) -> bool:
-    """All missions are done, or something must never have happened."""
-    return bool(plant.violations) or plant.is_over
-
-
-def play(
-    site: Terminal,
-    options: RunOptions,
-    *,
-    limit_us: int = LIMIT_US,
-    noise: float = NOISE,
-    prepare: Callable[[TerminalRun], None] | None = None,
-    show: Callable[[TerminalRun], None] | None = None,
-    web: str | None = None,
-) -> Outcome:
-    """Run a site on a loop of its own. ``prepare`` gets the run before it is switched on, ``show`` after each step.
-
-    With ``web`` its page is served there, and it goes on until ``limit_us`` or a person's Ctrl-C.
-    """
-    loop = VirtualTimeLoop(pace=options.pace)
-    try:
-        asyncio.set_event_loop(loop)
-        return loop.run_until_complete(_play(site, options, loop, limit_us, noise, prepare, show, web))
-    finally:
-        asyncio.set_event_loop(None)
-        loop.close()
-
-
-async def _play(
-    site: Terminal,
-    options: RunOptions,
-    loop: VirtualTimeLoop,
-    limit_us: int,
-    noise: float,
-    prepare: Callable[[TerminalRun], None] | None,
-    show: Callable[[TerminalRun], None] | None,
-    web: str | None,
-) -> Outcome:
-    run = build(site, options, loop, noise=noise)
-    if prepare is not None:
-        prepare(run)
-    run.start()
-    picture = (lambda: show(run)) if show is not None else None
-    async with watched(run, web) as viewer:
-        await run_until(
-            run, lambda: viewer.is_gone or (is_ended(run.plant) and not viewer.is_there), limit_us, STEP_US, picture
-        )
-    found = outcome(run)
-    run.close()
-    return found

@@ -1,13 +1,11 @@
 """Orders for a turning cell as a seed draws them: the site's own kinds of part, in other numbers and another order."""
 
 from dataclasses import replace
-from typing import cast
 
-from bus_sim.systems.orders import Orders, System, Tally, last_of, nothing_to_draw, tally_of
-from bus_sim.systems.session import SystemPlant
-from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant, make_plant
-from onboard.core.site import Site
-from onboard.systems.turning.messages import JobResult
+from bus_sim.systems.orders import Orders, last_of, nothing_to_draw, tally_of
+from bus_sim.systems.stage import Tally
+from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant
+from onboard.systems.turning.messages import OrderResult
 from onboard.systems.turning.site import Turning, Wanted
 
 #: Parts of an order, at least and at most. Ours.
@@ -16,9 +14,8 @@ BATCH = (1, 3)
 ORDER_S = 1_500.0
 
 
-def draw(site: Site, orders: Orders, seed: int) -> Turning:
+def draw(site: Turning, orders: Orders, seed: int) -> Turning:
     """The site with drawn orders. Raises ``DemandError`` for a site without any of its own, whose parts they take."""
-    assert isinstance(site, Turning)
     if not site.orders:
         raise nothing_to_draw(site.name, "no orders to take the parts of")
     chance = orders.chance(site.name, seed)
@@ -29,17 +26,12 @@ def draw(site: Site, orders: Orders, seed: int) -> Turning:
     return replace(site, orders=tuple(drawn))
 
 
-def last_s(site: Site) -> float:
+def last_s(site: Turning) -> float:
     """When the last order comes, s after power-up."""
-    assert isinstance(site, Turning)
     return last_of((one.at_ms for one in site.orders), ORIGIN_US)
 
 
-def count(plant: SystemPlant) -> Tally:
+def count(plant: TurningPlant) -> Tally:
     """What became of the orders."""
-    turning = cast("TurningPlant", plant)
-    done, refused, expected = JobResult.DONE, JobResult.REFUSED, len(turning.site.orders)
-    return tally_of(turning.entries, done, refused, expected, turning.timers.now_us())
-
-
-TURNING = System(make_plant, draw, last_s, count, lambda _: ORDER_S, lambda _: Orders(4, 120.0))
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.orders)
+    return tally_of(plant.entries, done, refused, expected, plant.timers.now_us())

@@ -9,16 +9,15 @@ from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.turning.nc import ProgramError, Run, contour_error_mm, run_program
 from onboard.core.messages import Message
-from onboard.core.site import Site
 from onboard.systems.turning.messages import (
     CHUNK,
     JobAnswer,
     JobEntry,
-    JobResult,
     LatheAction,
     LatheOrder,
     NcMode,
     NcState,
+    OrderResult,
     ProgramEnd,
     ProgramText,
     ToolState,
@@ -184,7 +183,7 @@ class Entry:
     number: int
     wanted: Wanted
     begun_us: int
-    result: JobResult | None = None
+    result: OrderResult | None = None
     winner: int = 0
     total_ct: int = 0
     ended_us: int | None = None
@@ -221,7 +220,7 @@ class Counter:
             return
         entry.result, entry.winner = message.job_result, message.winner
         entry.total_ct = message.total_ct or entry.total_ct
-        if message.job_result in (JobResult.DONE, JobResult.REFUSED):
+        if message.job_result in (OrderResult.DONE, OrderResult.REFUSED):
             entry.ended_us = self._plant.timers.now_us()
             self._plant.check_end()
 
@@ -291,7 +290,7 @@ class TurningPlant:
             return
         wanted: dict[int, int] = {}
         for entry in self.entries:
-            if entry.result is JobResult.DONE:
+            if entry.result is OrderResult.DONE:
                 job = entry.wanted.job
                 wanted[job.drawing] = wanted.get(job.drawing, 0) + job.batch
         for drawing in self.site.drawings:
@@ -300,7 +299,6 @@ class TurningPlant:
                 self.note(f"{made} parts of drawing {drawing} were made, {wanted.get(drawing, 0)} ordered")
 
 
-def make_plant(site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> TurningPlant:
+def make_plant(site: Turning, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> TurningPlant:
     """The plant of a turning cell; nothing in it is drawn by chance."""
-    assert isinstance(site, Turning)
     return TurningPlant(site, timers, links)

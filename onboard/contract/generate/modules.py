@@ -3,12 +3,14 @@
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
 from onboard.contract.generate.classes import HEAD, enumerations, message_class, set_classes, uses, version
-from onboard.contract.generate.model import TUPLES, Contract, Frame, FrameSet, read_contract
+from onboard.contract.generate.model import TUPLES, Contract, ContractError, Frame, FrameSet, read_contract
 from onboard.contract.generate.packing import (
     function_name,
     pack_function,
@@ -40,20 +42,44 @@ def contracts() -> tuple[Contract, ...]:
         text = system_dbc_text(name)
         assert text is not None
         found.append(read_contract(name, text, name, shared))
-    return tuple(found)
+    return _with_common_tables(tuple(found))
+
+
+def _with_common_tables(every: tuple[Contract, ...]) -> tuple[Contract, ...]:
+    """An enumeration that several systems name alike is one, and stands where those of all are.
+
+    ``ContractError`` where they name alike what is not: other values, or another comment.
+    """
+    tables = [(contract, table) for contract in every for table in contract.tables]
+    first = {table.name: (contract, table) for contract, table in reversed(tables)}
+    for contract, table in tables:
+        other, known = first[table.name]
+        if (known.choices, known.comment) != (table.choices, table.comment):
+            raise ContractError(
+                f"{contract.name}.dbc: value table {table.name} is another than that of {other.name}.dbc"
+            )
+    times = Counter(table.name for _, table in tables)
+    return tuple(
+        replace(
+            contract,
+            tables=tuple(replace(one, module=CODES) if times[one.name] > 1 else one for one in contract.tables),
+        )
+        for contract in every
+    )
 
 
 def generated(every: tuple[Contract, ...]) -> dict[str, str]:
     """The text of every generated file, by its name below ``onboard/contract``, in ruff's format."""
     fleet, device, *_ = every
-    where = {table.name: CODES for table in (*fleet.tables, *device.tables)}
+    common = {table.name: table for one in every for table in one.tables if table.module == CODES}
+    where = dict.fromkeys(common, CODES)
     files = {
         "codes.py": HEAD.format(what="Value tables shared by every message.", file="fleet.dbc`` and ``dbc/device")
-        + f"from enum import IntEnum\n\n{version(fleet)}\n\n{enumerations((*fleet.tables, *device.tables))}"
+        + f"from enum import IntEnum\n\n{version(fleet)}\n\n{enumerations(common.values())}"
     }
     shared: dict[str, list[str]] = {}
     for contract in every:
-        own = where | {table.name: contract.name for table in contract.tables if contract not in (fleet, device)}
+        own = where | {table.name: contract.name for table in contract.tables if table.module != CODES}
         for module in dict.fromkeys(frame.module for frame in contract.frames):
             frames = tuple(frame for frame in contract.frames if frame.module == module)
             sets = tuple(one for one in contract.sets if one.module == module)
@@ -71,7 +97,7 @@ def _classes(
 ) -> str:
     about = _ABOUT.get(module, f"What the machines of the system {contract.name} say beyond the messages of all")
     about += ", on their device buses" if module.endswith("_device") else ""
-    own = contract.tables if module == contract.name and module != "device" else ()
+    own = tuple(table for table in contract.tables if table.module == module)
     used = {name for frame in frames for name in uses(frame.fields)}
     used |= {name for one in sets for name in uses((*one.fields, *one.repeated_fields))}
     lines = [HEAD.format(what=f"{about}.", file=contract.name)]

@@ -6,8 +6,9 @@ Written by ``make docs`` from ``dbc/cell.dbc``: change that file, never this one
 from struct import Struct
 
 from onboard.contract.base import FrameCode, OutOfRangeError, Reference
-from onboard.contract.cell import ArmMode, GripAction, GripMode, OrderResult
+from onboard.contract.cell import ArmMode, GripAction, GripMode
 from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
+from onboard.contract.codes import OrderResult
 
 _new = tuple.__new__
 _ARM_MODE = tuple(ArmMode)

@@ -6,12 +6,13 @@ Written by ``make docs`` from ``dbc/graph.dbc``: change that file, never this on
 from struct import Struct
 
 from onboard.contract.base import FrameCode, OutOfRangeError
-from onboard.contract.graph import BodyPlace, RouteAction, VisitResult
+from onboard.contract.codes import OrderResult
+from onboard.contract.graph import BodyPlace, RouteAction
 from onboard.contract.graph_device import ApproachSensor, BodyState, RouteOrder, VisitAnswer, VisitKey
 
 _BODY_PLACE = tuple(BodyPlace)
+_ORDER_RESULT = tuple(OrderResult)
 _ROUTE_ACTION = tuple(RouteAction)
-_VISIT_RESULT = tuple(VisitResult)
 _BBBBXXXX = Struct("<BBBBxxxx")
 _BBXXXXXX = Struct("<BBxxxxxx")
 _BIXXX = Struct("<BIxxx")
@@ -56,7 +57,7 @@ def unpack_visit_answer(sender: int, data: bytes) -> VisitAnswer | None:
     robot = word_2 >> 2 & 0xFF
     if robot > 250:
         return None
-    return VisitAnswer(sender, order, _VISIT_RESULT[visit_result], robot)
+    return VisitAnswer(sender, order, _ORDER_RESULT[visit_result], robot)
 
 
 def pack_body_state(message: BodyState) -> bytes:

@@ -6,11 +6,12 @@ Written by ``make docs`` from ``dbc/mapd.dbc``: change that file, never this one
 from struct import Struct
 
 from onboard.contract.base import FrameCode, OutOfRangeError
-from onboard.contract.mapd import CartAction, TransportResult
+from onboard.contract.codes import OrderResult
+from onboard.contract.mapd import CartAction
 from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
 
 _CART_ACTION = tuple(CartAction)
-_TRANSPORT_RESULT = tuple(TransportResult)
+_ORDER_RESULT = tuple(OrderResult)
 _BHIX = Struct("<BHIx")
 _HBXXXXX = Struct("<HBxxxxx")
 _HHHH = Struct("<HHHH")
@@ -59,9 +60,7 @@ def unpack_transport_answer(sender: int, data: bytes) -> TransportAnswer | None:
     if task > 65534:
         return None
     transport_result = transport_result & 0x3
-    if transport_result > 2:
-        return None
-    return TransportAnswer(sender, task, _TRANSPORT_RESULT[transport_result])
+    return TransportAnswer(sender, task, _ORDER_RESULT[transport_result])
 
 
 def pack_cart_state(message: CartState) -> bytes:

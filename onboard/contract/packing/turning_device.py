@@ -6,12 +6,13 @@ Written by ``make docs`` from ``dbc/turning.dbc``: change that file, never this 
 from struct import Struct
 
 from onboard.contract.base import FrameCode, OutOfRangeError
-from onboard.contract.turning import JobResult, LatheAction, NcMode
+from onboard.contract.codes import OrderResult
+from onboard.contract.turning import LatheAction, NcMode
 from onboard.contract.turning_device import JobAnswer, JobEntry, LatheOrder, NcState, ProgramEnd, ProgramText, ToolState
 
-_JOB_RESULT = tuple(JobResult)
 _LATHE_ACTION = tuple(LatheAction)
 _NC_MODE = tuple(NcMode)
+_ORDER_RESULT = tuple(OrderResult)
 _BIXXX = Struct("<BIxxx")
 _HBIB = Struct("<HBIB")
 _HIXX = Struct("<HIxx")
@@ -103,7 +104,7 @@ def unpack_job_answer(sender: int, data: bytes) -> JobAnswer | None:
         return None
     winner = word_2 >> 3 & 0xFF
     total_ct = word_2 >> 11 & 0xFFFFF
-    return JobAnswer(sender, number, _JOB_RESULT[job_result], winner, total_ct)
+    return JobAnswer(sender, number, _ORDER_RESULT[job_result], winner, total_ct)
 
 
 def pack_nc_state(message: NcState) -> bytes:

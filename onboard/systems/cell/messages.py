@@ -17,10 +17,10 @@ from onboard.contract.cell import (
     OfferHigh,
     OfferLow,
     OfferNodes,
-    OrderResult,
     PartAt,
 )
 from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
+from onboard.contract.codes import OrderResult
 from onboard.systems.cell.fields import MAX_PATH, five, from_halves, halves, nodes_of
 
 __all__ = [

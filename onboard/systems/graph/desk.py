@@ -14,12 +14,12 @@ from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Site
 from onboard.systems.graph.errands import TRANSPORT_STOPS
 from onboard.systems.graph.messages import (
+    OrderResult,
     RobotAt,
     RobotMode,
     VisitAnswer,
     VisitKey,
     VisitList,
-    VisitResult,
     five,
     stops_of,
 )
@@ -160,4 +160,4 @@ class VisitDesk(OrderDesk[Visits]):
         """How it stands, and who has it; nothing at the counter for one that came from outside."""
         if order.task.origin != self.fleet.node_id:
             return None
-        return VisitAnswer(self.fleet.node_id, order.task.number, VisitResult[order.told], order.winner)
+        return VisitAnswer(self.fleet.node_id, order.task.number, OrderResult[order.told], order.winner)

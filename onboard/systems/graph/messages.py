@@ -1,5 +1,6 @@
 """For imports that are not rewritten yet: ``onboard.contract.graph``."""
 
+from onboard.contract.codes import OrderResult
 from onboard.contract.graph import (
     BodyPlace,
     EdgeNotice,
@@ -11,7 +12,6 @@ from onboard.contract.graph import (
     RouteAction,
     TurnSignal,
     VisitList,
-    VisitResult,
 )
 from onboard.contract.graph_device import ApproachSensor, BodyState, RouteOrder, VisitAnswer, VisitKey
 from onboard.systems.graph.fields import NO_NODE, five, stops_of
@@ -25,6 +25,7 @@ __all__ = [
     "EdgeState",
     "NodeAnswer",
     "NodeVerdict",
+    "OrderResult",
     "RobotAt",
     "RobotMode",
     "RouteAction",
@@ -33,7 +34,6 @@ __all__ = [
     "VisitAnswer",
     "VisitKey",
     "VisitList",
-    "VisitResult",
     "five",
     "stops_of",
 ]

@@ -1,11 +1,11 @@
 """A robot's body as its controller knows it: one order at a time, said again until it is taken up."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from onboard.core.effects import Effect
 from onboard.core.motion_authority import Permit
-from onboard.core.serial import successor
 from onboard.systems.mapd.messages import CartAction, CartOrder, CartState
+from onboard.work.device_link import DeviceLink
 
 #: An order that is not taken up is said again after this, us (dbc/mapd.dbc).
 ORDER_AGAIN_US = 500_000
@@ -17,27 +17,29 @@ class Cart:
 
     node_id: int
     state: CartState | None = None
-    again_us: int | None = None
-    _order: CartOrder | None = None
+    link: DeviceLink[tuple[CartAction, int, int, int]] = field(init=False)
+
+    def __post_init__(self) -> None:
+        me = self.node_id
+        self.link = DeviceLink(lambda sequence, order: CartOrder(me, sequence, *order), ORDER_AGAIN_US)
+
+    @property
+    def again_us(self) -> int | None:
+        """When an order is to be said again, bus time in us; None where it is taken up, or there is none."""
+        return self.link.due_us
 
     def sense(self, state: CartState) -> None:
         """A word of the body; the order that it names is taken up."""
         self.state = state
-        if self._order is not None and state.sequence == self._order.sequence:
-            self.again_us = None
+        if self.link.is_obeyed(state.sequence):
+            self.link.pause()
 
     def order(self, permit: Permit, action: CartAction, cell: int, task: int, step: int, now_us: int) -> list[Effect]:
         """Give an order, or say it again where it is due, as far as that is permitted."""
         assert self.state is not None
-        same = self._order is not None and (
-            (self._order.cart_action, self._order.cell, self._order.task, self._order.step)
-            == (action, cell, task, step)
-        )
-        if not permit or (same and (self.again_us is None or now_us < self.again_us)):
+        wanted = (action, cell, task, step)
+        if wanted == self.link.wanted and self.link.is_obeyed(self.state.sequence):
             return []
-        if not same:
-            sequence = successor(self.state.sequence, 8)
-            self._order = CartOrder(self.node_id, sequence, action, cell, task, step)
-        assert self._order is not None
-        self.again_us = now_us + ORDER_AGAIN_US
-        return permit.order(self._order)
+        if wanted != self.link.wanted:
+            self.link.go_on_from(self.state.sequence)
+        return self.link.order(wanted, permit, now_us)

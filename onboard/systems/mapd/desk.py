@@ -20,6 +20,7 @@ from onboard.systems.mapd.calls import award_of, call_of, mark_of, number_of, te
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.messages import (
     NO_TASK,
+    OrderResult,
     PathHead,
     PathMoves,
     StepRound,
@@ -27,7 +28,6 @@ from onboard.systems.mapd.messages import (
     StepTurn,
     TransportAnswer,
     TransportKey,
-    TransportResult,
     TurnRequest,
 )
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
@@ -149,13 +149,13 @@ class OrderDesk(Plain):
 
     def _on_key(self, key: TransportKey) -> list[Effect]:
         if key.task in self.served:
-            return [Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.DONE))]
-        answer = Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.RECEIVED))
+            return [Tell(TransportAnswer(self.fleet.node_id, key.task, OrderResult.DONE))]
+        answer = Tell(TransportAnswer(self.fleet.node_id, key.task, OrderResult.RECEIVED))
         if key.task in self.orders:
             return [answer]
         floor = self.site.floor
         if max(key.pickup, key.delivery) >= floor.size:
-            return [Tell(TransportAnswer(self.fleet.node_id, key.task, TransportResult.REFUSED))]
+            return [Tell(TransportAnswer(self.fleet.node_id, key.task, OrderResult.REFUSED))]
         release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
         task = Task(key.task, release, key.pickup, key.delivery)
         self.orders[key.task] = task
@@ -172,7 +172,7 @@ class OrderDesk(Plain):
         """A robot had it aboard and has it no more."""
         self.orders.pop(task, None)
         self.served.add(task)
-        answer = Tell(TransportAnswer(self.fleet.node_id, task, TransportResult.DONE))
+        answer = Tell(TransportAnswer(self.fleet.node_id, task, OrderResult.DONE))
         return [Record(ServedRecord(task)), answer]
 
     def _call(self, task: Task, now_us: int) -> Effect:

@@ -1,5 +1,6 @@
 """For imports that are not rewritten yet: ``onboard.contract.mapd``."""
 
+from onboard.contract.codes import OrderResult
 from onboard.contract.mapd import (
     CartAction,
     PathHead,
@@ -7,7 +8,6 @@ from onboard.contract.mapd import (
     StepRound,
     StepState,
     StepTurn,
-    TransportResult,
     TurnRequest,
 )
 from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
@@ -23,6 +23,7 @@ __all__ = [
     "CartAction",
     "CartOrder",
     "CartState",
+    "OrderResult",
     "PathHead",
     "PathMoves",
     "StepRound",
@@ -30,6 +31,5 @@ __all__ = [
     "StepTurn",
     "TransportAnswer",
     "TransportKey",
-    "TransportResult",
     "TurnRequest",
 ]

@@ -18,9 +18,9 @@ from onboard.systems.turning.messages import (
     BillBar,
     JobAnswer,
     JobEntry,
-    JobResult,
     LathePhase,
     LatheProgress,
+    OrderResult,
 )
 from onboard.systems.turning.records import JobOrderRecord, JobOrderStateRecord
 from onboard.work.order_desk import OrderDesk
@@ -132,5 +132,5 @@ class JobDesk(OrderDesk[Order]):
 
     def answer(self, order: Order) -> Message:
         """With the lathe and its price."""
-        number, result = order.task.number, JobResult[order.told]
+        number, result = order.task.number, OrderResult[order.told]
         return JobAnswer(self.fleet.node_id, number, result, order.winner, order.total_ct)

@@ -1,6 +1,7 @@
 """A lathe's steps: program to the control, set up, make the batch, one order after the other (rows P20, P23, P25)."""
 
 from dataclasses import dataclass, field
+from enum import Enum
 
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
@@ -34,6 +35,45 @@ from onboard.work.undertaking import TaskEvent, Undertakings
 AGAIN_US = 3_000_000
 #: LatheProgress is repeated this often, us (dbc/turning.dbc).
 PROGRESS_US = 10_000_000
+
+
+class Control(Enum):
+    """What the control's last word comes to, for the order in hand."""
+
+    BUSY = "it works, or is in no state to"
+    UNMOVED = "it is ready, and has not obeyed the last order"
+    OTHER_PROGRAM = "it is ready, and has not the program of this order, which is not begun"
+    FREE = "it is ready for what comes next"
+    ALL_MADE = "it is ready, and has made as many of this order as are wanted"
+
+
+class Deed(Enum):
+    """What the lathe does next."""
+
+    WAIT = "nothing"
+    SAY_AGAIN = "the last order again"
+    LOAD = "the program to the control"
+    SET_UP = "order to set up"
+    BEGIN = "note that it is set up, and order the first part"
+    MAKE = "order the next part"
+    FINISH = "tell that the order is over"
+
+
+#: (stage, control) -> (stage that follows, deed). The control counts parts anew when it is set up:
+#: until then the count is of the order before.
+TABLE: dict[tuple[Stage, Control], tuple[Stage, Deed]] = {
+    (Stage.WON, Control.BUSY): (Stage.WON, Deed.WAIT),
+    (Stage.WON, Control.UNMOVED): (Stage.WON, Deed.SAY_AGAIN),
+    (Stage.WON, Control.OTHER_PROGRAM): (Stage.WON, Deed.LOAD),
+    (Stage.WON, Control.FREE): (Stage.SETTING, Deed.SET_UP),
+    (Stage.SETTING, Control.BUSY): (Stage.SETTING, Deed.WAIT),
+    (Stage.SETTING, Control.UNMOVED): (Stage.SETTING, Deed.SAY_AGAIN),
+    (Stage.SETTING, Control.FREE): (Stage.MAKING, Deed.BEGIN),
+    (Stage.MAKING, Control.BUSY): (Stage.MAKING, Deed.WAIT),
+    (Stage.MAKING, Control.UNMOVED): (Stage.MAKING, Deed.SAY_AGAIN),
+    (Stage.MAKING, Control.FREE): (Stage.MAKING, Deed.MAKE),
+    (Stage.MAKING, Control.ALL_MADE): (Stage.MAKING, Deed.FINISH),
+}
 
 
 @dataclass
@@ -188,22 +228,45 @@ class LatheMachine:
     # --- steps -------------------------------------------------------------------------------------------------
 
     def _step(self, one: Batch, process: Process, now_us: int) -> list[Effect]:
+        """One line of ``TABLE``; a new stage is journalled before what follows from it."""
         assert self.nc is not None
-        if self.nc.nc_mode is not NcMode.READY:
-            self.link.pause()
-            self._program_again_us = None
-            return []
-        if self.link.is_obeyed(self.nc.sequence):
+        if self.link.is_obeyed(self.nc.sequence) and self.nc.nc_mode is NcMode.READY:
             self.link.rest()
-        elif self.link.wanted is not None:
-            return self.link.again(now_us)
-        if one.stage is Stage.WON:
-            return self._load(one, process, now_us)
-        if one.stage is Stage.SETTING:
-            return self._set_up(one, process, now_us)
-        if self.nc.parts >= one.job.batch:
-            return self._finish(one)
-        return self._make(process, now_us)
+        following, deed = TABLE[one.stage, self._control(self.nc, one)]
+        written: list[Effect] = []
+        if following is not one.stage:
+            one.stage = following
+            written = [_stage_record(one)]
+        match deed:
+            case Deed.WAIT:
+                self.link.pause()
+                self._program_again_us = None
+                return written
+            case Deed.SAY_AGAIN:
+                return written + self.link.again(now_us)
+            case Deed.LOAD:
+                return written + self._load(one, process, now_us)
+            case Deed.SET_UP:
+                self._program_again_us = None
+                chuck = self.generation.lathe.chucks.index(process.clamping.chuck)
+                return written + self.link.order((LatheAction.SET_UP, chuck, 0), self._permit(), now_us)
+            case Deed.BEGIN:
+                self.generation.state.set_up_for = (one.job.drawing, process.clamping.chuck.name)
+                return written + self._make(process, now_us)
+            case Deed.MAKE:
+                return written + self._make(process, now_us)
+            case Deed.FINISH:
+                return written + self._finish(one)
+
+    def _control(self, nc: NcState, one: Batch) -> Control:
+        """What the control's last word comes to."""
+        if nc.nc_mode is not NcMode.READY:
+            return Control.BUSY
+        if self.link.wanted is not None:
+            return Control.UNMOVED
+        if one.stage is Stage.WON and nc.program != _program_number(one.task):
+            return Control.OTHER_PROGRAM
+        return Control.ALL_MADE if one.stage is Stage.MAKING and nc.parts >= one.job.batch else Control.FREE
 
     def _make(self, process: Process, now_us: int) -> list[Effect]:
         """The next part; an edge that would not last for it is changed before, by what its sensor says."""
@@ -217,23 +280,11 @@ class LatheMachine:
 
     def _load(self, one: Batch, process: Process, now_us: int) -> list[Effect]:
         """The program to the control, until the control names it."""
-        assert self.nc is not None
-        number = _program_number(one.task)
-        if self.nc.program != number:
-            if self._program_again_us is not None and self._program_again_us > now_us:
-                return []
-            self._program_again_us = now_us + AGAIN_US
-            return [Tell(message) for message in text_frames(self.fleet.node_id, number, process.program)]
-        one.stage = Stage.SETTING
-        self._program_again_us = None
-        chuck = self.generation.lathe.chucks.index(process.clamping.chuck)
-        return [_stage_record(one), *self.link.order((LatheAction.SET_UP, chuck, 0), self._permit(), now_us)]
-
-    def _set_up(self, one: Batch, process: Process, now_us: int) -> list[Effect]:
-        """The control has obeyed and is ready again: it is set up."""
-        one.stage = Stage.MAKING
-        self.generation.state.set_up_for = (one.job.drawing, process.clamping.chuck.name)
-        return [_stage_record(one), *self._make(process, now_us)]
+        if self._program_again_us is not None and self._program_again_us > now_us:
+            return []
+        self._program_again_us = now_us + AGAIN_US
+        frames = text_frames(self.fleet.node_id, _program_number(one.task), process.program)
+        return [Tell(message) for message in frames]
 
     # --- words and memory --------------------------------------------------------------------------------------
 

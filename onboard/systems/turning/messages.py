@@ -1,10 +1,10 @@
 """For imports that are not rewritten yet: ``onboard.contract.turning``."""
 
+from onboard.contract.codes import OrderResult
 from onboard.contract.turning import (
     BillBar,
     BillCutting,
     BillWaiting,
-    JobResult,
     LatheAction,
     LathePhase,
     LatheProgress,
@@ -21,13 +21,13 @@ __all__ = [
     "BillWaiting",
     "JobAnswer",
     "JobEntry",
-    "JobResult",
     "LatheAction",
     "LatheOrder",
     "LathePhase",
     "LatheProgress",
     "NcMode",
     "NcState",
+    "OrderResult",
     "ProgramEnd",
     "ProgramText",
     "ToolState",

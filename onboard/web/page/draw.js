@@ -1,7 +1,10 @@
 // Drawing the site as an elevation: floors above each other, lifts at the ends, everything to the millimetre that the
 // bus tells. Between two words of a machine it moves on at its last speed, never beyond the next segment's middle.
 
-import { css, ready } from "./paint.js";
+import { cased, crossOut, css, hasFailed, load, ready } from "./paint.js";
+
+// Smaller letters are not read, px; what has no room for them has no name in the picture.
+const LEAST_FONT = 7;
 
 export class Stage {
   constructor(canvas) {
@@ -20,6 +23,9 @@ export class Stage {
     this.longest = Math.max(1, ...this.alleys.map((alley) => alley.length));
     this.places = new Set(layout.places);
     this.bays = new Map(layout.machines.filter((one) => one.station !== null).map((one) => [one.station, one]));
+    const names = [...this.bays.values()].map((one) => one.name);
+    this.common = names.length ? [...names[0]].findIndex((letter, at) => names.some((name) => name[at] !== letter)) : 0;
+    if (this.common < 0) this.common = names[0].length;
     this.liftMachines = new Map(layout.machines.filter((one) => one.kind === "lift").map((one) => [one.home[0], one]));
     this.resize();
   }
@@ -100,6 +106,7 @@ export class Stage {
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     this.hits = [];
+    this.ways = [];
     this.drawFloors(pen, snapshot);
     this.drawBlocked(pen, snapshot);
     this.drawAhead(pen, snapshot, nowUs, chosen);
@@ -109,6 +116,7 @@ export class Stage {
     }
     // For whoever asks what is drawn where, such as a test.
     this.canvas.drawn = this.hits;
+    this.canvas.ways = this.ways;
   }
 
   drawFloors(pen, snapshot) {
@@ -118,6 +126,8 @@ export class Stage {
       const middle = this.at(alley.number, 1).y;
       pen.fillStyle = css("--free");
       pen.fillRect(left, middle - floor * 0.14, cell * alley.length, floor * 0.28);
+      pen.strokeStyle = css("--line");
+      pen.strokeRect(left, middle - floor * 0.14, cell * alley.length, floor * 0.28);
       pen.fillStyle = css("--dim");
       pen.font = `${Math.min(20, floor * 0.3)}px system-ui`;
       pen.fillText(String(alley.number), cell * 0.45, middle);
@@ -175,8 +185,8 @@ export class Stage {
     } else {
       return;
     }
-    if (car && cell > 17 && !bay) this.text(pen, this.carName(car), box, css("--card"));
-    this.hits.push({ ...box, what: bay ? "machine" : "place", id: bay ? bay.node : number, car });
+    const name = car && !bay ? this.text(pen, this.carName(car), box, css("--card")) : null;
+    if (!bay) this.hits.push({ ...box, what: "place", id: number, car, name });
   }
 
   drawBay(pen, bay, box, car, machine) {
@@ -197,7 +207,9 @@ export class Stage {
       pen.arc(box.x + box.w + 4, outside, 3, 0, 7);
       pen.fill();
     }
-    if (this.cell > 17) this.text(pen, car ? this.carName(car) : "I/O", box, car ? css("--card") : css("--bay"));
+    const name = this.text(pen, car ? this.carName(car) : bay.name, box, car ? css("--card") : css("--bay"));
+    if (hasFailed(machine)) crossOut(pen, box);
+    this.hits.push({ ...box, what: "machine", id: bay.node, car, name, isCrossed: hasFailed(machine) });
   }
 
   drawDoor(pen, box, y, state) {
@@ -224,26 +236,42 @@ export class Stage {
         if (!row || row.kind !== "alley") continue;
         const spot = this.at(track, index);
         pen.fillRect(spot.x - this.cell / 2, spot.y - this.floor * 0.14, this.cell, this.floor * 0.28);
+        // Its edge in full colour: what is held is told apart from what is free without hues.
+        if (!strong) continue;
+        pen.globalAlpha = 1;
+        pen.strokeStyle = css("--hold");
+        pen.lineWidth = 2;
+        pen.strokeRect(spot.x - this.cell / 2 + 1, spot.y - this.floor * 0.14 + 1, this.cell - 2, this.floor * 0.28 - 2);
+        pen.globalAlpha = 0.5;
       }
-      pen.globalAlpha = strong ? 0.9 : 0.15;
-      pen.strokeStyle = css("--plan");
-      pen.lineWidth = Math.max(2.5, this.cell * 0.03);
-      pen.setLineDash([6, 4]);
-      pen.beginPath();
-      let from = this.where(machine.node, snapshot, nowUs);
-      for (const [track, first, last] of told.plan) {
-        const row = this.tracks.get(track);
-        if (!row || !from) continue;
-        const to = row.kind === "alley" ? this.at(track, last) : row.kind === "lift" ? { x: from.x, y: this.liftY(track, last) } : from;
-        pen.moveTo(from.x, from.y);
-        pen.lineTo(to.x, to.y);
-        from = to;
+      pen.globalAlpha = strong ? 1 : 0.15;
+      const way = this.wayOf(told, this.where(machine.node, snapshot, nowUs));
+      if (way.length > 1) {
+        cased(pen, way, "--plan", Math.max(2.5, this.cell * 0.03));
+        this.ways.push({ node: machine.node, points: way });
       }
-      pen.stroke();
-      pen.setLineDash([]);
-      pen.lineWidth = 1;
       pen.globalAlpha = 1;
     }
+  }
+
+  // A plan as corners: along alleys, and up and down in shafts and before spurs; never across.
+  wayOf(told, from) {
+    if (!from) return [];
+    const way = [[from.x, from.y]];
+    for (const [track, , last] of told.plan) {
+      const row = this.tracks.get(track);
+      if (!row) continue;
+      const [x, y] = way.at(-1);
+      if (row.kind === "lift") {
+        way.push([this.liftX(track), y], [this.liftX(track), this.liftY(track, last)]);
+      } else {
+        const spot = row.kind === "alley" ? this.at(track, last) : this.at(...row.joins[0]);
+        // From a platform between floors up or down first, along the alley then.
+        way.push([x, spot.y], [spot.x, spot.y]);
+        if (row.kind === "spur" && last > 0) way.push([spot.x, spot.y - this.floor * 0.3]);
+      }
+    }
+    return way.filter(([x, y], number) => !number || x !== way[number - 1][0] || y !== way[number - 1][1]);
   }
 
   drawShafts(pen, snapshot, nowUs) {
@@ -261,7 +289,10 @@ export class Stage {
       pen.lineWidth = 3;
       pen.strokeRect(box.x, box.y, box.w, box.h);
       pen.lineWidth = 1;
-      this.hits.push({ ...box, what: "machine", id: machine.node });
+      const name = this.text(pen, machine.name, { ...box, y: top, h: floor * 0.26 }, css("--dim"));
+      const isCrossed = hasFailed(snapshot.machines[machine.node]);
+      if (isCrossed) crossOut(pen, box);
+      this.hits.push({ ...box, what: "machine", id: machine.node, name, isCrossed });
     }
   }
 
@@ -276,34 +307,36 @@ export class Stage {
       pen.fillStyle = css("--robot");
       pen.fillRect(spot.x - cell * 0.12, Math.min(spot.y, spot.y + out), cell * 0.24, Math.abs(out));
     }
-    pen.fillStyle = told.car ? css("--car") : css("--robot");
+    pen.fillStyle = css("--robot");
     pen.fillRect(box.x, box.y, box.w, box.h);
+    if (told.car) load(pen, box);
     pen.strokeStyle = told.wait ? css("--wait") : chosen === machine.node ? css("--ink") : css("--robot");
     pen.lineWidth = told.wait || chosen === machine.node ? 3 : 2;
     pen.strokeRect(box.x, box.y, box.w, box.h);
     pen.lineWidth = 1;
-    if (told.state === "silent" || told.state === "stopped") {
-      pen.strokeStyle = css("--bad");
-      pen.beginPath();
-      pen.moveTo(box.x, box.y);
-      pen.lineTo(box.x + box.w, box.y + box.h);
-      pen.moveTo(box.x + box.w, box.y);
-      pen.lineTo(box.x, box.y + box.h);
-      pen.stroke();
-    }
-    if (cell > 14) this.text(pen, machine.name.replace(/^MR/, ""), box, css("--card"));
-    this.hits.push({ ...box, what: "machine", id: machine.node });
+    const name = this.text(pen, machine.name, box, css("--card"));
+    if (hasFailed(told)) crossOut(pen, box);
+    this.hits.push({ ...box, what: "machine", id: machine.node, name, isCrossed: hasFailed(told) });
   }
 
-  // Who named a car, and its number there, where there is room for both.
+  // Who named it, without what the names of all compartments begin with, and its number there: IOC2/17 is 2/17 here. A
+  // number alone is a car's only where one compartment names them.
   carName(car) {
-    return this.cell > 38 && this.bays.size > 1 ? car : car.split("/").at(-1);
+    const [who, number] = car.split("/");
+    return this.bays.size > 1 ? `${who.slice(this.common)}/${number}` : number;
   }
 
+  // A whole name or none; gives what was written.
   text(pen, words, box, colour) {
+    const font = (size) => { pen.font = `600 ${size}px system-ui`; };
+    const high = box.h * 0.8;
+    font(high);
+    const size = Math.min(high, (high * 0.94 * box.w) / Math.max(pen.measureText(words).width, box.w * 0.5));
+    if (size < LEAST_FONT) return null;
+    font(size);
     pen.fillStyle = colour;
-    pen.font = `600 ${Math.max(7, Math.min(box.h * 0.8, (box.w / Math.max(2, words.length)) * 1.5))}px system-ui`;
     pen.fillText(words, box.x + box.w / 2, box.y + box.h / 2 + 0.5);
+    return words;
   }
 
   // What is at a point of the picture, the last drawn first.

@@ -16,3 +16,49 @@ export function ready(canvas, width, height) {
   canvas.height = Math.round(height * ratio);
   return ratio;
 }
+
+// A line of one colour on any ground: dashes over a solid casing in the page's own colour.
+export function cased(pen, points, colour, width) {
+  const stroke = () => {
+    pen.beginPath();
+    points.forEach(([x, y], number) => (number ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+    pen.stroke();
+  };
+  pen.setLineDash([]);
+  pen.lineJoin = "round";
+  pen.strokeStyle = css("--card");
+  pen.lineWidth = width + 3;
+  stroke();
+  pen.strokeStyle = css(colour);
+  pen.lineWidth = width;
+  pen.setLineDash([6, 4]);
+  stroke();
+  pen.setLineDash([]);
+  pen.lineWidth = 1;
+}
+
+// Whoever is silent or stopped is crossed out.
+export const hasFailed = (told) => told.state === "silent" || told.state === "stopped";
+
+export function crossOut(pen, box) {
+  for (const [colour, width] of [["--card", 5], ["--bad", 2.5]]) {
+    pen.strokeStyle = css(colour);
+    pen.lineWidth = width;
+    pen.beginPath();
+    pen.moveTo(box.x, box.y);
+    pen.lineTo(box.x + box.w, box.y + box.h);
+    pen.moveTo(box.x + box.w, box.y);
+    pen.lineTo(box.x, box.y + box.h);
+    pen.stroke();
+  }
+  pen.lineWidth = 1;
+}
+
+// A carried thing within its carrier: a gap of the page's colour keeps the two apart for those who see no hues.
+export function load(pen, box) {
+  const edge = Math.max(2, Math.min(box.w, box.h) * 0.12);
+  pen.fillStyle = css("--card");
+  pen.fillRect(box.x + edge, box.y + edge, box.w - 2 * edge, box.h - 2 * edge);
+  pen.fillStyle = css("--car");
+  pen.fillRect(box.x + edge + 1.5, box.y + edge + 1.5, box.w - 2 * edge - 3, box.h - 2 * edge - 3);
+}

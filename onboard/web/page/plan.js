@@ -1,7 +1,7 @@
 // Drawing a site from above: shapes in plan units, scaled to the canvas's width; machines on the paths that they were
 // last said to go. A path is points [x, y, time us]; before its first and after its last a machine stands.
 
-import { css, ready } from "./paint.js";
+import { cased, crossOut, css, hasFailed, load, ready } from "./paint.js";
 
 const LEAST_FONT = 10;
 
@@ -55,6 +55,7 @@ export class Plan {
     pen.textAlign = "center";
     pen.textBaseline = "middle";
     this.hits = [];
+    this.ways = [];
     const marks = snapshot.marks ?? {};
     for (const one of this.layout.plan.shapes) this.drawShape(pen, one, marks[one.id] ?? {});
     const bodies = this.layout.machines.filter((one) => snapshot.machines[one.node].path && !this.shapes.has(`m${one.node}`));
@@ -62,8 +63,10 @@ export class Plan {
     for (const one of this.layout.plan.shapes) this.drawLabel(pen, one, marks[one.id] ?? {});
     for (const thing of snapshot.things ?? []) this.drawThing(pen, thing);
     for (const one of bodies) this.drawBody(pen, one, snapshot.machines[one.node], nowUs, chosen);
+    this.crossStanding(pen, snapshot, bodies);
     // For whoever asks what is drawn where, such as a test.
     this.canvas.drawn = this.hits;
+    this.canvas.ways = this.ways;
   }
 
   line(pen, points) {
@@ -82,9 +85,12 @@ export class Plan {
     pen.lineWidth = 1;
     if (one.kind === "lane" || one.kind === "edge" || one.kind === "link") {
       pen.lineCap = "round";
-      pen.strokeStyle = css("--free");
-      pen.lineWidth = Math.max(4, (one.kind === "lane" ? 15 : one.kind === "edge" ? 11 : 6) * this.scale);
-      this.line(pen, one.points);
+      const wide = Math.max(4, (one.kind === "lane" ? 15 : one.kind === "edge" ? 11 : 6) * this.scale);
+      for (const [colour, more] of [["--line", 2], ["--free", 0]]) {
+        pen.strokeStyle = css(colour);
+        pen.lineWidth = wide + more;
+        this.line(pen, one.points);
+      }
       if (mark.state === "held") this.band(pen, one.points);
       if (mark.state === "blocked") {
         pen.strokeStyle = css("--bad");
@@ -112,7 +118,9 @@ export class Plan {
       const box = this.box(one);
       if (one.kind === "cell") {
         pen.fillStyle = css("--free");
-        return pen.fillRect(box.x, box.y, box.w, box.h);
+        pen.strokeStyle = css("--line");
+        pen.fillRect(box.x, box.y, box.w, box.h);
+        return pen.strokeRect(box.x, box.y, box.w, box.h);
       }
       pen.strokeStyle = css(one.kind === "station" || one.kind === "endpoint" ? "--bay" : one.kind === "card" ? "--dim" : "--line");
       pen.fillStyle = css(one.kind === "obstacle" ? "--line" : one.kind === "station" || one.kind === "card" ? "--card" : "--ground");
@@ -126,10 +134,8 @@ export class Plan {
   // Held by a right: a band beside the colour alone, so that it can be told from what is free without colours.
   band(pen, points) {
     pen.strokeStyle = css("--hold");
-    pen.globalAlpha = 0.55;
-    pen.lineWidth = Math.max(4, 9 * this.scale);
+    pen.lineWidth = Math.max(3, 7 * this.scale);
     this.line(pen, points);
-    pen.globalAlpha = 1;
   }
 
   arrow(pen, points) {
@@ -214,6 +220,8 @@ export class Plan {
       pen.fillRect(left, y - size * 0.4, wide, size * 0.8);
       pen.fillStyle = css(share > 0.9 && name.startsWith("T") ? "--wait" : "--car");
       pen.fillRect(left, y - size * 0.4, wide * Math.max(0, Math.min(1, share)), size * 0.8);
+      pen.strokeStyle = css("--line");
+      pen.strokeRect(left, y - size * 0.4, wide, size * 0.8);
     }
     pen.textAlign = "center";
     this.hits.push({ ...box, what: "machine", id: one.node });
@@ -234,12 +242,10 @@ export class Plan {
     }
     const here = this.position(told, nowUs);
     if (told.ahead?.length && here) {
-      pen.globalAlpha = strong ? 0.9 : 0.12;
-      pen.strokeStyle = css("--plan");
-      pen.lineWidth = Math.max(2, 3.5 * this.scale);
-      pen.setLineDash([6, 4]);
-      this.line(pen, [[here.x, here.y], ...this.way(told.ahead, here)]);
-      pen.setLineDash([]);
+      pen.globalAlpha = strong ? 1 : 0.12;
+      const way = [[here.x, here.y], ...this.way(told.ahead, here)].map(([x, y]) => [this.x(x), this.y(y)]);
+      cased(pen, way, "--plan", Math.max(2, 3.5 * this.scale));
+      this.ways.push({ node: machine.node, points: way });
       pen.globalAlpha = 1;
     }
     pen.lineWidth = 1;
@@ -250,10 +256,30 @@ export class Plan {
     return ahead.flatMap((one, number) => {
       if (typeof one !== "string") return [one];
       const points = this.shapes.get(one)?.points ?? [];
-      if (number) return points;
-      const gaps = points.map(([x, y]) => Math.hypot(x - here.x, y - here.y));
-      return points.slice(gaps.indexOf(Math.min(...gaps)) + 1);
+      return number ? points : points.slice(this.piece(points, here) + 1);
     });
+  }
+
+  // The piece of a line that a point is on, or nearest to, by the number of its beginning.
+  piece(points, here) {
+    const gaps = points.slice(1).map(([x1, y1], number) => {
+      const [x0, y0] = points[number];
+      const long = (x1 - x0) ** 2 + (y1 - y0) ** 2;
+      const share = long ? Math.max(0, Math.min(1, ((here.x - x0) * (x1 - x0) + (here.y - y0) * (y1 - y0)) / long)) : 0;
+      return Math.hypot(here.x - x0 - share * (x1 - x0), here.y - y0 - share * (y1 - y0));
+    });
+    return gaps.lastIndexOf(Math.min(...gaps));
+  }
+
+  // Machines that do not drive: a card, or the place that they keep.
+  crossStanding(pen, snapshot, bodies) {
+    for (const machine of this.layout.machines) {
+      if (bodies.includes(machine) || !hasFailed(snapshot.machines[machine.node])) continue;
+      const own = this.hits.find((hit) => (hit.what === "machine" && hit.id === machine.node) || hit.id === `m${machine.node}`);
+      if (!own) continue;
+      crossOut(pen, own);
+      own.isCrossed = true;
+    }
   }
 
   drawThing(pen, thing) {
@@ -287,8 +313,9 @@ export class Plan {
     const wide = Math.max(24, 34 * this.scale, pen.measureText(machine.name).width + 8);
     const high = Math.max(16, 22 * this.scale);
     const box = { x: this.x(spot.x) - wide / 2, y: this.y(spot.y) - high / 2, w: wide, h: high };
-    pen.fillStyle = css(told.car ? "--car" : "--robot");
+    pen.fillStyle = css("--robot");
     pen.fillRect(box.x, box.y, box.w, box.h);
+    if (told.car) load(pen, box);
     pen.strokeStyle = css(told.wait ? "--wait" : chosen === machine.node ? "--ink" : "--card");
     pen.lineWidth = told.wait || chosen === machine.node ? 3 : 1.5;
     pen.strokeRect(box.x, box.y, box.w, box.h);
@@ -298,17 +325,8 @@ export class Plan {
       pen.fillStyle = css("--ink");
       pen.fillText(told.car, box.x + wide / 2, box.y - size * 0.6);
     }
-    if (told.state === "silent" || told.state === "stopped") {
-      pen.strokeStyle = css("--bad");
-      pen.beginPath();
-      pen.moveTo(box.x, box.y);
-      pen.lineTo(box.x + wide, box.y + high);
-      pen.moveTo(box.x + wide, box.y);
-      pen.lineTo(box.x, box.y + high);
-      pen.stroke();
-    }
-    pen.lineWidth = 1;
-    this.hits.push({ ...box, what: "machine", id: machine.node });
+    if (hasFailed(told)) crossOut(pen, box);
+    this.hits.push({ ...box, what: "machine", id: machine.node, name: machine.name, isCrossed: hasFailed(told) });
   }
 
   hit(x, y) {

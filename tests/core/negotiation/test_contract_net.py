@@ -3,7 +3,7 @@
 import pytest
 
 from bench.negotiation import PROTOCOLS, measure
-from bus_sim.baselines.contract_net import REFUSAL, ContractNetInitiator, ContractNetParticipant
+from bus_sim.systems.car_park.baselines.contract_net import REFUSAL, ContractNetInitiator, ContractNetParticipant
 from onboard.core.codes import CallResult, KindCode
 from onboard.core.effects import Effect, Send
 from onboard.core.messages import Award, Bid, Message

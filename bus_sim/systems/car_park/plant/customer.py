@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from bus_sim.demand import Stay
 from bus_sim.devices.timers import Timer, Timers
+from bus_sim.systems.car_park.demand import Stay
 from bus_sim.systems.car_park.plant.bodies import DRIVER_S
 from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.oracle import Oracle

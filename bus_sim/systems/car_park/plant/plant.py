@@ -1,12 +1,10 @@
 """The whole plant of a site: devices on their machines' device buses, the world, the street and the oracle."""
 
-import asyncio
-from collections.abc import Mapping
-
 from bus_sim.devices.link import BusDeviceLink
-from bus_sim.devices.timers import LoopTimers
+from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.compartment import Compartment
+from bus_sim.systems.car_park.plant.customer import Customer, State
 from bus_sim.systems.car_park.plant.lift import LiftDrive
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.shuttle import Shuttle
@@ -14,28 +12,21 @@ from bus_sim.systems.car_park.plant.street import Street
 from bus_sim.systems.car_park.plant.world import World
 from onboard.core.codes import KindCode
 from onboard.core.site import Site
-from onboard.ports.bus import Bus
-from onboard.wire.codec import device_codec
-from onboard.wire.decoder import Decoder
 
 
 class Plant:
-    """Everything that is not a controller. ``buses`` has one connection to each machine's device bus, by node-ID."""
+    """Everything that is not a controller. ``links`` has the end of each machine's device bus, by node-ID."""
 
-    def __init__(self, site: Site, loop: asyncio.AbstractEventLoop, buses: Mapping[int, Bus], seed: int) -> None:
-        self.timers = LoopTimers(loop)
+    def __init__(self, site: Site, timers: Timers, links: dict[int, BusDeviceLink], seed: int) -> None:
+        self.timers = timers
         self.world = World(site, self.timers)
         self.oracle = Oracle(self.world)
         self.carriers: dict[int, Carrier] = {}
         self.shuttles: dict[int, Shuttle] = {}
         self.compartments: dict[int, Compartment] = {}
         self.lifts: dict[int, LiftDrive] = {}
-        #: Each machine's devices' connection to its device bus; faults of sensors and actuators act there.
-        self.links: dict[int, BusDeviceLink] = {}
         for machine in site.machines.values():
-            node_id = machine.node_id
-            link = BusDeviceLink(buses[node_id], device_codec(), Decoder(device_codec()), node_id)
-            self.links[node_id] = link
+            node_id, link = machine.node_id, links[machine.node_id]
             if machine.kind is KindCode.ROBOT:
                 shuttle = Shuttle(node_id, site, self.world, self.timers, link)
                 self.shuttles[node_id] = shuttle
@@ -51,3 +42,23 @@ class Plant:
         for devices in (self.shuttles, self.carriers, self.lifts, self.compartments):
             for device in devices.values():
                 device.start()
+
+    @property
+    def violations(self) -> list[str]:
+        """What the oracle has found so far."""
+        return [str(one) for one in self.oracle.violations]
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nobody waits for anything; whoever has lost the ticket is not waited for, as no machine can help."""
+        return all(
+            customer.state is State.GONE
+            or (customer.state is State.PARKED and customer.stay.departure_us is None)
+            or looks_for_ticket(customer)
+            for customer in self.street.customers
+        )
+
+
+def looks_for_ticket(customer: Customer) -> bool:
+    """Whether somebody stands at the desk without the ticket."""
+    return customer.state is State.AT_DESK and customer.has_lost_ticket

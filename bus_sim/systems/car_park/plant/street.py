@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from functools import partial
 
-from bus_sim.demand import Demand, Stay
 from bus_sim.devices.timers import Timers
+from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, Event, Outcome, State
 from bus_sim.systems.car_park.plant.oracle import Oracle

@@ -1,0 +1,164 @@
+"""``bus-sim compare``: the price of having nobody in charge, as tables."""
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from bus_sim.demand import DemandError
+from bus_sim.sites import find_site
+from bus_sim.systems.car_park.compare.free_flow import bounds_us
+from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
+from bus_sim.systems.car_park.compare.plays import POLICIES, Play, play
+from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
+from bus_sim.systems.car_park.compare.table import Table, tabulate
+from bus_sim.systems.car_park.day import Day, choose_demand
+from bus_sim.systems.car_park.demand import Demand
+from bus_sim.systems.car_park.window import Window, choose_window
+from onboard.core.site import Site
+from onboard.systems.car_park.site import CarPark
+
+#: What the command can compare on.
+PARTS = ("random", "day", "small")
+#: Where the optimum is looked for: one compartment, two robots.
+SMALL_SITE = "small"
+#: Small cases solved at most: a proof can take half a minute.
+MOST_CASES = 5
+
+HELP = """\
+The same customers, plant, controllers, tokens and planner; only who decides who does what differs. The central
+dispatchers read every robot's plans directly and pay nothing for it; the bound has each customer alone in an empty
+park. All in virtual time: the figures are the same on every machine.
+
+  random   cars at random intervals, in and out, for several seeds
+  day      the busiest hour of a real day
+  small    cases small enough for an exact optimum (needs OR-Tools: the extra "optimum")
+
+exit status: 0 all went well; 1 a run broke an invariant or left somebody waiting; 2 a mistake in the command line
+"""
+
+
+def add_compare(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """The subcommand's options."""
+    compare = commands.add_parser(
+        "compare",
+        help="our protocol beside central dispatchers, a bound and an optimum",
+        description=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    compare.add_argument("site", nargs="?", default="standard", help="name of a shipped site, or a site file")
+    compare.add_argument("--seeds", default="1-10", metavar="A-B", help="seeds of the random parts (default: 1-10)")
+    compare.add_argument("--cars", type=int, default=12, metavar="N", help="cars of each random run (default: 12)")
+    compare.add_argument(
+        "--random",
+        nargs=2,
+        type=float,
+        default=(30.0, 15.0),
+        metavar=("MEAN", "SIGMA"),
+        help="intervals of arrivals, and of departures, in s (default: 30 15)",
+    )
+    compare.add_argument("--day", metavar="D", help="the day whose busiest hour is played (default: the shipped one)")
+    compare.add_argument("--sessions", type=Path, metavar="FILE", help="sessions file of that day")
+    compare.add_argument(
+        "--window", default="busiest", metavar="FROM-TO", help="another part of it, such as 06:30-09:00"
+    )
+    compare.add_argument(
+        "--parts",
+        default=",".join(PARTS),
+        metavar="PART,...",
+        help=f"which of {', '.join(PARTS)} (default: all)",
+    )
+    compare.add_argument("--json", type=Path, metavar="FILE", help="write all tables as JSON too")
+
+
+def run_compare(args: argparse.Namespace) -> int:
+    """Make the tables; the exit status. Raises ``DemandError`` for a person's mistake."""
+    seeds, parts = _seeds(args.seeds), _parts(args.parts)
+    site = find_site(args.site)
+    if not isinstance(site, CarPark):
+        raise DemandError(f"{args.site}: a {site.system}, and only car parks are compared; name a car park")
+    small = find_site(SMALL_SITE)
+    found: dict[str, Table | SmallTable] = {}
+    for part in parts:
+        if part == "small" and not is_available():
+            print("no optimum: OR-Tools is not installed; pip install 'onboard-fleet[optimum]'\n", flush=True)
+            continue
+        if part == "random":
+            found[part] = compare_random(site, seeds, args.cars, tuple(args.random))
+        elif part == "day":
+            found[part] = compare_day(site, args)
+        else:
+            found[part] = _compare_small(small, seeds[:MOST_CASES])
+        print("\n".join([*found[part].lines(), ""]), flush=True)
+    if args.json is not None:
+        told = {part: table.to_json() for part, table in found.items()}
+        args.json.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
+    tables = [table for table in found.values() if isinstance(table, Table)]
+    return 1 if any(table.faults or table.left_out for table in tables) else 0
+
+
+def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float, float]) -> Table:
+    """All policies on random arrivals. Raises ``DemandError`` for intervals that make no sense."""
+    demands = {seed: Demand.by_mean(*interval_s, seed, count=cars) for seed in seeds}
+    plays = [_told(play(site, demands[seed], policy, seed)) for seed in seeds for policy in POLICIES]
+    title = (
+        f"{site.name}: {cars} cars in and out at intervals of {interval_s[0]:g} s +- {interval_s[1]:g} s, "
+        f"seeds {seeds[0]} to {seeds[-1]}"
+    )
+    return tabulate(title, plays, {seed: bounds_us(site, demand, seed) for seed, demand in demands.items()})
+
+
+def compare_day(site: Site, args: argparse.Namespace) -> Table:
+    """All policies on a window of a real day: what comes before is played too, and not counted."""
+    demand = choose_demand(Day(sessions=args.sessions, day=args.day), site)
+    window = choose_window(demand, args.window)
+    seed = 1
+    before = Demand(tuple(stay for stay in demand.stays if stay.arrival_us < window.end_us), demand.zero)
+    plays = [_told(play(site, before, policy, seed, window)) for policy in POLICIES]
+    return tabulate(f"{site.name}: {window.told(demand)}", plays, {seed: _bounds_within(site, before, window, seed)})
+
+
+def _bounds_within(site: Site, demand: Demand, window: Window, seed: int) -> tuple[list[int], list[int]]:
+    """Least waiting of those who come, and of those who leave, within a window."""
+
+    def inside(moment_us: int | None) -> bool:
+        return moment_us is not None and window.begin_us <= moment_us < window.end_us
+
+    coming = tuple(stay for stay in demand.stays if inside(stay.arrival_us))
+    leaving = tuple(stay for stay in demand.stays if inside(stay.departure_us))
+    return bounds_us(site, Demand(coming), seed)[0], bounds_us(site, Demand(leaving), seed)[1]
+
+
+def _compare_small(site: Site, seeds: range) -> SmallTable:
+    cases = []
+    for seed in seeds:
+        try:
+            cases.append(solve_case(site, seed))
+            print(f"small case {seed}: optimum {cases[-1].optimum_s:.1f} s", file=sys.stderr, flush=True)
+        except OptimumError as error:
+            print(f"small case {seed} left out: {error}", file=sys.stderr, flush=True)
+    if not cases:
+        raise DemandError("--parts small: no case of these seeds could be solved; try others")
+    return SmallTable(site.name, tuple(cases))
+
+
+def _told(one: Play) -> Play:
+    waits_us = one.in_us + one.out_us
+    mean_s = sum(waits_us) / len(waits_us) / 1e6 if waits_us else 0.0
+    print(f"seed {one.seed}, {one.policy}: waiting {mean_s:.1f} s, {one.left} not served", file=sys.stderr, flush=True)
+    return one
+
+
+def _seeds(text: str) -> range:
+    first, dash, last = text.partition("-")
+    if not first.isdecimal() or (dash and not last.isdecimal()) or (dash and int(last) < int(first)):
+        raise DemandError(f"--seeds {text}: must be one number, or first and last such as 1-5")
+    return range(int(first), int(last or first) + 1)
+
+
+def _parts(text: str) -> list[str]:
+    parts = [part for part in text.split(",") if part]
+    unknown = [part for part in parts if part not in PARTS]
+    if unknown or not parts:
+        raise DemandError(f"--parts {text}: must be some of {', '.join(PARTS)}")
+    return parts

@@ -1,0 +1,194 @@
+"""A case small enough for an exact optimum: one compartment, some robots, a few cars, nobody ever in the way.
+
+The abstract problem: a task is taken up by one robot after the other, ways take the planner's free-flow time, the bay
+serves one customer at a time, and every place holds one car. All times are whole ms. Rules of decision are played
+on it step by step (``play_case``); the clairvoyant optimum is in ``optimum``.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from bus_sim.systems.car_park.compare.free_flow import Acts, FreeFlow
+from bus_sim.systems.car_park.demand import Demand
+from bus_sim.systems.car_park.plant.customer import REACTION_US
+from onboard.core.codes import KindCode
+from onboard.core.site import Segment, Site, Station
+from onboard.ways.roads import roads_of
+
+#: Places kept for each car, those nearest to the bay: on both sides of it more than the cars need, and all ways to and
+#: from a farther one on the same side are longer.
+PLACES_A_CAR = 4
+
+
+class Visitor(NamedTuple):
+    """One car: when it comes and is fetched (None: never), and its driver's acts, ms."""
+
+    arrival_ms: int
+    departure_ms: int | None
+    drive_in_ms: int
+    walk_ms: int
+    drive_out_ms: int
+
+
+@dataclass(frozen=True)
+class Case:
+    """The data of one small case. ``way_ms`` is between positions: fronts of ``places``, then ``bay``, then ``homes``.
+
+    Durations are rounded down, so that the optimum stays below what the plant does.
+    """
+
+    visitors: tuple[Visitor, ...]
+    places: tuple[Station, ...]
+    bay: int
+    homes: tuple[int, ...]
+    way_ms: tuple[tuple[int, ...], ...]
+    close_ms: int
+    open_ms: int
+    handle_ms: int
+    react_ms: int
+
+    @classmethod
+    def of(cls, site: Site, demand: Demand, seed: int) -> "Case":
+        """The case of a demand on a site with one compartment. Raises ``ValueError`` where it has several."""
+        if len(site.compartments) != 1:
+            raise ValueError(f"site {site.name} has {len(site.compartments)} compartments; a small case has one")
+        (station,) = site.compartments.values()
+        homes = [machine.home for machine in site.machines.values() if machine.kind is KindCode.ROBOT]
+        roads, least = roads_of(site), FreeFlow.of(site)
+        places = sorted(site.places, key=lambda place: roads.shortest_us(station.segment, place.segment))
+        places = places[: PLACES_A_CAR * len(demand.stays)]
+        positions: list[Segment] = [place.segment for place in places]
+        positions += [station.segment, *homes]
+        visitors = []
+        for stay in demand.stays:
+            acts = Acts.of(stay, seed)
+            leaves_ms = None if stay.departure_us is None else stay.departure_us // 1000
+            visitors.append(Visitor(stay.arrival_us // 1000, leaves_ms, *(act_us // 1000 for act_us in acts)))
+        count = len(places)
+        return cls(
+            tuple(visitors),
+            tuple(places),
+            count,
+            tuple(range(count + 1, count + 1 + len(homes))),
+            tuple(tuple(roads.shortest_us(here, there) // 1000 for there in positions) for here in positions),
+            least.close_us // 1000,
+            least.open_us // 1000,
+            least.handle_us // 1000,
+            REACTION_US // 1000,
+        )
+
+
+class Offer(NamedTuple):
+    """What a robot could do about a task: done at ``finish_ms``, the car taken at ``taken_ms``, at ``place``."""
+
+    finish_ms: int
+    robot: int
+    place: int
+    taken_ms: int
+    empty_ms: int
+    begin_ms: int
+
+
+#: Picks one of the offers of all robots for a task told at a time (ms).
+Rule = Callable[[list[Offer], int], Offer]
+
+
+def earliest_finish(offers: list[Offer], told_ms: int) -> Offer:
+    """Our protocol: the earliest finish wins, then the lower robot, and a robot may still be busy."""
+    return min(offers)
+
+
+def nearest(offers: list[Offer], told_ms: int) -> Offer:
+    """The shortest empty way among robots that are free, or become free first."""
+    first_ms = max(told_ms, min(offer.begin_ms for offer in offers))
+    return min((offer for offer in offers if offer.begin_ms <= first_ms), key=lambda offer: (offer.empty_ms, offer))
+
+
+def any_robot(seed: int) -> Rule:
+    """A robot by chance among those that are free, or become free first; it takes the best place."""
+    chance = random.Random(f"small case:{seed}")
+
+    def choose(offers: list[Offer], told_ms: int) -> Offer:
+        first_ms = max(told_ms, min(offer.begin_ms for offer in offers))
+        free = [offer for offer in offers if offer.begin_ms <= first_ms]
+        robot = chance.choice(sorted({offer.robot for offer in free}))
+        return min(offer for offer in free if offer.robot == robot)
+
+    return choose
+
+
+@dataclass
+class _State:
+    robots: list[tuple[int, int]]
+    stored: dict[int, tuple[int, int]] = field(default_factory=dict)
+    taken_until: dict[int, int | None] = field(default_factory=dict)
+    parked_ms: dict[int, int] = field(default_factory=dict)
+    bay_ms: int = 0
+    waited_ms: list[int] = field(default_factory=list)
+
+
+def play_case(case: Case, rule: Rule) -> int:
+    """The customers' total waiting (ms) where each task is given by ``rule`` when the compartment tells it.
+
+    The bay serves as the compartment does: a ticket whose car is stored first, then whoever came first.
+    """
+    state = _State([(home, 0) for home in case.homes])
+    coming = {number: one.arrival_ms for number, one in enumerate(case.visitors)}
+    leaving: dict[int, int] = {}
+    while coming or leaving:
+        begin_ms, _, number, fetch = min(
+            [(max(at_ms, state.bay_ms, state.stored[number][1]), 0, number, True) for number, at_ms in leaving.items()]
+            + [(max(at_ms, state.bay_ms), 1, number, False) for number, at_ms in coming.items()]
+        )
+        if fetch:
+            _fetch(case, state, rule, number, begin_ms, leaving.pop(number))
+        else:
+            _park(case, state, rule, number, begin_ms, coming.pop(number))
+            departure_ms = case.visitors[number].departure_ms
+            if departure_ms is not None:
+                leaving[number] = max(departure_ms, state.parked_ms[number])
+    return sum(state.waited_ms)
+
+
+def _park(case: Case, state: _State, rule: Rule, number: int, begin_ms: int, came_ms: int) -> None:
+    visitor = case.visitors[number]
+    told_ms = begin_ms + case.react_ms + visitor.drive_in_ms
+    out_ms = told_ms + visitor.walk_ms
+    ready_ms = out_ms + case.close_ms
+    offers = []
+    for robot, (here, free_ms) in enumerate(state.robots):
+        way_ms = case.way_ms[here][case.bay]
+        at_ms = max(free_ms, told_ms) + way_ms
+        taken_ms = max(at_ms, ready_ms) + case.open_ms + case.handle_ms
+        for place in range(len(case.places)):
+            finish_ms = taken_ms + case.way_ms[case.bay][place] + case.handle_ms
+            until_ms = state.taken_until.get(place, 0)
+            if until_ms is not None and until_ms <= finish_ms - case.handle_ms:
+                offers.append(Offer(finish_ms, robot, place, taken_ms, way_ms, free_ms))
+    offer = rule(offers, told_ms)
+    state.robots[offer.robot] = offer.place, offer.finish_ms
+    state.stored[number] = offer.place, offer.finish_ms
+    state.taken_until[offer.place] = None
+    state.parked_ms[number] = out_ms
+    state.bay_ms = offer.taken_ms + case.close_ms + case.open_ms
+    state.waited_ms.append(out_ms - came_ms)
+
+
+def _fetch(case: Case, state: _State, rule: Rule, number: int, begin_ms: int, asked_ms: int) -> None:
+    visitor = case.visitors[number]
+    place, stored_ms = state.stored[number]
+    told_ms = begin_ms + case.close_ms
+    offers = []
+    for robot, (here, free_ms) in enumerate(state.robots):
+        way_ms = case.way_ms[here][place]
+        taken_ms = max(max(free_ms, told_ms) + way_ms, stored_ms) + case.handle_ms
+        finish_ms = taken_ms + case.way_ms[place][case.bay] + case.open_ms + case.handle_ms
+        offers.append(Offer(finish_ms, robot, place, taken_ms, way_ms, free_ms))
+    offer = rule(offers, told_ms)
+    state.robots[offer.robot] = case.bay, offer.finish_ms
+    state.taken_until[place] = offer.taken_ms
+    gone_ms = offer.finish_ms + case.close_ms + case.open_ms + case.react_ms + visitor.drive_out_ms
+    state.bay_ms = gone_ms
+    state.waited_ms.append(gone_ms - asked_ms)

@@ -1,0 +1,161 @@
+"""``bus-sim certify``: can robots stick on this graph under these rules, and how many robots are best?"""
+
+import argparse
+import re
+import sys
+import time
+from pathlib import Path
+
+from bus_sim.options import RunOptions
+from bus_sim.sites import SiteNotFoundError, find_site
+from bus_sim.systems.graph.against_optimum import compare
+from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, told
+from bus_sim.systems.graph.certify.counterexample import play_file, play_on_bus, write_counterexample
+from bus_sim.systems.graph.certify.model import Model
+from bus_sim.systems.graph.certify.throughput import Pace, measure
+from onboard.systems.graph.network import Graph, complete, grid, ring
+from onboard.systems.graph.rules import Rules
+from onboard.systems.graph.site import FactoryGraph
+
+#: Cases that are compared with the optimum at most.
+MOST_CASES = 20
+_SPEC = re.compile(r"(?:ring:(\d{1,2})|complete:(\d{1,2})|grid:(\d{1,2})x(\d{1,2}))")
+_RULES = [rules.value for rules in Rules]
+
+HELP = """\
+rules:
+  paper          an edge is granted where it is free; who is told to stop waits on its edge
+  keep           besides, a node with traffic at it keeps its last free edge and refuses it to the neighbour
+  edge-and-node  an edge is granted together with a slot in the node behind it; who waits does so in a node
+
+All interleavings of all task sets are searched. The number of robots with the best throughput is proposed among those
+that are certified, measured by simulation.
+
+exit status: 0 certified; 1 not certified, or undecided; 2 a mistake in the command line or in a file
+"""
+
+
+def add_certify(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """The subcommand's options."""
+    parser = commands.add_parser(
+        "certify",
+        help="can robots ever stick on a graph? and how many robots are best?",
+        description=HELP,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "site",
+        nargs="?",
+        help="name of a shipped graph site, a site file, or ring:N, complete:N, grid:RxC",
+    )
+    parser.add_argument("--robots", type=int, metavar="K", help="number of robots (default: the site's)")
+    parser.add_argument("--rules", choices=_RULES, help="the node agents' rules (default: the site's, else paper)")
+    parser.add_argument("--capacity", type=int, metavar="N", help="slots of a node, for edge-and-node (default: K)")
+    parser.add_argument("--up-to", type=int, default=5, metavar="K", help="most robots to propose (default: 5)")
+    parser.add_argument("--counterexample", type=Path, metavar="FILE", help="write it here, for bus-sim certify --play")
+    parser.add_argument("--play", type=Path, metavar="FILE", help="play a counterexample step by step instead")
+    parser.add_argument("--bus", action="store_true", help="with --play: on the virtual bus, under --rules if given")
+    parser.add_argument("--trace", type=Path, metavar="FILE", help="with --play --bus: write a candump log")
+    parser.add_argument(
+        "--optimum",
+        type=int,
+        metavar="CASES",
+        help="instead, 1 to 4 robots on a 3x3 grid on the bus: time to the last goal over the exact optimum",
+    )
+    parser.add_argument("--table", action="store_true", help="count the task sets that can stick on known graphs")
+
+
+def run_certify(args: argparse.Namespace) -> int:
+    """The command. Raises ``SiteNotFoundError`` or ``ConfigError`` for a mistake in the command line or a file."""
+    if args.table:
+        return _table()
+    if args.optimum is not None:
+        return _optimum(args.optimum)
+    if args.play is not None and args.bus:
+        rules = Rules(args.rules) if args.rules is not None else None
+        return play_on_bus(args.play, rules, RunOptions(trace=args.trace, limit_s=3_600))
+    if args.play is not None:
+        return play_file(args.play)
+    if args.site is None:
+        raise SiteNotFoundError("certify: no graph named; name a graph site, or such as ring:6")
+    graph, site = _graph(args.site)
+    robots = args.robots if args.robots is not None else (len(site.robots) if site is not None else 2)
+    if not 1 <= robots <= len(graph.nodes):
+        raise SiteNotFoundError(f"--robots {robots}: must be 1 to {len(graph.nodes)}, a node for each to start from")
+    rules = Rules(args.rules) if args.rules is not None else (site.rules if site is not None else Rules.PAPER)
+    if args.capacity is not None and args.capacity < 1:
+        raise SiteNotFoundError(f"--capacity {args.capacity}: must be 1 or more")
+    capacity = args.capacity or (site.capacity if site is not None else robots)
+    found = certify(graph, robots, rules, capacity)
+    _say(found, f"{args.site}, {robots} robots, rules {rules.value}", args.counterexample, graph, rules, capacity)
+    _propose(graph, rules, capacity if args.capacity or site else None, min(args.up_to, len(graph.nodes)))
+    return 0 if found.certified else 1
+
+
+def _graph(text: str) -> tuple[Graph, FactoryGraph | None]:
+    spec = _SPEC.fullmatch(text)
+    if spec is not None:
+        nodes, joined, rows, columns = (int(one) if one else 0 for one in spec.groups())
+        if max(nodes, joined) > 2 or min(rows, columns) > 1:
+            return (ring(nodes) if nodes else complete(joined) if joined else grid(rows, columns)), None
+        raise SiteNotFoundError(f"{text}: too small; a ring or complete graph has 3 nodes or more, a grid 2x2 or more")
+    site = find_site(text)
+    if not isinstance(site, FactoryGraph):
+        raise SiteNotFoundError(f"{text}: a {site.system}, no graph; name a graph site, or such as ring:6")
+    return site.graph, site
+
+
+def _say(found: Certificate, what: str, file: Path | None, graph: Graph, rules: Rules, capacity: int) -> None:
+    verdict = {True: "deadlock-free under these rules", False: "not certified", None: "undecided"}[found.certified]
+    print(f"{what}: {verdict}\n{found.reason}")
+    if found.stuck is not None:
+        print("\n".join(told(found.stuck)))
+        if file is not None:
+            write_counterexample(file, graph, rules, capacity, found.stuck)
+            print(f"written to {file}; play it: bus-sim certify --play {file} [--bus [--rules edge-and-node]]")
+
+
+def _propose(graph: Graph, rules: Rules, capacity: int | None, most: int) -> None:
+    """Throughput by number of robots, and the best that is certified."""
+    best: tuple[float, int] | None = None
+    print("\nrobots  certified  tasks/h  a robot")
+    for robots in range(1, most + 1):
+        room = capacity or robots
+        certified = certify(graph, robots, rules, room, limit=300_000).certified
+        result = measure(Model(graph, rules, room), robots, _pace(graph))
+        words = {True: "yes", False: "no", None: "?"}[certified]
+        stuck = f"  stuck after {result.stuck_at_s:.0f} s" if result.stuck_at_s is not None else ""
+        print(f"{robots:6}  {words:9}  {result.per_hour:7.1f}  {result.per_hour / robots:7.1f}{stuck}")
+        if certified and (best is None or result.per_hour > best[0]):
+            best = (result.per_hour, robots)
+    print(f"proposed: {best[1]} robots, {best[0]:.1f} tasks an hour" if best else "proposed: none is certified")
+
+
+def _pace(graph: Graph) -> Pace:
+    """A metre a second; a graph without measures has edges of ten seconds."""
+    return Pace() if max(graph.lengths_mm.values()) >= 1000 else Pace(speed_mm_s=1, load_s=0.5)
+
+
+def _optimum(cases: int) -> int:
+    site = find_site("graph")
+    if not isinstance(site, FactoryGraph) or not 1 <= cases <= MOST_CASES:
+        raise SiteNotFoundError(f"--optimum {cases}: must be 1 to {MOST_CASES}; a case of 4 robots takes 10 s")
+    print("robots  cases    mean   worst")
+    for robots in range(1, 5):
+        print(compare(site, grid(3, 3, 6000), robots, cases).line(), flush=True)
+    return 0
+
+
+def _table() -> int:
+    print(f"{'graph':10} robots  task sets  {'rule off':>8}  {'rule on':>8}  seconds")
+    for row in ROWS:
+        began = time.perf_counter()
+        sets, off = count_stuck(row.graph, row.robots, Rules.PAPER, sample=row.sample)
+        _, on = count_stuck(row.graph, row.robots, Rules.KEEP, sample=row.sample)
+        print(
+            f"{row.name:10} {row.robots:6}  {sets:9}  {off:8}  {on:8}  {time.perf_counter() - began:7.1f}"
+            + (f"  drawn with seed {row.sample[1]}" if row.sample is not None else ""),
+            flush=True,
+        )
+    sys.stdout.flush()
+    return 0

@@ -1,0 +1,31 @@
+"""Attacks in a factory graph's own words."""
+
+from collections.abc import Iterator
+
+from bus_sim.attacks import words
+from onboard.core.codes import KindCode
+from onboard.core.messages import Message
+from onboard.systems.graph.messages import NodeAnswer, NodeVerdict, TurnSignal, VisitList, five
+from onboard.systems.graph.site import FactoryGraph
+
+
+class Orders(words.Orders):
+    """Visits that nobody ordered."""
+
+    def orders(self) -> Iterator[Message]:
+        """See ``words.Orders``."""
+        me, site, chance = self.node.node_id, self.node.site, self.node.chance
+        assert isinstance(site, FactoryGraph)
+        robots = [node for node, one in site.machines.items() if one.kind is KindCode.VEHICLE]
+        stops = tuple(chance.sample(sorted(site.graph.neighbours), 2))
+        yield VisitList(me, self.number, chance.choice(robots), *five(stops))
+
+
+class WrongAnswers(words.WrongAnswers):
+    """Every robot that comes near a node is told by the attacker that it may go on."""
+
+    def hear(self, message: Message, now_us: int) -> None:
+        """See ``Attack``."""
+        if isinstance(message, TurnSignal):
+            go = NodeAnswer(self.node.node_id, message.sender, message.node, NodeVerdict.GO, message.after, 0)
+            self.node.say(go)

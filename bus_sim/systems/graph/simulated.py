@@ -1,0 +1,22 @@
+"""A factory graph in the simulator."""
+
+from bus_sim.systems.graph.forged import Orders as ForgedOrders
+from bus_sim.systems.graph.forged import WrongAnswers
+from bus_sim.systems.graph.orders import ORDER_S, draw, last_s, usual
+from bus_sim.systems.graph.plant import make_plant
+from bus_sim.systems.graph.stage import GraphStage
+from bus_sim.systems.orders import OrderedSystem
+from onboard.core.codes import KindCode
+from onboard.systems.graph.site import FactoryGraph
+
+SIMULATED = OrderedSystem(
+    FactoryGraph.system,
+    make_plant,
+    GraphStage,
+    draw,
+    last_s,
+    lambda _: ORDER_S,
+    usual,
+    worker=KindCode.VEHICLE,
+    attacks={"orders": ForgedOrders, "answers": WrongAnswers},
+)

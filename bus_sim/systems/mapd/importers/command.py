@@ -1,0 +1,84 @@
+"""``bus-sim import``: files of others to a site file, all or nothing, and a list of what could not be carried over."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from bus_sim.systems.mapd.importers.draft import Draft, site_text
+from bus_sim.systems.mapd.importers.mapf import Wanted, import_map
+from bus_sim.systems.mapd.importers.opentcs import import_opentcs
+from onboard.config.files import read_text
+from onboard.config.problems import ConfigError, Problems
+from onboard.config.site import parse_site
+
+_KINDS = "a map (.map, with a .task file or without), an openTCS model (.xml) or an Open-RMF building (.yaml)"
+
+
+def add_import(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """The command's options."""
+    one = commands.add_parser("import", help="make a site file of a MAPF map, an openTCS model or an Open-RMF building")
+    one.add_argument("files", nargs="+", type=Path, metavar="FILE", help=_KINDS)
+    one.add_argument("-o", "--output", type=Path, required=True, metavar="SITE", help="the site file to write")
+    one.add_argument("--robots", type=_positive, metavar="N", help="so many robots (default: all that the file names)")
+    one.add_argument("--tasks", type=_positive, default=20, metavar="N", help="tasks to draw where it has none")
+    one.add_argument("--every", type=_positive, default=5, metavar="STEPS", help="steps between two tasks drawn")
+    one.add_argument("--seed", type=int, default=1, help="seed of everything that is drawn (default: 1)")
+
+
+def _positive(text: str) -> int:
+    number = int(text)
+    if not 1 <= number <= 10_000:
+        raise argparse.ArgumentTypeError(f"{text}: write a whole number from 1 to 10000")
+    return number
+
+
+def run_import(args: argparse.Namespace) -> int:
+    """Import, check by reading the result as any site file is read, then write. Raises ``ConfigError``."""
+    draft = import_files(args.files, Wanted(args.robots, args.tasks, args.every, args.seed))
+    text = site_text(draft)
+    site = parse_site(text, str(args.output))
+    problems = Problems(str(args.output))
+    half = args.output.with_name(f".{args.output.name}.new")
+    try:
+        half.write_text(text, encoding="utf-8")
+        half.replace(args.output)
+    except OSError as error:
+        half.unlink(missing_ok=True)
+        problems.add(0, "", None, f"cannot be written: {error.strerror}", "name a file in a folder that you may write")
+        raise ConfigError(problems.found) from error
+    for element, why in draft.losses:
+        sys.stdout.write(f"not carried over: {element}: {why}\n")
+    robots = sum(1 for _ in draft.robots)
+    sys.stdout.write(f"{args.output}: {site.name}, {robots} robots, {len(draft.tasks)} tasks\n")
+    return 0
+
+
+def import_files(files: list[Path], wanted: Wanted) -> Draft:
+    """The draft of one file, or of a map and its tasks. Raises ``ConfigError``."""
+    first, *others = sorted(files, key=lambda path: path.suffix == ".task")
+    problems = Problems(str(first))
+    if first.suffix not in _IMPORTERS:
+        problems.add(0, "", first.suffix or first.name, "unknown kind of file", f"give {_KINDS}")
+    for other in others:
+        if first.suffix != ".map" or other.suffix != ".task" or len(others) > 1:
+            Problems.add(problems, 0, "", other.name, "does not go with it", "give one file, or a .map and its .task")
+    problems.raise_if_any()
+    text = read_text(first, "import")
+    if first.suffix == ".map":
+        tasks = (others[0], read_text(others[0], "task")) if others else None
+        return import_map(first, text, tasks, wanted)
+    return _IMPORTERS[first.suffix](first, text, wanted)
+
+
+def _building(path: Path, text: str, wanted: Wanted) -> Draft:
+    # Not before it is needed: PyYAML is in an extra, and boards do not carry it.
+    from bus_sim.systems.mapd.importers.rmf import import_building  # noqa: PLC0415  # see above
+
+    return import_building(path, text, wanted)
+
+
+def _map(path: Path, text: str, wanted: Wanted) -> Draft:
+    return import_map(path, text, None, wanted)
+
+
+_IMPORTERS = {".map": _map, ".xml": import_opentcs, ".yaml": _building, ".yml": _building}

@@ -1,0 +1,20 @@
+"""Attacks in a terminal's own words."""
+
+from collections.abc import Iterator
+
+from bus_sim.attacks import words
+from onboard.core.messages import Message
+from onboard.systems.terminal.messages import BoxOrder
+from onboard.systems.terminal.site import EntityKind
+from onboard.systems.terminal.vehicle import terminal
+
+
+class Orders(words.Orders):
+    """Boxes that nobody ordered."""
+
+    def orders(self) -> Iterator[Message]:
+        """See ``words.Orders``."""
+        site, chance = terminal(self.node.site), self.node.chance
+        stations = [number for number, one in site.entities.items() if one.kind is EntityKind.STATION]
+        box, station = chance.randint(1, len(site.boxes)), chance.choice(stations)
+        yield BoxOrder(self.node.node_id, site.desk, self.number, box, station, 0, True)

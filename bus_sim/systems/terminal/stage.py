@@ -1,0 +1,81 @@
+"""A terminal's run: missions are typed at the desks, robots carry boxes; what came of it."""
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from bus_sim.systems.stage import HOUR_US, Ended, Show, Stage, Summary, Tally
+from bus_sim.systems.terminal.orders import count
+from bus_sim.systems.terminal.plant import TerminalPlant
+from bus_sim.systems.terminal.run import Outcome, TerminalRun, outcome
+from bus_sim.systems.terminal.show import TerminalShow, summary_lines
+from onboard.systems.terminal.site import Terminal
+
+if TYPE_CHECKING:  # the page's libraries are an extra
+    from bus_sim.web.run_source import RunSource
+
+
+@dataclass(frozen=True)
+class TerminalSummary:
+    """See ``Summary``."""
+
+    site: Terminal
+    seed: int
+    found: Outcome
+    failures: tuple[str, ...]
+
+    @property
+    def is_good(self) -> bool:
+        """See ``Summary``."""
+        return self.found.is_good and not self.failures
+
+    def lines(self, width: int | None = None) -> list[str]:
+        """See ``Summary``."""
+        return summary_lines(self.site, self.found) + [f"halted: {what}" for what in self.failures]
+
+    def to_json(self) -> dict[str, object]:
+        """Times in us."""
+        return {"site": self.site.name, "seed": self.seed, **asdict(self.found), "good": self.is_good}
+
+
+class TerminalStage(Stage[TerminalPlant]):
+    """See ``Stage``."""
+
+    who = "boxes"
+    step_us = 1_000_000
+    tail_us = 0
+    run: TerminalRun
+
+    @property
+    def limit_us(self) -> int:
+        """See ``Stage``."""
+        return HOUR_US
+
+    def head(self) -> list[str]:
+        """See ``Stage``."""
+        site, options = self.plant.site, self.run.options
+        trace = options.trace if options.trace is not None else "none"
+        return [f"site {site.name}, digest {site.digest}, seed {options.seed}, trace {trace}"]
+
+    def tally(self) -> Tally:
+        """See ``Stage``."""
+        return count(self.plant)
+
+    def show(self, console: Console) -> Show:
+        """See ``Stage``."""
+        return TerminalShow(self.run, console)
+
+    def source(self) -> "RunSource":
+        """See ``Stage``."""
+        from bus_sim.systems.terminal.page import TerminalSource  # noqa: PLC0415  # its libraries are an extra
+
+        return TerminalSource(self.run)
+
+    def outcome(self) -> Outcome:
+        """The indicators so far."""
+        return outcome(self.run)
+
+    def summary(self, ended: Ended) -> Summary:
+        """See ``Stage``."""
+        return TerminalSummary(self.plant.site, self.run.options.seed, self.outcome(), ended.failures)

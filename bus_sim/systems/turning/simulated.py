@@ -1,0 +1,19 @@
+"""A turning cell in the simulator."""
+
+from bus_sim.systems.orders import OrderedSystem, Orders
+from bus_sim.systems.turning.orders import ORDER_S, draw, last_s
+from bus_sim.systems.turning.plant import make_plant
+from bus_sim.systems.turning.stage import TurningStage
+from onboard.core.codes import KindCode
+from onboard.systems.turning.site import Turning
+
+SIMULATED = OrderedSystem(
+    Turning.system,
+    make_plant,
+    TurningStage,
+    draw,
+    last_s,
+    lambda _: ORDER_S,
+    lambda _: Orders(4, 120.0),
+    worker=KindCode.LATHE,
+)

@@ -1,0 +1,72 @@
+"""One mistake of a person is one line: the option or file, the value and what to do; and exit status 2, at once."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from bus_sim.cli import main as bus_sim
+from deploy.__main__ import main as deploy
+from onboard.cli import main as onboard
+
+#: Program, what was typed, and what the line says.
+MISTAKES = [
+    (bus_sim, "foo", r"argument COMMAND: invalid choice: 'foo' .*see bus-sim --help"),
+    (bus_sim, "run --seed x", r"argument --seed: invalid int value: 'x'; see bus-sim run --help"),
+    (bus_sim, "run small extra", r"unrecognized arguments: extra; see bus-sim --help"),
+    (bus_sim, "run --for -5", r"--for -5: must be seconds above 0"),
+    (bus_sim, "run cell --for nan", r"--for nan: must be seconds above 0"),
+    (bus_sim, "run small --trace gone/t.log", r"--trace gone/t.log: there is no folder gone; make it first, or name"),
+    (bus_sim, "run cell --trace gone/t.log", r"--trace gone/t.log: there is no folder gone"),
+    (bus_sim, "run small --trace folder", r"--trace folder: is a folder; name a file in it"),
+    (bus_sim, "run terminal --json folder", r"--json folder: is a folder; name a file in it"),
+    (bus_sim, "run --serve 127.0.0.1:99999", r"--serve 127.0.0.1:99999: must be HOST:PORT, such as"),
+    (
+        bus_sim,
+        "run --sessions semicolons.csv",
+        r"semicolons.csv:1: no column arrival, .*divided by semicolons; save",
+    ),
+    (bus_sim, "run --sessions tabs.csv", r"tabs.csv:1: no column arrival, .*divided by tabs; save it with commas"),
+    (bus_sim, "compare --json gone/t.json", r"--json gone/t.json: there is no folder gone"),
+    (bus_sim, "campaign small --json gone/t.json", r"--json gone/t.json: there is no folder gone"),
+    (bus_sim, "campaign small --out file", r"--out file: is a file; name a folder"),
+    (bus_sim, "campaign small --scene overlap", r"--scene overlap: goes with --exhaustive; add it, or leave this out"),
+    (bus_sim, "attack small --json gone/t.json", r"--json gone/t.json: there is no folder gone"),
+    (bus_sim, "certify graph --capacity 0", r"--capacity 0: must be 1 or more"),
+    (bus_sim, "certify graph --counterexample gone/t", r"--counterexample gone/t: there is no folder gone"),
+    (bus_sim, "import file -o gone/t.toml", r"--output gone/t.toml: there is no folder gone"),
+    (onboard, "", r"the following arguments are required: --machine; see onboard --help"),
+    (onboard, "trace foo", r"argument COMMAND: invalid choice: 'foo' .*see onboard trace --help"),
+    (onboard, "trace load file --site small --bitrate x", r"unrecognized arguments|invalid"),
+    (onboard, "operate status --site small", r"name a bus: -i INTERFACE -c CHANNEL; see onboard operate --help"),
+    (onboard, "gateway --site small -i virtual -c x", r"arguments are required: --mqtt; see onboard gateway --help"),
+    (onboard, "web --site small", r"name a log, or a bus: -i INTERFACE -c CHANNEL; see onboard web --help"),
+    (deploy, "foo", r"argument COMMAND: invalid choice: 'foo' .*see python -m deploy --help"),
+    (deploy, "update --secret gone", r"argument --secret: gone: no such file; see python -m deploy update --help"),
+]
+
+
+@pytest.mark.parametrize(("program", "words", "told"), MISTAKES, ids=lambda value: value if type(value) is str else "")
+def test_a_mistake_is_one_line_and_status_2(
+    program: Callable[[list[str]], int],
+    words: str,
+    told: str,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("(1.000000) fleet 123#11\n")
+    (tmp_path / "semicolons.csv").write_text("arrival;departure;station_id;session_id\n")
+    (tmp_path / "tabs.csv").write_text("arrival\tdeparture\tstation_id\tsession_id\n")
+    before = sorted(tmp_path.iterdir())
+    try:
+        status: object = program(words.split())
+    except SystemExit as ended:
+        status = ended.code
+    error = capsys.readouterr().err
+    assert status == 2
+    assert error.count("\n") == 1 and re.search(told, error), error
+    assert sorted(tmp_path.iterdir()) == before, "nothing half done"
