@@ -12,6 +12,7 @@ from onboard.core.messages import (
     Itinerary,
     Message,
     Progress,
+    Reference,
     TaskReport,
 )
 from onboard.core.serial import ms_after
@@ -132,6 +133,12 @@ class Calls:
             case Heartbeat():
                 self._on_heartbeat(message, time_us)
         return None
+
+    def finish(self, task: Reference, time_us: int) -> None:
+        """A task is done, where no report tells it."""
+        for call in self._going:
+            if call.terms.task == task and is_task(call.terms) and not call.is_over:
+                call.finished_us = time_us
 
     def moment_us(self, bus_ms: int, near_us: int) -> int | None:
         """Time of the log of a bus time in ms, which wraps; None before bus time was heard."""

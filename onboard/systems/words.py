@@ -6,7 +6,7 @@ its system has none, the words are neutral ones: numbers as the bus has them.
 
 from collections.abc import Callable, Mapping
 
-from onboard.core.codes import ANY_STATION, NOBODY, OUTSIDE, Operation, Reason, TaskPhase, TokenKind
+from onboard.core.codes import ANY_STATION, NOBODY, OUTSIDE, Criterion, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.messages import CallForProposals, Message, Reference
 from onboard.core.site import Segment, Site, Station
 from onboard.systems.registry import part
@@ -22,8 +22,6 @@ class SiteWords:
     noun = "load"
     #: Signals that mean nothing in this system, although messages of all have them.
     silent: frozenset[str] = frozenset()
-    #: Why calls cannot be listed; empty where they can.
-    no_calls = ""
 
     def __init__(self, site: Site | None) -> None:
         self._known = site
@@ -88,6 +86,21 @@ class SiteWords:
     def way(self, call: CallForProposals) -> str:
         """From where to where a call's load goes; empty where it goes nowhere."""
         return f"{self.place(call.from_station)} to {self.place(call.to_station)}"
+
+    def cost(self, cost: int, criterion: Criterion | None) -> str:
+        """A bid's cost in the unit of its call's criterion; the bare number where the call was not seen."""
+        match criterion:
+            case Criterion.FINISH_TIME:
+                return f"{cost / 1000:.3f} s"
+            case Criterion.MONEY:
+                return f"{cost / 100:.2f} money"
+            case Criterion.LENGTH:
+                return f"{cost} mm"
+        return str(cost)
+
+    def finished(self, message: Message) -> Reference | None:
+        """The task that a message tells to be done, where that is no report."""
+        return None
 
     def deed(self, message: Message) -> str:
         """What the sender of a message does from now on; empty where the message does not say."""

@@ -38,6 +38,7 @@ class Words:
         self.site = site
         self.system = words_of(site)
         self.machine = self.system.machine
+        self.cost = self.system.cost
         self.reference = self.system.reference
         self._names: dict[type[Message], tuple[str, ...]] = {}
         self._criteria: dict[tuple[int, int], Criterion] = {}
@@ -77,17 +78,6 @@ class Words:
                 yield f"{self.system.noun} {self.system.load(value)}"
             else:
                 yield f"{name_in_words(name)} {self._value(name, value)}"
-
-    def cost(self, cost: int, criterion: Criterion | None) -> str:
-        """A bid's cost in the unit of its call's criterion; the bare number where the call was not seen."""
-        match criterion:
-            case Criterion.FINISH_TIME:
-                return _seconds(cost)
-            case Criterion.MONEY:
-                return f"{cost / 100:.2f} money"
-            case Criterion.LENGTH:
-                return f"{cost} mm"
-        return str(cost)
 
     def _value(self, name: str, value: object) -> str:
         if isinstance(value, Reference):

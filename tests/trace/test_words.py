@@ -15,6 +15,7 @@ WORDS = {
     "graph": (["transport order 4", "N1 to N7"], ["drives from N"], ["token slot 1 of N5", "stop1 N4", "order 4"]),
     "terminal": (["transport box B4", "S2 to S10"], ["drives through L"], ["token slot 1 of L3", "box B7", "lane L11"]),
     "turning": (["machine order 1, 6 x pin"], ["turns order 1"], ["drawing pin", "material brass", "total 226 ct"]),
+    "mapd": (["transport task 0", " steps", ", finished"], ["delivers task", "goes to pick up task"], ["token cell "]),
     "cell": (["reach part 1", "(10.0, 10.0) m to (40.0, 30.0) m"], ["carries the part"], ["token part 1", "part 1"]),
 }
 #: Words of a car park, and its way of writing places.
@@ -42,19 +43,8 @@ def test_logs_are_told_in_the_words_of_the_system(name: str, capsys: pytest.Capt
         ] == []
 
 
-def test_a_floor_of_cells_is_told_by_their_names_and_has_no_calls(capsys: pytest.CaptureFixture[str]) -> None:
-    log, site = log_of("mapd"), file_of("mapd")
-    dump = _told(capsys, "dump", log, "--decode", "--site", site)
-    assert re.search(r"TransportCall: task \d+, pickup \d+,\d+, delivery \d+,\d+", dump)
-    assert re.search(r"token cell \d+,\d+, version", dump)
-    assert not FOREIGN.search(dump)
-    for command in ("calls", "why"):
-        assert main([command, str(log), "--site", str(site)]) == 2
-        assert "its robots share tasks out in rounds and not by calls" in capsys.readouterr().err
-
-
 def test_every_system_that_ships_is_looked_at_here() -> None:
-    assert len(system_names()) == len([*WORDS, "mapd"])
+    assert len(system_names()) == len(WORDS)
 
 
 def test_without_a_site_loads_are_neutral(capsys: pytest.CaptureFixture[str]) -> None:

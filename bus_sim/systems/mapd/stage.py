@@ -1,5 +1,6 @@
 """A run of a pick-up and delivery site: what came of it, in steps and in seconds."""
 
+from collections import Counter
 from statistics import fmean
 
 from bus_sim.systems.mapd.orders import count
@@ -7,8 +8,8 @@ from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.show import picture
 from bus_sim.systems.stage import Stage, Tally
-from onboard.core.messages import Award, Bid, CallForProposals
-from onboard.systems.mapd.messages import PathHead, StepRound
+from onboard.core.messages import CallForProposals
+from onboard.systems.mapd.messages import StepRound
 
 
 class MapdStage(Stage[UnitPlant]):
@@ -39,8 +40,7 @@ class MapdStage(Stage[UnitPlant]):
         served = [one for one in plant.goods.values() if one.served_step is not None and one.served_us is not None]
         steps = [one.served_step - one.task.release for one in served if one.served_step is not None]
         seconds = [(one.served_us - one.ordered_us) / 1e6 for one in served if one.served_us is not None]
-        kinds = (Bid, Award, PathHead)
-        counts = {kind: sum(isinstance(one, kind) for one in said) for kind in kinds}
+        counts = Counter(type(one).__name__ for one in said)
         published = token_passing(site.name, len(site.tasks))
         return {
             "robots": len(site.homes),
@@ -53,7 +53,7 @@ class MapdStage(Stage[UnitPlant]):
             "makespan_steps": max((one.served_step or 0 for one in served), default=0),
             "mean_service_s": fmean(seconds) if seconds else 0.0,
             "calls": len({one.call for one in said if isinstance(one, CallForProposals)}),
-            "bids": counts[Bid],
-            "awards": counts[Award],
-            "paths": counts[PathHead],
+            "bids": counts["Bid"],
+            "awards": counts["Award"],
+            "paths": counts["PathHead"],
         }

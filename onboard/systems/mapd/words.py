@@ -1,6 +1,6 @@
 """Words of a pick-up and delivery site: cells by the names of its map, tasks by their numbers."""
 
-from onboard.core.codes import TokenKind
+from onboard.core.codes import Criterion, TokenKind
 from onboard.core.messages import Message, Reference
 from onboard.core.site import Station
 from onboard.systems.mapd.messages import NO_TASK, StepState
@@ -13,11 +13,13 @@ class MapdWords(SiteWords):
     """What a pick-up and delivery site's messages mean."""
 
     noun = "task"
-    no_calls = "its robots share tasks out in rounds and not by calls; `onboard trace dump --decode` shows the rounds"
+    silent = frozenset({"wheelbase_mm", "car"})
 
     def __init__(self, site: Mapd) -> None:
         super().__init__(site)
         self._site = site
+        self._in_hand: dict[int, int] = {}
+        self._served: tuple[Message, int] | None = None
         self.signals = {
             **dict.fromkeys(("cell", "pickup", "delivery"), self.place),
             "robot": self.machine,
@@ -38,6 +40,24 @@ class MapdWords(SiteWords):
         if kind is not TokenKind.STATION:
             return super().resource(kind, number)
         return f"cell {self.place(resource_number(Station.from_number(number)))}"
+
+    def hear(self, message: Message) -> None:
+        """What each robot has in hand: it says only that this was served."""
+        if isinstance(message, StepState):
+            before = self._in_hand.pop(message.sender, NO_TASK)
+            if message.served and before != NO_TASK:
+                self._served = message, before
+            if message.task != NO_TASK:
+                self._in_hand[message.sender] = message.task
+
+    def finished(self, message: Message) -> Reference | None:
+        """A robot's step tells that what it had is delivered."""
+        told = self._served
+        return Reference(self._site.desk, told[1]) if told is not None and told[0] is message else None
+
+    def cost(self, cost: int, criterion: Criterion | None) -> str:
+        """Bids are in hundredths of a step."""
+        return f"{cost / 100:.2f} steps"
 
     def deed(self, message: Message) -> str:
         """What a robot does in its step."""

@@ -61,7 +61,6 @@ def run_calls(args: argparse.Namespace) -> int:
     site = site_of(args)
     task = task_of(args.task, site)
     listener, calls, words = Listener(codecs_for(site)), Calls(), Words(site)
-    _refuse_without_calls("calls", site, words)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):
@@ -69,6 +68,9 @@ def run_calls(args: argparse.Namespace) -> int:
             if said.is_fleet:
                 words.hear(said.message)
                 calls.feed(said.message, said.time_us)
+                done = words.system.finished(said.message)
+                if done is not None:
+                    calls.finish(done, said.time_us)
     shown = [call for call in calls.all if task is None or call.terms.task == task]
     for call in shown:
         print("\n".join(told_call(call, words, start_us or 0)))
@@ -84,7 +86,6 @@ def run_why(args: argparse.Namespace) -> int:
     assert site is not None, "argparse asks for it"
     task = task_of(args.task, site)
     words = Words(site)
-    _refuse_without_calls("why", site, words)
     listener, why = Listener(codecs_for(site)), Why(site, words)
     start_us: int | None = None
     with open_log(args) as log:
@@ -104,12 +105,6 @@ def run_why(args: argparse.Namespace) -> int:
     sys.stdout.flush()
     tell_faults(log, listener)
     return 0
-
-
-def _refuse_without_calls(command: str, site: Site | None, words: Words) -> None:
-    """What follows calls has nothing to tell of a system that makes none. Raises ``TraceError``."""
-    if site is not None and words.system.no_calls:
-        raise TraceError(f"{command}: {site.name} is a {site.system}: {words.system.no_calls}")
 
 
 def _line(story: TaskStory, words: Words) -> str:

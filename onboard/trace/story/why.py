@@ -121,11 +121,7 @@ class Why:
         body.heard_us = time_us
         self._words.hear(message)
         body.deed = self._words.system.deed(message) or body.deed
-        match self._calls.feed(message, time_us):
-            case CallOpened() as fact if is_task(fact.call.terms):
-                self._on_call(fact.call.terms, time_us)
-            case CallAnswered() as fact:
-                self._on_answer(fact)
+        self._deal(message, time_us)
         match message:
             case TaskReport():
                 self._on_report(message, time_us)
@@ -139,6 +135,18 @@ class Why:
                 body.is_held = message.at_rest and message.manual_mode is not ManualMode.AUTOMATIC
             case TokenRefusal():
                 self._body(message.requester).refusal = (time_us, message)
+
+    def _deal(self, message: Message, time_us: int) -> None:
+        """What a message tells of calls, and of tasks that no report ends."""
+        done = self.tasks.get(self._words.system.finished(message) or Reference(0, 0))
+        if done is not None and done.end_us is None:
+            done.phases.setdefault(TaskPhase.DONE, time_us)
+            self._end(done, time_us)
+        match self._calls.feed(message, time_us):
+            case CallOpened() as fact if is_task(fact.call.terms):
+                self._on_call(fact.call.terms, time_us)
+            case CallAnswered() as fact:
+                self._on_answer(fact)
 
     def finish(self) -> None:
         """The log has ended: what is still waited for lasts until then."""
@@ -183,10 +191,13 @@ class Why:
             return
         story.phases.setdefault(report.phase, time_us)
         if report.phase in _ENDS:
-            story.end_us = time_us
-            self._open.remove(story)
+            self._end(story, time_us)
         elif report.phase is TaskPhase.FORFEITED:
             story.owner = 0
+
+    def _end(self, story: TaskStory, time_us: int) -> None:
+        story.end_us = time_us
+        self._open.remove(story)
 
     def _on_progress(self, body: _Body, progress: Progress) -> None:
         at = Segment(progress.track, progress.index)
