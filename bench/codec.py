@@ -17,9 +17,9 @@ from cantools.database.can.message import Message as DbcMessage
 
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
 from onboard.contract.base import FrameCode, Message
+from onboard.contract.codes import Grade, LegAction, Side
+from onboard.contract.messages import Bid, Itinerary, Leg, Stamp
 from onboard.contract.packing import calls, device, plans, presence, rights
-from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.messages import Bid, Itinerary, Leg, Stamp
 from onboard.systems.registry import part
 from onboard.wire.codec import fleet_codec
 

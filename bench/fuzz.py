@@ -10,7 +10,7 @@ import time
 
 from bus_sim.campaign.fuzz import Fuzzer
 from bus_sim.sites import find_site
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Site
 
 

@@ -21,7 +21,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.stage import CarPark
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.codes import TokenKind
+from onboard.contract.codes import TokenKind
 from onboard.core.site import Site, journal_owner
 from onboard.holon.holon import Holon
 from onboard.io.journal import GROWTH, LEAST_BYTES, FileJournal

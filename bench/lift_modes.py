@@ -19,9 +19,9 @@ from bus_sim.systems.car_park.baselines import session_lock
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.contract.codes import CallResult, KindCode
+from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import CallResult, KindCode
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.site import Site
 from onboard.systems.car_park.site import RideCalls
 from onboard.systems.registry import factory_for

@@ -21,7 +21,7 @@ from bus_sim.systems.mapd.published import TOKEN_PASSING
 from bus_sim.systems.mapd.run import play_day
 from bus_sim.systems.mapd.steps import Day
 from onboard.config.site import parse_site
-from onboard.systems.mapd.messages import StepRound
+from onboard.contract.mapd import StepRound
 from onboard.systems.mapd.site import Mapd
 
 

@@ -23,10 +23,10 @@ from bus_sim.can.node import NodeOptions, SimulatedBus
 from bus_sim.systems.car_park.baselines.contract_net import ContractNetInitiator, ContractNetParticipant
 from bus_sim.virtual_time import VirtualTimeLoop, run
 from onboard.config.site import parse_site
-from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
+from onboard.contract.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
+from onboard.contract.messages import Bid, CallForProposals, Itinerary, Leg, Message, Reference, Stamp
 from onboard.core.effects import Effect, Send
 from onboard.core.frame import Frame
-from onboard.core.messages import Bid, CallForProposals, Itinerary, Leg, Message, Reference, Stamp
 from onboard.core.negotiation import (
     Awarded,
     CallTerms,

@@ -16,8 +16,8 @@ import time
 
 from bus_sim.sites import find_site
 from onboard.config.site import parse_site
-from onboard.core.codes import Grade, KindCode, LegAction, Side
-from onboard.core.messages import Itinerary, Leg, Stamp
+from onboard.contract.codes import Grade, KindCode, LegAction, Side
+from onboard.contract.messages import Itinerary, Leg, Stamp
 from onboard.core.site import Segment, Site
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.occupancy import final_position, itinerary_windows, lift_uses, standing_segments, travel_windows

@@ -16,11 +16,11 @@ from bus_sim.devices.timers import Timers
 from bus_sim.journal import SimulatedJournal
 from bus_sim.options import RunOptions
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import Message
 from onboard.controller.shell import Controller, Ports
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import KindCode
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.core.records import next_boot
 from onboard.core.site import Machine, Site, journal_owner
 from onboard.holon.holon import Holon

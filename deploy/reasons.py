@@ -6,7 +6,7 @@ The table stands in ``deploy/README.md``; a test keeps the two equal, and every 
 import sys
 from typing import NamedTuple
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 
 
 class Advice(NamedTuple):

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from hil.scenarios.scenario import Scenario
 from hil.stage import Stage
-from onboard.core.codes import Reason
-from onboard.core.messages import Diagnostic
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Diagnostic
 from onboard.ports.bus import BusHealth, ErrorState
 from onboard.trace.check.checks import Checks, Verdict
 

@@ -4,8 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from hil.stage import Said
-from onboard.core.codes import DriveMode, TokenKind
-from onboard.core.messages import Bid, CallForProposals, DriveState, Message, TokenGrant
+from onboard.contract.codes import DriveMode, TokenKind
+from onboard.contract.messages import Bid, CallForProposals, DriveState, Message, TokenGrant
 
 
 @dataclass

@@ -8,9 +8,9 @@ from bus_sim.run import FLEET, BusRun
 from bus_sim.systems.stage import Stage as World
 from hil.device import Device
 from hil.notice import Notice
-from onboard.core.codes import MachineState
+from onboard.contract.codes import MachineState
+from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.frame import Frame
-from onboard.core.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Machine, Site
 from onboard.wire.decoder import Decoder
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from onboard.contract.codes import Reason
 from onboard.controller.shell import Controller
-from onboard.core.codes import Reason
 from onboard.io.endings import OWN_FAULTS, Ending, ending_of
 from onboard.io.lasting_bus import LastingBus
 from onboard.io.lives import Lives

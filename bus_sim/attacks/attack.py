@@ -8,10 +8,10 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.authority import TokenKey
-from onboard.core.codes import NOBODY
 from onboard.core.frame import Frame
-from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.site import Site
 
 #: An attack is called this often, us.

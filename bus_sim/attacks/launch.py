@@ -9,8 +9,8 @@ from bus_sim.can.node import SimulatedBus
 from bus_sim.faults.injection import Injection
 from bus_sim.run import BusRun
 from bus_sim.systems.registry import simulated_of
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.wire.decoder import Decoder
 
 

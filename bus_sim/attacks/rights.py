@@ -1,9 +1,10 @@
 """Forged words about rights and about cars: who may be where, and what stands where."""
 
 from bus_sim.attacks.attack import Attack, Node, Tokens
+from onboard.contract.codes import TokenKind
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import CarAt, Message, Reference, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.authority import TokenKey
-from onboard.core.codes import ANY_STATION, OUTSIDE, TokenKind
-from onboard.core.messages import CarAt, Message, Reference, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.serial import successor
 
 #: Between two words about the same car, us.

@@ -4,17 +4,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 
 from bus_sim.attacks.attack import TICK_US, Attack, Node
+from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, Reason
+from onboard.contract.messages import Blocked, BusTime, EmergencyStop, Heartbeat, ManualOrder, Message, SyncRequest
 from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, Reason
-from onboard.core.messages import (
-    Blocked,
-    BusTime,
-    EmergencyStop,
-    Heartbeat,
-    ManualOrder,
-    Message,
-    SyncRequest,
-)
 
 _SECOND_US = 1_000_000
 #: Machines of another site that one node makes up.

@@ -17,8 +17,8 @@ from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.stage import Stage
 from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.codes import MOBILE_KINDS
-from onboard.core.messages import Heartbeat, Message
+from onboard.contract.constants import MOBILE_KINDS
+from onboard.contract.messages import Heartbeat, Message
 from onboard.core.site import Site
 
 #: A site starts by itself within this, s (issue 13, point 1).

@@ -21,8 +21,8 @@ from bus_sim.run import EventLog, NoWatchdog, run_until
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
+from onboard.contract.codes import Reason
 from onboard.controller.shell import Controller, Ports
-from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.core.records import next_boot
 from onboard.core.site import Machine, Site

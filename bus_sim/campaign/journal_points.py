@@ -8,9 +8,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from bus_sim.faults.injection import AnyFault, Injection
-from onboard.core.codes import Reason
-from onboard.core.messages import Message
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Halted, Message
 
 #: Records that are cut off the end, each number of them a point.
 MOST_LOST = 50

@@ -9,7 +9,7 @@ from typing import Final
 from bus_sim.faults.injection import Injection
 from bus_sim.faults.table import TEN_YEARS_MS, Value
 from bus_sim.systems.registry import simulated_of
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Site
 
 #: Faults begin in this span after power-up, s, unless a system says otherwise: all end before it is over.

@@ -12,10 +12,10 @@ from bus_sim.can.faults import Fault, FaultInjector, FaultKind
 from bus_sim.faults.injection import AnyFault, Injection
 from bus_sim.faults.table import KINDS, Group
 from bus_sim.run import BusRun
+from onboard.contract.codes import MachineState
+from onboard.contract.messages import Heartbeat, Message, SyncRequest
 from onboard.controller.shell import Controller
-from onboard.core.codes import MachineState
 from onboard.core.frame import Frame
-from onboard.core.messages import Heartbeat, Message, SyncRequest
 from onboard.core.site import Machine
 from onboard.ports.bus import ErrorState
 

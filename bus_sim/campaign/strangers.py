@@ -14,7 +14,7 @@ from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.stranger import Stranger
 from bus_sim.systems.system import Coming
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.recovery_messages import Halted
+from onboard.contract.messages import Halted
 from onboard.core.site import Site
 
 #: The mean wait of a seed may be so much longer than without the stranger, s.

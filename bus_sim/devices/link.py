@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Protocol
 
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.ports.bus import Bus
 
 #: Called with a message and the loop time of its reception, us.

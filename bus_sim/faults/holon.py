@@ -2,8 +2,8 @@
 
 import math
 
+from onboard.contract.messages import Message
 from onboard.core.effects import Effect
-from onboard.core.messages import Message
 from onboard.holon.holon import Holon
 
 #: Messages that wait for a process that stands still; beyond that the oldest stay and the newest are lost, as in the

@@ -5,8 +5,8 @@ from typing import Any
 
 from bus_sim.faults.injection import Injection
 from bus_sim.run import BusRun
-from onboard.core.codes import Reason
-from onboard.core.messages import Blocked, Clear, EmergencyStop, Message
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment
 from onboard.operate.names import OperateError
 from onboard.operate.order import Order

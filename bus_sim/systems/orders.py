@@ -16,7 +16,7 @@ from bus_sim.run import BusRun, buses_of, links_of
 from bus_sim.systems.stage import Stage, Tally
 from bus_sim.systems.system import HAND_SPEED, Faulted, Occasion, PlantT, SimulatedSystem, SiteT
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 
 #: Faults begin so long after power-up, s: the machines have found each other, and the first orders are there.
 BEGIN_S = 12.0

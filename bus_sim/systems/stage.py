@@ -16,7 +16,7 @@ from bus_sim.demand import DemandError
 from bus_sim.devices.timers import Timers
 from bus_sim.run import BusRun
 from bus_sim.systems.picture import LiveText
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 
 if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from onboard.contract.codes import KindCode, Reason, TaskPhase
+from onboard.contract.messages import CallForProposals, Message, TaskReport
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
-from onboard.core.codes import KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import CallForProposals, Message, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, Awarded, Estimator, Needs, NegotiationEvent, Proposal
 from onboard.core.site import Machine, Site

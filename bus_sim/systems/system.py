@@ -12,8 +12,8 @@ from bus_sim.options import RunOptions
 from bus_sim.systems.stage import Stage, SystemPlant
 from bus_sim.systems.stranger import Stranger, factories_with
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.contract.codes import KindCode
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import KindCode
 from onboard.core.site import Site
 
 #: What a fault does to a run at its time.

@@ -9,8 +9,8 @@ from typing import Any
 from bus_sim.can.faults import Fault, FaultKind
 from bus_sim.can.medium import Tap
 from bus_sim.run import BusRun
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.core.site import Machine
 from onboard.web.app import CommandError, number
 from onboard.web.picture import LivePicture

@@ -11,8 +11,8 @@ import time
 from collections.abc import Callable, Iterator
 
 from onboard.config.machine import MachineConfig
+from onboard.contract.messages import Heartbeat
 from onboard.core.frame import Frame
-from onboard.core.messages import Heartbeat
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 

@@ -2,8 +2,8 @@
 
 from hil.commission.person import is_yes, number
 from hil.commission.setting import Setting
-from onboard.core.codes import CONTRACT_VERSION, MachineState
-from onboard.core.messages import Diagnostic, DoorOrder, DriveOrder, Heartbeat, ShuttleOrder
+from onboard.contract.codes import CONTRACT_VERSION, MachineState
+from onboard.contract.messages import Diagnostic, DoorOrder, DriveOrder, Heartbeat, ShuttleOrder
 from onboard.core.mirror import MISSED_HEARTBEATS
 from onboard.ports.bus import ErrorState
 

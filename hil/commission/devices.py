@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from hil.commission.drive import ARRIVED_MM, Moved, move
 from hil.commission.person import is_yes
 from hil.commission.setting import REPEAT_S, Setting
-from onboard.core.codes import (
+from onboard.contract.codes import (
     DeskInput,
     DeskText,
     DoorAction,
@@ -17,7 +17,7 @@ from onboard.core.codes import (
     ShuttleMode,
     Side,
 )
-from onboard.core.messages import (
+from onboard.contract.messages import (
     NO_REFERENCE,
     BayState,
     DeskEvent,

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from hil.commission.setting import REPEAT_S, Setting
-from onboard.core.codes import DriveMode
-from onboard.core.messages import DriveOrder, DriveState
+from onboard.contract.codes import DriveMode
+from onboard.contract.messages import DriveOrder, DriveState
 from onboard.core.serial import successor
 
 #: A drive counts as arrived this near its target, mm.

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from hil.notice import Notice
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.ports.bus import Bus
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder

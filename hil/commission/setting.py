@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from hil.commission.listener import BusListener
 from hil.commission.person import Person
 from hil.commission.protocol import Protocol, Verdict
-from onboard.core.messages import DriveState, Message
+from onboard.contract.messages import DriveState, Message
 from onboard.core.serial import successor
 from onboard.core.site import Machine, Site
 

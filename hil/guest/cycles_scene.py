@@ -7,9 +7,9 @@ import sys
 from hil.guest.listener import BusListener
 from hil.guest.mesh import bring_up, run
 from hil.guest.site_run import TOOLS, SiteRun, play
-from onboard.core.codes import MachineState, TaskPhase
+from onboard.contract.codes import MachineState, TaskPhase
+from onboard.contract.messages import Heartbeat, TaskReport
 from onboard.core.frame import Frame
-from onboard.core.messages import Heartbeat, TaskReport
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder
 

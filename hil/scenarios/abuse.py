@@ -6,19 +6,19 @@ from dataclasses import replace
 from hil.scenarios.recovery import BEATS_S
 from hil.scenarios.work import AWARD_S, CALL_S, JOIN_S, is_awarded
 from hil.stage import Said, Stage
-from onboard.core.codes import DriveMode, MachineState, Reason
-from onboard.core.frame import Frame
-from onboard.core.messages import (
+from onboard.contract.codes import DriveMode, MachineState, Reason
+from onboard.contract.messages import (
     Award,
     Bid,
     BusTime,
     CallForProposals,
     Diagnostic,
     DriveState,
+    Halted,
     Heartbeat,
     Message,
 )
-from onboard.core.recovery_messages import Halted
+from onboard.core.frame import Frame
 
 #: Frames of a flood: three quarters of a second of a full bus at 500 kbit/s, of eight bytes each.
 FLOOD_FRAMES = 2_400

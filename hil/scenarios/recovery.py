@@ -2,8 +2,8 @@
 
 from hil.scenarios.work import JOIN_S, MOTION_S, moves
 from hil.stage import Stage
-from onboard.core.codes import DriveMode
-from onboard.core.messages import DriveState, Heartbeat
+from onboard.contract.codes import DriveMode
+from onboard.contract.messages import DriveState, Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS
 
 #: The fleet's heartbeats, s: many times the longest period that a site may have would be an hour; ours.

@@ -7,7 +7,7 @@ from hil.scenarios.recovery import leaves_bus_off, survives_reset, survives_unpl
 from hil.scenarios.scenario import Scenario
 from hil.scenarios.work import bids, joins, moves, takes, wins, yields
 from hil.stage import Stage
-from onboard.core.codes import KindCode, Reason
+from onboard.contract.codes import KindCode, Reason
 
 _ROBOT = frozenset({KindCode.ROBOT})
 #: Kinds that carry out what comes, of every system.

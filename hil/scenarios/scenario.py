@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from bus_sim.systems.registry import simulated_of
 from hil.bench import Capability
 from hil.stage import Stage
-from onboard.core.codes import MOBILE_KINDS, KindCode, Reason
+from onboard.contract.codes import KindCode, Reason
+from onboard.contract.constants import MOBILE_KINDS
 from onboard.core.site import Machine, Site
 
 

@@ -1,7 +1,7 @@
 """Scenarios of ordinary work: the device joins, bids, wins, moves under authority, and gives way."""
 
 from hil.stage import Stage
-from onboard.core.codes import (
+from onboard.contract.codes import (
     CONTRACT_VERSION,
     CallResult,
     DriveMode,
@@ -13,7 +13,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.messages import (
+from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,

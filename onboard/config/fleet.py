@@ -4,7 +4,8 @@ import re
 from dataclasses import dataclass, field
 
 from onboard.config.reader import Table
-from onboard.core.codes import MAX_NODE_ID, KindCode
+from onboard.contract.codes import KindCode
+from onboard.contract.constants import MAX_NODE_ID
 from onboard.core.site import Machine, Segment, Station
 
 #: A C identifier, as a DBC names nodes and messages, short enough for ``<name>_<message>`` within its 32 characters.

@@ -8,7 +8,7 @@ from onboard.config.files import read_text, root_table
 from onboard.config.problems import ConfigError, Problem, Problems, quoted
 from onboard.config.reader import Table, type_name
 from onboard.config.site import load_site
-from onboard.core.codes import MAX_NODE_ID
+from onboard.contract.constants import MAX_NODE_ID
 from onboard.core.site import Machine, Site
 
 

@@ -10,8 +10,8 @@ from collections.abc import Awaitable, Callable, Iterable
 from dataclasses import dataclass
 from typing import ParamSpec
 
+from onboard.contract.codes import MachineState, Reason
 from onboard.controller.rest import Rest
-from onboard.core.codes import MachineState, Reason
 from onboard.core.effects import Actuate, Effect, Halt, Record, Renew, Report, Send, Tell
 from onboard.core.frame import Frame
 from onboard.holon.holon import Holon

@@ -11,14 +11,23 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.contract.codes import Reason
+from onboard.contract.constants import NOBODY, SEEN_VERSION_BITS
+from onboard.contract.messages import (
+    Message,
+    TokenDispute,
+    TokenGiven,
+    TokenGrant,
+    TokenHeld,
+    TokenRefusal,
+    TokenRequest,
+    TokenSeen,
+)
 from onboard.core.backoff import BackOff
 from onboard.core.belief import Belief, Beliefs, Key
-from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason
 from onboard.core.effects import Effect, Record, Report, Send
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.records import RetiredRecord, TokenGivenRecord, TokenGoneRecord, TokenHeldRecord, TokenRecord
-from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Site
 from onboard.core.token_keys import TokenKey, genesis_holder, may_exist, segment_token, station_token
 

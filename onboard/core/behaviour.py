@@ -8,11 +8,11 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import ClassVar, Protocol, runtime_checkable
 
+from onboard.contract.codes import KindCode, MachineState, Reason
+from onboard.contract.messages import Message
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect
 from onboard.core.journal_records import Entry
-from onboard.core.messages import Message
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import MotionAuthority
 from onboard.core.negotiation import Estimator, Negotiation, NegotiationEvent

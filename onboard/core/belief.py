@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import NOBODY, TokenKind
+from onboard.contract.codes import TokenKind
+from onboard.contract.constants import NOBODY
 
 #: A token, as in ``authority.TokenKey``.
 Key = tuple[TokenKind, int]

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Message
 from onboard.core.journal_records import Entry, JournalRecord
-from onboard.core.messages import Message
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from dataclasses import MISSING, Field, dataclass, fields
 from enum import Enum, IntEnum, StrEnum
 from typing import Any, ClassVar, NamedTuple, TypeVar, get_args, get_type_hints
 
-from onboard.core.messages import Reference
+from onboard.contract.messages import Reference
 
 Entry = Mapping[str, str | int]
 _TYPE = "record"

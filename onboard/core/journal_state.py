@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 from onboard.core.journal_records import Entry, RecordTypes, misshapen, records_in
 from onboard.core.records import CORE_RECORDS, BlockedRecord, BootRecord, ClearRecord, EpochRecord, ManualRecord
 

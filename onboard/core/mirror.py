@@ -10,10 +10,11 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
+from onboard.contract.codes import Grade, KindCode, MachineState, Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Heartbeat, Itinerary, Message, Progress
 from onboard.core.authority import TokenBook
-from onboard.core.codes import NOBODY, Grade, KindCode, MachineState, Reason
 from onboard.core.effects import Effect
-from onboard.core.messages import Heartbeat, Itinerary, Message, Progress
 from onboard.core.serial import is_newer
 from onboard.core.site import Machine, Segment, Site
 from onboard.core.token_keys import TokenKey

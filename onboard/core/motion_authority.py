@@ -8,10 +8,10 @@ right where the system says that one is needed, is not carried out: the machine 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Message
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.codes import Reason
 from onboard.core.effects import Actuate, Effect, Tell
-from onboard.core.messages import Message
 from onboard.core.site import Needs
 
 #: The rights of whoever moves within itself only.

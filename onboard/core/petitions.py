@@ -7,9 +7,9 @@ its request only to cover lost frames, and a request that is not repeated lapses
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.contract.messages import TokenRequest
 from onboard.core.authority import TokenKey
 from onboard.core.backoff import BackOff
-from onboard.core.messages import TokenRequest
 
 #: Itinerary version of a request without an agreed order of passing (dbc/fleet.dbc).
 UNORDERED = 0

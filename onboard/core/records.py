@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from onboard.core.codes import ManualMode, Reason, TokenKind
+from onboard.contract.codes import ManualMode, Reason, TokenKind
+from onboard.contract.messages import Reference
 from onboard.core.journal_records import End, Entry, JournalRecord, Keep, RecordTypes, Which, records_in
-from onboard.core.messages import Reference
 from onboard.core.serial import successor
 
 _TOKEN = ("kind", "number")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar, NamedTuple
 
-from onboard.core.codes import KindCode, Side
+from onboard.contract.codes import KindCode, Side
 
 
 class Segment(NamedTuple):

@@ -3,7 +3,7 @@
 from functools import cache
 from typing import NamedTuple
 
-from onboard.core.codes import KindCode, TokenKind
+from onboard.contract.codes import KindCode, TokenKind
 from onboard.core.site import Segment, Site, Station
 
 

@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 
-from onboard.core.messages import CallForProposals, CarAt, ManualState, Message, TaskReport
+from onboard.contract.messages import CallForProposals, CarAt, ManualState, Message, TaskReport
 from onboard.core.site import Site
 from onboard.gateway.actions import InstantActions
 from onboard.gateway.dialect import Json, timestamp

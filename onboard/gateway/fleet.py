@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any
 
-from onboard.core.codes import KindCode, Operation, Reason, TaskPhase
-from onboard.core.messages import Heartbeat, Message, Progress, Reference, TaskReport
+from onboard.contract.codes import KindCode, Operation, Reason, TaskPhase
+from onboard.contract.messages import Heartbeat, Message, Progress, Reference, TaskReport
 from onboard.core.site import Segment, Site
 from onboard.gateway.dialect import Json, timestamp
 from onboard.gateway.edge import edge_of

@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from functools import partial
 
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.gateway.desk import OrderDesk
 from onboard.gateway.link import Link, LinkWords

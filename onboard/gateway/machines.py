@@ -2,21 +2,14 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import (
-    ANY_STATION,
-    MOBILE_KINDS,
-    CallResult,
-    KindCode,
-    MachineState,
-    ManualMode,
-    Reason,
-    TaskPhase,
-)
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, KindCode, MachineState, ManualMode, Reason, TaskPhase
+from onboard.contract.constants import ANY_STATION, MOBILE_KINDS
+from onboard.contract.messages import (
     Blocked,
     CarAt,
     Clear,
     EmergencyStop,
+    Halted,
     Heartbeat,
     Itinerary,
     ManualState,
@@ -25,7 +18,6 @@ from onboard.core.messages import (
     TaskReport,
     Waiting,
 )
-from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
 from onboard.gateway.whereabouts import Tracker, Whereabouts

@@ -3,7 +3,7 @@
 import zlib
 from dataclasses import dataclass, replace
 
-from onboard.core.messages import Reference
+from onboard.contract.messages import Reference
 from onboard.gateway.records import Life, WishRecord
 from onboard.ports.journal import Entry
 

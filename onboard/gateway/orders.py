@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 
-from onboard.core.codes import TaskPhase
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import Message, Reference, TaskReport
 from onboard.core.journal_records import records_in
-from onboard.core.messages import Message, Reference, TaskReport
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Site
 from onboard.gateway.inbox import Incoming

@@ -7,8 +7,8 @@ asked again meanwhile, for its word may be lost, and nothing is told that it has
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from onboard.core.codes import ManualMode
-from onboard.core.messages import ManualOrder, ManualState, Message
+from onboard.contract.codes import ManualMode
+from onboard.contract.messages import ManualOrder, ManualState, Message
 from onboard.gateway.dialect import Json
 
 #: The mode that each action asks for.

@@ -9,8 +9,8 @@ from collections import Counter, deque
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Message, TaskReport
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import Message, TaskReport
 from onboard.core.site import Site
 from onboard.gateway import state as vda
 from onboard.gateway.dialect import Connection, Json, timestamp

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import StrEnum
 
+from onboard.contract.messages import Reference
 from onboard.core.journal_records import JournalRecord
-from onboard.core.messages import Reference
 
 
 class Life(StrEnum):

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from onboard.core.codes import MAX_NODE_ID
+from onboard.contract.constants import MAX_NODE_ID
 from onboard.gateway.dialect import DIALECTS, Dialect
 
 #: Characters of a topic level: those of a serial number in VDA 5050 2.1, section 6.4.

@@ -6,14 +6,13 @@ edges are what its own firm plan still leads over. All of them are released: a p
 
 from dataclasses import dataclass
 
-from onboard.core.codes import MachineState, Operation, TaskPhase
-from onboard.core.messages import Reference
-from onboard.core.recovery_messages import Halted
-from onboard.core.remedies import reason_words, remedy
+from onboard.contract.codes import MachineState, Operation, TaskPhase
+from onboard.contract.messages import Halted, Reference
 from onboard.core.site import Segment
 from onboard.gateway.dialect import Connection, Dialect, Json
 from onboard.gateway.machines import Body, Machines, TaskInHand
 from onboard.gateway.whereabouts import Whereabouts
+from onboard.holon.remedies import reason_words, remedy
 
 #: A wait is told as information as long as nothing newer is heard, at most so long, us. As on the page (onboard/web).
 WAIT_TOLD_US = 30_000_000

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import Protocol
 
-from onboard.core.codes import Grade, LegAction
-from onboard.core.messages import Itinerary, Message, Progress
+from onboard.contract.codes import Grade, LegAction
+from onboard.contract.messages import Itinerary, Message, Progress
 from onboard.core.site import Segment, Site
 from onboard.ways.site import TrackKind, way_site
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import Message, Reference, SyncRequest
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import Message, Reference, SyncRequest
 from onboard.core.site import Site
 from onboard.gateway.order import Order, Wish
 

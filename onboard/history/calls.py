@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import CallResult, Criterion, Grade, Operation, Reason, TaskPhase
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, Criterion, Grade, Operation, Reason, TaskPhase
+from onboard.contract.messages import (
     Award,
     Bid,
     BusTime,

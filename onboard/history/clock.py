@@ -1,6 +1,6 @@
 """Bus time against the log's."""
 
-from onboard.core.messages import BusTime
+from onboard.contract.messages import BusTime
 from onboard.core.serial import from_bus_ms
 
 

@@ -1,6 +1,6 @@
 """A bus in one fold: feed it every message of the fleet bus, and let views take what it tells."""
 
-from onboard.core.messages import Message, TaskReport, TokenGrant, TokenHeld
+from onboard.contract.messages import Message, TaskReport, TokenGrant, TokenHeld
 from onboard.history.calls import BidMade, CallAnswered, CallOpened, Calls
 from onboard.history.clock import BusClock
 from onboard.history.lives import Lives

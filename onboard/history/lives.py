@@ -1,7 +1,7 @@
 """Signs of life: when each machine was heard, the state that it told, and what it waits for."""
 
-from onboard.core.codes import MachineState
-from onboard.core.messages import Heartbeat, Message, Progress, Waiting
+from onboard.contract.codes import MachineState
+from onboard.contract.messages import Heartbeat, Message, Progress, Waiting
 
 
 class Lives:

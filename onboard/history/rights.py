@@ -1,7 +1,7 @@
 """Who holds which right to a place, by the newest word that was said of it."""
 
-from onboard.core.codes import TokenKind
-from onboard.core.messages import TokenGrant, TokenHeld
+from onboard.contract.codes import TokenKind
+from onboard.contract.messages import TokenGrant, TokenHeld
 from onboard.core.serial import is_newer
 
 #: Loads come and go for ever, places do not: rights to loads are not remembered.

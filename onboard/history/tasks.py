@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import CallResult, Criterion, Operation, TaskPhase
-from onboard.core.messages import Reference, TaskReport
+from onboard.contract.codes import CallResult, Criterion, Operation, TaskPhase
+from onboard.contract.messages import Reference, TaskReport
 from onboard.history.bounds import drop_oldest
 from onboard.history.calls import CallAnswered, CallOpened
 

@@ -7,9 +7,10 @@ anybody.
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, KindCode, Reason
+from onboard.contract.codes import KindCode, Reason
+from onboard.contract.constants import MAX_NODE_ID, MOBILE_KINDS, Speakers
+from onboard.contract.messages import Blocked, BusTime, Clear, EmergencyStop, ManualOrder, Message
 from onboard.core.effects import Effect, Report
-from onboard.core.messages import Blocked, BusTime, Clear, EmergencyStop, ManualOrder, Message, Speakers
 from onboard.core.site import Site
 
 #: Highest number that a node can have on the wire.

@@ -3,9 +3,9 @@
 from collections import Counter
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Diagnostic
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Diagnostic
 
 
 @dataclass

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
-from onboard.core.codes import NOBODY, Reason
+from onboard.contract.codes import Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Halted
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.records import HeldRecord, ReleasedRecord
-from onboard.core.recovery_messages import Halted
 
 #: An emergency stop holds so long after it was last heard, us (docs/contract-2.md).
 STOP_LASTS_US = 30_000_000

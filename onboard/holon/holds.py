@@ -4,25 +4,28 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onboard.core.codes import Reason, TaskPhase
-from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.journal_state import RIGHTS_LOST
-from onboard.core.messages import (
+from onboard.contract.codes import Reason, TaskPhase
+from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,
     EmergencyStop,
+    Go,
+    Halted,
     Heartbeat,
     Itinerary,
     LeftOut,
     Message,
     TaskReport,
+    TokenDispute,
+    TokenGiven,
     TokenGrant,
     TokenHeld,
     TokenRequest,
 )
+from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.records import BootRecord
-from onboard.core.recovery_messages import Go, Halted, TokenDispute, TokenGiven
 from onboard.holon.holding import Hold, Holding, Outcome
 from onboard.holon.own_number import OwnNumber
 from onboard.holon.presence import Presence

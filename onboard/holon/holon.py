@@ -8,33 +8,35 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory
-from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason
-from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
-from onboard.core.journal_records import Entry, records_in
-from onboard.core.journal_state import INTACT, OLD, RIGHTS_LOST, JournalCondition, reason_of, still_counting
-from onboard.core.messages import (
+from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason
+from onboard.contract.constants import NOBODY, Speakers
+from onboard.contract.messages import (
     Award,
     Bid,
     BusTime,
     CallForProposals,
     EmergencyStop,
+    Go,
+    Halted,
     Heartbeat,
     Itinerary,
     LeftOut,
     Message,
     Progress,
-    Speakers,
+    Regeneration,
     SyncRequest,
     TaskReport,
     TokenGrant,
     TokenHeld,
 )
+from onboard.core.authority import TokenBook, TokenKey
+from onboard.core.behaviour import Attentive, Behaviour, BehaviourFactory
+from onboard.core.bus_time import BUS_TIME_MODULUS
+from onboard.core.effects import Effect, Halt, Record, Renew, Report, Send
+from onboard.core.journal_records import Entry, records_in
+from onboard.core.journal_state import INTACT, OLD, RIGHTS_LOST, JournalCondition, reason_of, still_counting
 from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_of
 from onboard.core.records import BootRecord
-from onboard.core.recovery_messages import Go, Halted, Regeneration
 from onboard.core.site import Machine, Site
 from onboard.holon.admission import Admission
 from onboard.holon.drops import ToldDrops

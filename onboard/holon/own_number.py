@@ -8,10 +8,10 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import CallResult
+from onboard.contract.messages import Award, Message, TokenGrant, TokenHeld
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.codes import CallResult
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Message, TokenGrant, TokenHeld
 from onboard.core.mirror import Mirror
 
 #: Own awards remembered: a fleet closes some hundreds an hour. Ours.

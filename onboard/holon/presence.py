@@ -9,11 +9,11 @@ more machines speak another contract or know another site than speak its own, it
 
 from dataclasses import dataclass, field, replace
 
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.constants import NOBODY, STILL
+from onboard.contract.messages import Halted, Heartbeat
 from onboard.core.authority import TokenBook
-from onboard.core.codes import NOBODY, STILL, MachineState, Reason
-from onboard.core.messages import Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
-from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
 
 #: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word. Ours.

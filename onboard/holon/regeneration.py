@@ -10,21 +10,24 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
-from onboard.core.authority import TokenBook, TokenKey, may_exist
-from onboard.core.belief import Belief
-from onboard.core.codes import CONTRACT_VERSION, NOBODY, MachineState, Reason, RegenerationPhase, TokenKind
-from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Heartbeat, Message, TokenHeld
-from onboard.core.mirror import Mirror
-from onboard.core.records import AssignedRecord, EpochRecord, ReadBackRecord, TokenGoneRecord, TokenHeldRecord
-from onboard.core.recovery_messages import (
+from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason, RegenerationPhase, TokenKind
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import (
+    Heartbeat,
+    Message,
     Regeneration,
     RegenerationState,
     TokenAssigned,
+    TokenHeld,
     TokenSeen,
-    assignment_digest,
 )
+from onboard.core.assignments import assignment_digest
+from onboard.core.authority import TokenBook, TokenKey, may_exist
+from onboard.core.belief import Belief
+from onboard.core.effects import Effect, Record, Report, Send
+from onboard.core.journal_records import Entry, records_in
+from onboard.core.mirror import Mirror
+from onboard.core.records import AssignedRecord, EpochRecord, ReadBackRecord, TokenGoneRecord, TokenHeldRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment
 

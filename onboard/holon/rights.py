@@ -8,19 +8,23 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from onboard.core.authority import Claim, TokenBook, TokenKey, may_exist
-from onboard.core.behaviour import Fleet
-from onboard.core.codes import NOBODY, Reason
-from onboard.core.effects import Effect, Send
-from onboard.core.messages import (
+from onboard.contract.codes import Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import (
     Message,
+    SyncDone,
     SyncRequest,
+    TokenDispute,
+    TokenGiven,
     TokenGrant,
     TokenHeld,
     TokenRefusal,
     TokenRequest,
+    TokenSeen,
 )
-from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
+from onboard.core.authority import Claim, TokenBook, TokenKey, may_exist
+from onboard.core.behaviour import Fleet
+from onboard.core.effects import Effect, Send
 from onboard.holon.witness import Witness
 
 #: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from onboard.core.codes import MachineState, Reason
-from onboard.core.messages import Heartbeat
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.messages import Heartbeat
 from onboard.holon.holding import Holding
 from onboard.holon.presence import Presence
 from onboard.holon.regeneration import Regenerating

@@ -7,9 +7,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 from enum import Enum
 
+from onboard.contract.codes import Reason
+from onboard.contract.constants import MOBILE_KINDS
+from onboard.contract.messages import BusTime
 from onboard.core.bus_time import BUS_TIME_MODULUS, MAX_SLEW_US, BusClock
-from onboard.core.codes import MOBILE_KINDS, Reason
-from onboard.core.messages import BusTime
 from onboard.core.mirror import Mirror
 from onboard.core.site import Machine, Site
 

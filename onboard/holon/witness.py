@@ -10,12 +10,22 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.contract.codes import Reason
+from onboard.contract.constants import NOBODY, SEEN_VERSION_BITS
+from onboard.contract.messages import (
+    Halted,
+    Heartbeat,
+    SyncDone,
+    SyncRequest,
+    TokenGiven,
+    TokenGrant,
+    TokenHeld,
+    TokenRequest,
+    TokenSeen,
+)
 from onboard.core.authority import TokenBook, TokenKey
-from onboard.core.codes import NOBODY, SEEN_VERSION_BITS, Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Heartbeat, SyncRequest, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.mirror import Mirror
-from onboard.core.recovery_messages import Halted, SyncDone, TokenGiven, TokenSeen
 from onboard.core.serial import is_newer
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.

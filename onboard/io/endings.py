@@ -2,7 +2,7 @@
 
 from enum import IntEnum
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 
 
 class Ending(IntEnum):

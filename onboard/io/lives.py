@@ -10,7 +10,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 from onboard.io.endings import Ending
 
 #: So many lives in a row that an own fault ended within ``HEALTHY_US`` each, and the machine waits for a person.

@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.contract.codes import TokenKind
+from onboard.contract.constants import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE
+from onboard.contract.messages import CarAt, TokenAssigned
 from onboard.core.authority import TokenKey, genesis_holder, may_exist
-from onboard.core.codes import ANY_STATION, MOBILE_KINDS, NOBODY, OUTSIDE, TokenKind
-from onboard.core.messages import CarAt
-from onboard.core.recovery_messages import TokenAssigned
 from onboard.core.site import Machine, Segment, Site, Station
 from onboard.ways.lifts import gate, lift_at, platform
 from onboard.ways.site import way_site

@@ -1,10 +1,9 @@
 """``block`` and ``clear``: a segment that nobody can pass, kept in the journal of its track's steward."""
 
-from onboard.core.codes import Reason
-from onboard.core.messages import Blocked, Clear, Message, SyncRequest
-from onboard.core.recovery_messages import SyncDone
-from onboard.core.remedies import reason_words
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Blocked, Clear, Message, SyncDone, SyncRequest
 from onboard.core.site import Segment
+from onboard.holon.remedies import reason_words
 from onboard.operate.order import AGAIN_US, DONE, Order
 from onboard.operate.park import Park
 from onboard.operate.words import state_words

@@ -1,6 +1,6 @@
 """``hold`` and ``release``: a person has a hand in one machine that moves (row M38; onboard/work/manual.py)."""
 
-from onboard.core.messages import ManualState, Message
+from onboard.contract.messages import ManualState, Message
 from onboard.core.site import Machine
 from onboard.gateway.pauses import Pauses
 from onboard.operate.order import DONE, Order

@@ -3,7 +3,8 @@
 import re
 
 from onboard.config.problems import nearest
-from onboard.core.codes import MAX_NODE_ID, MOBILE_KINDS, NOBODY, Reason
+from onboard.contract.codes import Reason
+from onboard.contract.constants import MAX_NODE_ID, MOBILE_KINDS, NOBODY
 from onboard.core.site import Machine, Segment, Site
 from onboard.ways.site import TrackKind, way_site
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.operate.park import Park
 
 #: What is not answered is said again after this, us (dbc/fleet.dbc, ManualOrder). Ours.

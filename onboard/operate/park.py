@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import CONTRACT_VERSION, MAX_NODE_ID, NOBODY, MachineState, ManualMode, Reason
-from onboard.core.messages import Blocked, Clear, Diagnostic, EmergencyStop, Heartbeat, ManualState, Message
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import CONTRACT_VERSION, MachineState, ManualMode, Reason
+from onboard.contract.constants import MAX_NODE_ID, NOBODY
+from onboard.contract.messages import Blocked, Clear, Diagnostic, EmergencyStop, Halted, Heartbeat, ManualState, Message
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
 from onboard.gateway.whereabouts import Tracker

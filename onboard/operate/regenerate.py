@@ -9,19 +9,25 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
-from onboard.core.authority import TokenKey
-from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason, RegenerationPhase, TokenKind
-from onboard.core.messages import Blocked, CarAt, Heartbeat, Message, TokenGrant, TokenHeld
-from onboard.core.recovery_messages import (
+from onboard.contract.codes import Reason, RegenerationPhase, TokenKind
+from onboard.contract.constants import MOBILE_KINDS, NOBODY
+from onboard.contract.messages import (
+    Blocked,
+    CarAt,
+    Heartbeat,
+    Message,
     Regeneration,
     RegenerationState,
     TokenAssigned,
     TokenGiven,
+    TokenGrant,
+    TokenHeld,
     TokenSeen,
-    assignment_digest,
 )
-from onboard.core.remedies import reason_words
+from onboard.core.assignments import assignment_digest
+from onboard.core.authority import TokenKey
 from onboard.core.serial import is_newer, successor
+from onboard.holon.remedies import reason_words
 from onboard.operate.assignment import NO_BODY, Assignment, Body, Statements, Whose, assign
 from onboard.operate.order import AGAIN_US, MISTAKE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park

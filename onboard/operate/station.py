@@ -3,8 +3,8 @@
 import asyncio
 from collections.abc import Awaitable, Callable
 
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.operate.names import FIRST_TOOL, LAST_TOOL, OperateError
 from onboard.operate.order import MISTAKE, NOT_CONFIRMED, Order

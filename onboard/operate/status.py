@@ -1,8 +1,9 @@
 """``onboard operate status``: who lives, who stands and why; it only listens."""
 
-from onboard.core.codes import MOBILE_KINDS, Reason
-from onboard.core.messages import Message
-from onboard.core.remedies import reason_words
+from onboard.contract.codes import Reason
+from onboard.contract.constants import MOBILE_KINDS
+from onboard.contract.messages import Message
+from onboard.holon.remedies import reason_words
 from onboard.operate.order import DONE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park
 from onboard.operate.words import state_words

@@ -3,9 +3,9 @@
 A stop counts until 30 s after it was last heard, so it is said as long as it shall hold. This bus is no safety channel.
 """
 
-from onboard.core.codes import NOBODY, MachineState, Reason
-from onboard.core.messages import EmergencyStop, Heartbeat, Message
-from onboard.core.recovery_messages import Go, Halted
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import EmergencyStop, Go, Halted, Heartbeat, Message
 from onboard.core.site import Machine
 from onboard.operate.order import AGAIN_US, DONE, NOT_CONFIRMED, Order
 from onboard.operate.park import Park

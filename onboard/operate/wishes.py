@@ -4,10 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason
+from onboard.contract.codes import Reason
+from onboard.contract.constants import MOBILE_KINDS, NOBODY
 from onboard.core.journal_state import RIGHTS_LOST
-from onboard.core.remedies import START_ANEW, remedy
 from onboard.core.site import Machine, Site
+from onboard.holon.remedies import START_ANEW, remedy
 from onboard.operate.assignment import Body
 from onboard.operate.blocks import Mark
 from onboard.operate.holds import Hold

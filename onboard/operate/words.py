@@ -1,8 +1,8 @@
 """States and reasons in words for a person, with what to do where something is to be done."""
 
-from onboard.core.codes import MachineState, Reason
-from onboard.core.recovery_messages import Halted
-from onboard.core.remedies import reason_words, remedy
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.messages import Halted
+from onboard.holon.remedies import reason_words, remedy
 from onboard.operate.park import Park
 
 _STATES = {

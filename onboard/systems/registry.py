@@ -9,8 +9,8 @@ from functools import partial
 from types import ModuleType
 
 from onboard import systems
+from onboard.contract.codes import KindCode
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import KindCode
 from onboard.core.journal_records import Entry
 from onboard.core.journal_state import JournalCondition, condition_of
 from onboard.core.site import Site

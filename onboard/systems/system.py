@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from onboard.contract.codes import KindCode
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import KindCode
 from onboard.core.journal_records import RecordTypes
 
 

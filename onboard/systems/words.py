@@ -6,8 +6,9 @@ its system has none, the words are neutral ones: numbers as the bus has them.
 
 from collections.abc import Callable, Mapping
 
-from onboard.core.codes import ANY_STATION, NOBODY, OUTSIDE, Criterion, Operation, Reason, TaskPhase, TokenKind
-from onboard.core.messages import CallForProposals, Message, Reference
+from onboard.contract.codes import Criterion, Operation, Reason, TaskPhase, TokenKind
+from onboard.contract.constants import ANY_STATION, NOBODY, OUTSIDE
+from onboard.contract.messages import CallForProposals, Message, Reference
 from onboard.core.site import Segment, Site, Station
 from onboard.systems.registry import part
 

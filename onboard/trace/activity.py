@@ -8,16 +8,9 @@ from collections import Counter
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from onboard.core.codes import ANY_STATION, CallResult, Grade, KindCode, LegAction, Operation, TaskPhase
-from onboard.core.messages import (
-    CarAt,
-    Itinerary,
-    Message,
-    Progress,
-    Reference,
-    TaskReport,
-    Waiting,
-)
+from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, Operation, TaskPhase
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CarAt, Itinerary, Message, Progress, Reference, TaskReport, Waiting
 from onboard.core.site import Segment, Site
 from onboard.history.calls import Call, CallAnswered
 from onboard.history.history import Fact

@@ -7,8 +7,8 @@ for a part of it (a ride) are sub-calls.
 from collections import Counter
 from dataclasses import dataclass, field
 
-from onboard.core.codes import CallResult, Grade, LegAction, Operation, TaskPhase
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Stamp, Waiting
+from onboard.contract.codes import CallResult, Grade, LegAction, Operation, TaskPhase
+from onboard.contract.messages import CallForProposals, Itinerary, Leg, Message, Stamp, Waiting
 from onboard.core.serial import ms_after
 from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
 from onboard.history.history import Fact, History

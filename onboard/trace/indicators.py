@@ -4,8 +4,8 @@ from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import BusTime, Heartbeat, Message
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
 from onboard.history.history import Fact, History
 from onboard.trace.activity import Activities, Activity, Body

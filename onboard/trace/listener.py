@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from onboard.core.codes import Reason
-from onboard.core.messages import Message
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Message
 from onboard.trace.raw import RawFrame
 from onboard.wire.codec import Codecs
 from onboard.wire.decoder import Decoder

@@ -6,21 +6,13 @@ simulated one or a recorded log alike.
 
 from collections import Counter, deque
 
-from onboard.core.codes import (
-    ANY_STATION,
-    OUTSIDE,
-    STILL,
-    CallResult,
-    Grade,
-    ManualMode,
-    Operation,
-    Reason,
-    TaskPhase,
-)
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, Grade, ManualMode, Operation, Reason, TaskPhase
+from onboard.contract.constants import ANY_STATION, OUTSIDE, STILL
+from onboard.contract.messages import (
     Blocked,
     CarAt,
     Clear,
+    Halted,
     Heartbeat,
     Itinerary,
     ManualState,
@@ -29,7 +21,6 @@ from onboard.core.messages import (
     Reference,
     Waiting,
 )
-from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment, Site
 from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
 from onboard.history.history import Fact, History

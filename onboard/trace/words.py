@@ -9,8 +9,8 @@ from dataclasses import fields
 from enum import IntEnum
 from functools import cache
 
-from onboard.core.codes import Criterion
-from onboard.core.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
+from onboard.contract.codes import Criterion
+from onboard.contract.messages import Bid, CallForProposals, Leg, Message, Reference, Stamp
 from onboard.core.site import Site
 from onboard.systems.words import plain, words_of
 

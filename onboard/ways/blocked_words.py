@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from onboard.contract.messages import Blocked, Clear
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Blocked, Clear
 from onboard.core.records import BlockedRecord, ClearRecord
 from onboard.ways.obstacles import Obstacles
 from onboard.ways.site import WaySite

@@ -8,9 +8,9 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.messages import CarAt, Reference
 from onboard.core.authority import TokenBook
-from onboard.core.codes import Reason, TokenKind
-from onboard.core.messages import CarAt, Reference
 from onboard.core.serial import is_newer
 from onboard.core.token_keys import TokenKey
 from onboard.ways.tokens import car_token

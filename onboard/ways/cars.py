@@ -8,11 +8,12 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import CarAt, Message, Reference
 from onboard.core.authority import TokenBook
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Record
-from onboard.core.messages import CarAt, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.records import RetiredRecord
 from onboard.core.serial import is_newer

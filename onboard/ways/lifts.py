@@ -5,7 +5,7 @@ it holds the gate, and the lift moves only while it holds it itself, so nothing 
 the platform moves. On an alley's axis the platform is the position before index 1 or behind the last.
 """
 
-from onboard.core.messages import Progress
+from onboard.contract.messages import Progress
 from onboard.core.site import Segment
 from onboard.ways.site import WaySite
 

@@ -4,10 +4,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.constants import MOBILE_KINDS, NOBODY
+from onboard.contract.messages import Blocked, Clear, Itinerary, Message, Progress
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import MOBILE_KINDS, NOBODY, Reason, TokenKind
 from onboard.core.effects import Effect
-from onboard.core.messages import Blocked, Clear, Itinerary, Message, Progress
 from onboard.core.mirror import Mirror
 from onboard.core.serial import reread_us
 from onboard.core.site import Machine, Segment, Station

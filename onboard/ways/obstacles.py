@@ -8,8 +8,9 @@ on the bus (``Blocked``) until another clears it. What is known here steers plan
 from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import MOBILE_KINDS, Reason
-from onboard.core.messages import Blocked, Clear, Progress
+from onboard.contract.codes import Reason
+from onboard.contract.constants import MOBILE_KINDS
+from onboard.contract.messages import Blocked, Clear, Progress
 from onboard.core.mirror import Obstacle
 from onboard.core.site import Machine, Segment
 from onboard.ways.lifts import PLATFORM_INDEX, lift_at, platform

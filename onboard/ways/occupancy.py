@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
-from onboard.core.codes import LegAction
-from onboard.core.messages import Itinerary, Leg
+from onboard.contract.codes import LegAction
+from onboard.contract.messages import Itinerary, Leg
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment
 from onboard.ways.kinematics import Run, ceil_ms, cleared_at_us, run_duration_us, time_at_us

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from onboard.core.messages import Itinerary, Leg
+from onboard.contract.messages import Itinerary, Leg
 from onboard.core.serial import from_bus_ms
 from onboard.ways.occupancy import leg_begins_us
 

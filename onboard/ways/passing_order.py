@@ -14,8 +14,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import NOBODY, LegAction, Reason
-from onboard.core.messages import Itinerary, Leg, Progress
+from onboard.contract.codes import LegAction, Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Itinerary, Leg, Progress
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment
 from onboard.ways.occupancy import body_mm, leg_windows

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from functools import lru_cache
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.ways.reach import passages
 from onboard.ways.site import TrackKind, WaySite

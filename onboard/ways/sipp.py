@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from heapq import heappop, heappush
 from typing import NamedTuple
 
-from onboard.core.codes import LegAction
+from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
 from onboard.ways.departures import Departures
 from onboard.ways.kinematics import ceil_ms

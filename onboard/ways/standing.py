@@ -7,8 +7,9 @@ the end only its place counts.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, ManualMode
-from onboard.core.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
+from onboard.contract.codes import Grade, LegAction, ManualMode
+from onboard.contract.constants import MOBILE_KINDS
+from onboard.contract.messages import Itinerary, Leg, ManualOrder, Message, Progress, TaskReport, TokenRequest, Waiting
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment
 from onboard.ways.occupancy import final_position, turned_in

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from onboard.core.codes import TokenKind
+from onboard.contract.codes import TokenKind
 from onboard.core.site import Segment
 from onboard.core.token_keys import TokenKey, segment_token, station_token
 from onboard.ways.lifts import GATE_INDEX, PLATFORM_INDEX

@@ -7,9 +7,9 @@ What is drawn of a system, and its words, are its scene's (``onboard.trace.scene
 from collections import deque
 from typing import Any
 
-from onboard.core.codes import CallResult, Criterion, Reason, TaskPhase
+from onboard.contract.codes import CallResult, Criterion, Reason, TaskPhase
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.history.calls import Call
 from onboard.history.history import Fact

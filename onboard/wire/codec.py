@@ -9,10 +9,8 @@ from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 from onboard.contract.base import FrameCode
-from onboard.contract.packing import calls, device, plans, presence, rights
-from onboard.core.codes import Grade, Reason
-from onboard.core.frame import Frame
-from onboard.core.messages import (
+from onboard.contract.codes import Grade, Reason
+from onboard.contract.messages import (
     Call,
     CallForProposals,
     CallLoad,
@@ -23,6 +21,8 @@ from onboard.core.messages import (
     ItineraryLeg,
     Message,
 )
+from onboard.contract.packing import calls, device, plans, presence, rights
+from onboard.core.frame import Frame
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.wire.speakers import speakers_of
 

@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from onboard.contract.base import SetFrame
-from onboard.core.codes import Grade, Reason
-from onboard.core.frame import Frame
-from onboard.core.messages import (
+from onboard.contract.codes import Grade, Reason
+from onboard.contract.messages import (
     NO_REFERENCE,
     Call,
     CallForProposals,
@@ -20,6 +19,7 @@ from onboard.core.messages import (
     Leg,
     Message,
 )
+from onboard.core.frame import Frame
 from onboard.core.serial import BUS_MS_MODULUS
 from onboard.core.site import Machine
 from onboard.wire.codec import NO_WHEELBASE_MM, Codec

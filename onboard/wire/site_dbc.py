@@ -6,7 +6,8 @@ does not. Text is templated, as cantools' own writer reorders signals and drops 
 
 from collections.abc import Iterable, Iterator
 
-from onboard.core.codes import MAX_NODE_ID, KindCode
+from onboard.contract.codes import KindCode
+from onboard.contract.constants import MAX_NODE_ID
 from onboard.core.site import Machine, Site
 from onboard.wire.dbc_file import MessageLayout, SignalLayout, device_layouts, fleet_layouts, system_layouts
 from onboard.wire.speakers import GATEWAY, is_in

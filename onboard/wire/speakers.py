@@ -3,8 +3,9 @@
 from collections.abc import Iterable, Mapping
 
 from onboard.contract.base import FrameCode
-from onboard.core.codes import MAX_NODE_ID, KindCode, Reason
-from onboard.core.messages import EmergencyStop, Message, Speakers
+from onboard.contract.codes import KindCode, Reason
+from onboard.contract.constants import MAX_NODE_ID, Speakers
+from onboard.contract.messages import EmergencyStop, Message
 from onboard.core.site import Machine
 
 #: The node of the fleet contract that stands for people's tools and bridges to other buses.

@@ -7,8 +7,8 @@ from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
+from onboard.contract.messages import Message
 from onboard.core.effects import Effect
-from onboard.core.messages import Message
 from onboard.core.motion_authority import Permit
 from onboard.core.serial import successor
 

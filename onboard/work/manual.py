@@ -8,10 +8,10 @@ started again, since whoever held it may stand before it.
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import ManualMode
+from onboard.contract.codes import ManualMode
+from onboard.contract.messages import ManualOrder, ManualState
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import ManualOrder, ManualState
 from onboard.core.records import ManualRecord
 
 

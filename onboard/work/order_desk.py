@@ -9,12 +9,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import ClassVar, Generic, TypeVar
 
+from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.contract.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord
-from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.negotiation import CallTerms, Closed, NegotiationEvent
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.work.order_life import NEXT, OrderEvent, OrderState, WorkOrder

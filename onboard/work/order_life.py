@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from enum import Enum
 
-from onboard.core.codes import NOBODY
-from onboard.core.messages import Reference
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Reference
 
 
 class OrderState(Enum):

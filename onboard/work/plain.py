@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
+from onboard.contract.codes import KindCode, MachineState, Reason
+from onboard.contract.messages import CallForProposals, Message
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect
-from onboard.core.messages import CallForProposals, Message
 from onboard.core.negotiation import NegotiationEvent, Proposal
 
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Generic, TypeVar
 
+from onboard.contract.codes import CallResult, Reason, TaskPhase
+from onboard.contract.messages import Award, CallForProposals, Message, Reference, TaskReport
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import CallResult, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import MOST_OVER
-from onboard.core.messages import Award, CallForProposals, Message, Reference, TaskReport
 
 #: Of these the newest so many are told again to whoever asks for all.
 MOST_TOLD = 32

@@ -11,7 +11,7 @@ from bus_sim.attacks.trials import Plan, run_attack
 from bus_sim.cli import main
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.orders import Orders
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 from onboard.holon.admission import Admission
 from tests.mapd.sites import drawn, site_text
 

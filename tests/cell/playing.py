@@ -11,8 +11,8 @@ from bus_sim.sites import find_site
 from bus_sim.systems.cell.plant import CellPlant, Entry
 from bus_sim.systems.cell.view import CellView
 from bus_sim.systems.stage import Stage
-from onboard.core.codes import KindCode
-from onboard.core.messages import Message
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import Message
 from onboard.core.site import Machine, Segment
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point

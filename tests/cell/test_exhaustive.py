@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from bus_sim.systems.cell.tree import ContractTree
-from onboard.core.messages import Reference
+from onboard.contract.messages import Reference
 from onboard.systems.cell.contracts import Arm, Filter, Goal
 from onboard.systems.cell.geometry import Area, Point, crosses, shortest_way, way_length_m
 

@@ -4,9 +4,9 @@ import pytest
 
 from bus_sim.options import RunOptions
 from bus_sim.session import play
-from onboard.core.messages import Bid, CallForProposals, Message, Reference
+from onboard.contract.cell import ArmPhase, ArmProgress, GoalPath, PartAt
+from onboard.contract.messages import Bid, CallForProposals, Message, Reference
 from onboard.systems.cell.checks import RULES
-from onboard.systems.cell.messages import ArmPhase, ArmProgress, GoalPath, PartAt
 from tests.cell.playing import cell, wish
 from tests.faults.systems import judged, withstands
 

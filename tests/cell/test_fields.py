@@ -4,9 +4,10 @@ from math import inf, nan
 
 import pytest
 
-from onboard.core.messages import Reference
+from onboard.contract.cell import OfferHigh, OfferLow, OfferNodes
+from onboard.contract.messages import Reference
+from onboard.systems.cell.fields import from_halves, halves
 from onboard.systems.cell.goal_frames import Hearsay
-from onboard.systems.cell.messages import OfferHigh, OfferLow, OfferNodes, from_halves, halves
 
 
 @pytest.mark.parametrize("value", [65.2119063886405, 0.1, 0.0, 1e300, 5e-324])

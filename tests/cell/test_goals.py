@@ -7,10 +7,11 @@ import pytest
 
 from bus_sim.run import BusRun
 from bus_sim.systems.cell.tree import ContractTree
-from onboard.core.messages import Bid, CallForProposals, Reference, TaskReport
+from onboard.contract.cell import ArmProgress, PartAt
+from onboard.contract.codes import OrderResult
+from onboard.contract.messages import Bid, CallForProposals, Reference, TaskReport
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.geometry import Area, distance_m
-from onboard.systems.cell.messages import ArmProgress, OrderResult, PartAt
 from tests.cell.playing import Scene, cell, wish
 from tests.cell.witness import ARMS, DESK, arm, metres
 

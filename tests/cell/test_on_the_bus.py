@@ -6,22 +6,13 @@ import pytest
 
 from bus_sim.systems.cell.plant import CellPlant
 from bus_sim.systems.cell.show import plan
-from onboard.core.codes import CallResult, Criterion, KindCode, Operation, TaskPhase
-from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.contract.cell import ArmPhase, ArmProgress, GoalPath, GoalStart, GoalTerms, OfferNodes, PartAt
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, OrderResult, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.holon.holon import Holon
+from onboard.systems.cell.fields import nodes_of
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.memory import undertakings
-from onboard.systems.cell.messages import (
-    ArmPhase,
-    ArmProgress,
-    GoalPath,
-    GoalStart,
-    GoalTerms,
-    OfferNodes,
-    OrderResult,
-    PartAt,
-    nodes_of,
-)
 from tests.cell.playing import Scene, cell
 from tests.cell.witness import DESK, GOAL, metres
 

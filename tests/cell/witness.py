@@ -1,6 +1,6 @@
 """The witness geometry of the paper's printed run (Panescu, Miron 2006, Fig. 5): 1 in the paper is 1 m here."""
 
-from onboard.core.messages import Reference
+from onboard.contract.messages import Reference
 from onboard.systems.cell.contracts import Arm, Goal
 from onboard.systems.cell.geometry import Area, Point
 

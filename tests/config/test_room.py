@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.config.site import parse_site
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.car_park.site import car_park
 from onboard.ways.refuges import open_refuges
 from tests.config.support import problems_of

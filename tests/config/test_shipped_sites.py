@@ -3,7 +3,7 @@
 import pytest
 
 from bus_sim.sites import find_site, site_names
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.occupancy import standing_segments

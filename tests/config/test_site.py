@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from onboard.config.site import load_site, parse_site, site_digest
-from onboard.core.codes import KindCode, Side
+from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.site import car_park
 from onboard.ways.site import Axis, Track, TrackKind, way_site

@@ -11,9 +11,9 @@ import dbc
 from dbc import device_dbc_text, fleet_dbc_text, system_dbc_text, systems
 from onboard.contract import constants
 from onboard.contract.base import OutOfRangeError
+from onboard.contract.codes import Reason
 from onboard.contract.generate.model import ContractError, read_contract
 from onboard.contract.generate.modules import contracts, generated
-from onboard.core.codes import Reason
 from onboard.core.frame import Frame
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import SignalLayout, read_annotations, read_layouts

@@ -8,10 +8,10 @@ from bus_sim.run import run_until
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import build
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
+from onboard.contract.messages import Message, SyncRequest
 from onboard.controller.shell import Controller
 from onboard.core.effects import Effect, Record, Renew, Send
 from onboard.core.journal_state import JournalState
-from onboard.core.messages import Message, SyncRequest
 from onboard.core.records import BootRecord
 from onboard.ports.journal import Entry
 

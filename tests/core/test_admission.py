@@ -2,13 +2,21 @@
 
 import pytest
 
-from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, OperatorAction, Reason, TokenKind
-from onboard.core.effects import Report, Send
-from onboard.core.messages import (
+from onboard.contract.codes import (
+    CONTRACT_VERSION,
+    KindCode,
+    MachineState,
+    ManualMode,
+    OperatorAction,
+    Reason,
+    TokenKind,
+)
+from onboard.contract.messages import (
     Blocked,
     BusTime,
     Clear,
     Diagnostic,
+    Go,
     Heartbeat,
     ManualOrder,
     Message,
@@ -17,7 +25,7 @@ from onboard.core.messages import (
     SyncRequest,
     TokenHeld,
 )
-from onboard.core.recovery_messages import Go
+from onboard.core.effects import Report, Send
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import way_mirror

@@ -1,8 +1,8 @@
 """What is to last for a while is not over because a clock has jumped."""
 
 from bus_sim.sites import find_site
-from onboard.core.codes import KindCode, Reason
-from onboard.core.messages import BusTime, EmergencyStop
+from onboard.contract.codes import KindCode, Reason
+from onboard.contract.messages import BusTime, EmergencyStop
 from onboard.holon.holding import STOP_LASTS_US, Hold
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for

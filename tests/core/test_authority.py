@@ -6,12 +6,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.messages import (
+    Message,
+    TokenDispute,
+    TokenGiven,
+    TokenGrant,
+    TokenHeld,
+    TokenRefusal,
+    TokenRequest,
+    TokenSeen,
+)
 from onboard.core.authority import MAX_VERSION, TokenBook, TokenKey, segment_token
-from onboard.core.codes import Reason, TokenKind
 from onboard.core.effects import Effect, Record, Report
-from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRefusal, TokenRequest
 from onboard.core.motion_authority import MotionAuthority, authorised
-from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
 from onboard.ways.tokens import car_token
 from tests.core.token_words import hear, said

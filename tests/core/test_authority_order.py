@@ -3,8 +3,8 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from onboard.core.codes import Reason
-from onboard.core.messages import SyncRequest, TokenRefusal
+from onboard.contract.codes import Reason
+from onboard.contract.messages import SyncRequest, TokenRefusal
 from onboard.ways.mirror import way_mirror
 from tests.core.walkers import Alley
 

@@ -1,8 +1,8 @@
 """What waits for an answer is said again ever later; a return begins anew."""
 
+from onboard.contract.constants import NOBODY
 from onboard.core.authority import Claim, TokenBook, segment_token
 from onboard.core.backoff import LONGEST_REPEATS, QUICK, BackOff
-from onboard.core.codes import NOBODY
 from onboard.core.effects import Send
 from onboard.core.site import Segment
 from tests.sites import one_floor

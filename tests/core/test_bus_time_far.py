@@ -1,10 +1,10 @@
 """A clock that is far off is lost, not slewed for hours; the next message that says the same sets it."""
 
 from bus_sim.sites import find_site
+from onboard.contract.codes import Reason
+from onboard.contract.messages import BusTime
 from onboard.core.bus_time import BUS_TIME_MODULUS, FAR_US, MAX_SLEW_US, BusClock
-from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import BusTime
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 

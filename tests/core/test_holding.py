@@ -2,7 +2,8 @@
 
 import pytest
 
-from onboard.core.codes import NOBODY, Reason
+from onboard.contract.codes import Reason
+from onboard.contract.constants import NOBODY
 from onboard.holon.holding import QUIET_BEATS, STOP_LASTS_US, TWIN_BEATS, Hold, Holding, Outcome
 
 ME, OTHER = 11, 12

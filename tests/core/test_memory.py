@@ -2,11 +2,11 @@
 
 import pytest
 
+from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason, TokenKind
+from onboard.contract.constants import OUTSIDE
+from onboard.contract.messages import CarAt, Halted, Heartbeat, Reference, SyncRequest, TokenGrant, TokenHeld
 from onboard.core.authority import segment_token
-from onboard.core.codes import CONTRACT_VERSION, OUTSIDE, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Report, Send
-from onboard.core.messages import CarAt, Heartbeat, Reference, SyncRequest, TokenGrant, TokenHeld
-from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import pytest
 
 from bus_sim.sites import find_site
+from onboard.contract.codes import KindCode, LightColour, Reason
+from onboard.contract.messages import DriveOrder, EmergencyStop, LightOrder, SyncRequest
 from onboard.core.authority import TokenBook, TokenKey, segment_token
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import KindCode, LightColour, Reason
 from onboard.core.effects import Actuate, Effect, Halt, Tell
-from onboard.core.messages import DriveOrder, EmergencyStop, LightOrder, SyncRequest
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import ALONE, MotionAuthority, Permit, authorised
 from onboard.core.negotiation import Estimator

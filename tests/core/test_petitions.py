@@ -1,9 +1,9 @@
 """Open requests: remembered by the holder, oldest first, all tokens or none where no order is agreed."""
 
+from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.messages import TokenGrant, TokenRefusal, TokenRequest
 from onboard.core.authority import REFUSED_REPEATS, Claim, TokenBook, TokenKey, segment_token
-from onboard.core.codes import Reason, TokenKind
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import TokenGrant, TokenRefusal, TokenRequest
 from onboard.core.petitions import UNORDERED, Petitions
 from onboard.core.site import Segment
 from onboard.ways.all_or_none import PATIENCE_REPEATS, AllOrNone

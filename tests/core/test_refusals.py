@@ -1,9 +1,9 @@
 """Only who holds a token can refuse it; a word of anybody else keeps nobody from asking."""
 
+from onboard.contract.codes import Reason
+from onboard.contract.messages import TokenRefusal
 from onboard.core.authority import TokenBook, segment_token
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import Reason
-from onboard.core.messages import TokenRefusal
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Negotiation
 from onboard.core.site import Segment

@@ -2,7 +2,7 @@
 
 import pytest
 
-from onboard.core.messages import Reference, Stamp
+from onboard.contract.messages import Reference, Stamp
 from onboard.core.serial import BUS_MS_MODULUS, away, from_bus_ms, ms_after, ranks_before, to_bus_ms
 from onboard.systems.cell.contracts import NO_LIMIT, Urgency
 

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, replace
 import pytest
 
 from bus_sim.sites import find_site
+from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
+from onboard.contract.messages import Halted, Heartbeat, Message
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, Reason
 from onboard.core.effects import Effect
-from onboard.core.messages import Heartbeat, Message
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
-from onboard.core.recovery_messages import Halted
 from onboard.core.site import Machine, Site
 from onboard.holon.holon import Holon
 from onboard.work.plain import NoEstimator, Plain

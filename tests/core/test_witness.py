@@ -2,12 +2,22 @@
 
 import pytest
 
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.messages import (
+    Halted,
+    Message,
+    SyncDone,
+    SyncRequest,
+    TokenDispute,
+    TokenGiven,
+    TokenGrant,
+    TokenHeld,
+    TokenRequest,
+    TokenSeen,
+)
 from onboard.core.authority import TokenBook, segment_token
-from onboard.core.codes import MachineState, Reason
 from onboard.core.effects import Effect
-from onboard.core.messages import Message, SyncRequest, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.mirror import Mirror, Peer
-from onboard.core.recovery_messages import Halted, SyncDone, TokenDispute, TokenGiven, TokenSeen
 from onboard.core.site import Segment
 from onboard.holon.witness import ANSWER_PERIOD_US, Witness
 from tests.core.token_words import said

@@ -1,10 +1,9 @@
 """Words about tokens to one book, as the controller hands them on: for tests that play a bus of their own."""
 
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Message, TokenDispute, TokenGiven, TokenGrant, TokenHeld, TokenRequest, TokenSeen
 from onboard.core.authority import TokenBook
-from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Message, TokenGrant, TokenHeld, TokenRequest
-from onboard.core.recovery_messages import TokenDispute, TokenGiven, TokenSeen
 
 
 def hear(book: TokenBook, message: Message, now_us: int, verdict: Reason = Reason.NONE) -> list[Effect]:

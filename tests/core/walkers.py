@@ -9,20 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from onboard.config.site import parse_site
+from onboard.contract.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
+from onboard.contract.messages import DriveState, Itinerary, Leg, Message, Progress, Stamp, SyncRequest, TokenRequest
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, MachineState, Reason, Side
 from onboard.core.effects import Effect, Halt, Record, Send
-from onboard.core.messages import (
-    DriveState,
-    Itinerary,
-    Leg,
-    Message,
-    Progress,
-    Stamp,
-    SyncRequest,
-    TokenRequest,
-)
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.serial import successor, to_bus_ms

@@ -19,10 +19,9 @@ from deploy.package import build_package
 from deploy.wheels import PINS, DeployError, pinned_wheels
 from onboard.cli import main as onboard_main
 from onboard.config.machine import load_machine
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
+from onboard.contract.messages import EmergencyStop, Halted, Heartbeat, Message
 from onboard.core.frame import Frame
-from onboard.core.messages import EmergencyStop, Heartbeat, Message
-from onboard.core.recovery_messages import Halted
 from onboard.io.endings import Ending
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from deploy.reasons import ADVICE, table
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 
 README = Path(__file__).parents[2] / "deploy" / "README.md"
 

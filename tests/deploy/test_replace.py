@@ -10,8 +10,8 @@ import pytest
 from deploy.__main__ import main
 from deploy.image.layer import FILES
 from onboard.config.machine import load_machine
-from onboard.core.codes import MachineState
-from onboard.core.messages import Heartbeat, Message
+from onboard.contract.codes import MachineState
+from onboard.contract.messages import Heartbeat, Message
 from onboard.core.site import journal_owner
 from onboard.io.journal import FILE_NAME, FileJournal
 from onboard.io.open_bus import BusSettings, open_bus

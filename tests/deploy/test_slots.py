@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from deploy.update.health import HEARTBEATS, Health, frame_of
 from deploy.update.slots import ATTEMPTS, SLOTS, STATE_BYTES, Event, Slots, after, from_block, other, to_block
-from onboard.core.codes import KindCode, MachineState
+from onboard.contract.codes import KindCode, MachineState
+from onboard.contract.messages import Heartbeat
 from onboard.core.frame import Frame
-from onboard.core.messages import Heartbeat
 from onboard.wire.codec import fleet_codec
 
 GRUB = Path(__file__).parents[2] / "deploy" / "image" / "files" / "grub.cfg"

@@ -8,7 +8,7 @@ from bus_sim.campaign.profiles import draw_faults
 from bus_sim.campaign.report import Report, Verdict
 from bus_sim.campaign.trial import play
 from bus_sim.faults.scenario import Scenario
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.core.site import Site
 from onboard.trace.check.checks import Checks
 from onboard.trace.check.checks import Verdict as CheckVerdict

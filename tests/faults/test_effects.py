@@ -7,11 +7,10 @@ import pytest
 
 from bus_sim.systems.car_park.plant.customer import Outcome, State
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import DeskInput, DoorName, DoorPosition, MachineState, Reason
+from onboard.contract.codes import DeskInput, DoorName, DoorPosition, MachineState, Reason
+from onboard.contract.messages import DeskEvent, DriveOrder, DriveState, Halted, Heartbeat
 from onboard.core.frame import Frame
 from onboard.core.journal_state import JournalState
-from onboard.core.messages import DeskEvent, DriveOrder, DriveState, Heartbeat
-from onboard.core.recovery_messages import Halted
 from onboard.ports.bus import ErrorState
 from tests.faults.world import Seen, watch
 

@@ -9,10 +9,9 @@ from bus_sim.faults.injection import Injection
 from bus_sim.run import FLEET
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import CallResult, Reason, TokenKind
+from onboard.contract.codes import CallResult, Reason, TokenKind
+from onboard.contract.messages import Award, Diagnostic, Go, Halted, Heartbeat, Message, Reference, TokenGrant
 from onboard.core.frame import Frame
-from onboard.core.messages import Award, Diagnostic, Heartbeat, Message, Reference, TokenGrant
-from onboard.core.recovery_messages import Go, Halted
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
 

@@ -10,8 +10,8 @@ from bus_sim.faults.injection import parse_injection
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop, run
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.wire.codec import device_codec
 from onboard.wire.decoder import Decoder
 from tests.sites import one_floor

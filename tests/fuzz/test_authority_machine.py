@@ -4,10 +4,10 @@ from hypothesis import Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, rule
 
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Message
 from onboard.core.authority import TokenBook, TokenKey, segment_token, station_token
-from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import Message
 from onboard.core.site import Segment
 from tests.core.token_words import hear
 from tests.sites import one_floor

@@ -7,7 +7,7 @@ import pytest
 
 from bus_sim.campaign.fuzz import Fuzzer
 from bus_sim.sites import find_site
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 from tests.mapd.sites import drawn, made
 
 FRAMES = 20_000

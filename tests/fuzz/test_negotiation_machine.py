@@ -4,9 +4,9 @@ from hypothesis import Phase, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import Award, Message
 from onboard.core.effects import Send
-from onboard.core.messages import Award, Message
 from onboard.core.negotiation import Awarded, Negotiation
 from onboard.core.negotiation.negotiation import Outcome
 from tests.core.negotiation.fleet import CALLER, START_US, TIMING, Costs, terms

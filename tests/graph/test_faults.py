@@ -7,17 +7,9 @@ import pytest
 
 from bus_sim.cli import main as bus_sim
 from onboard.cli import main as onboard
-from onboard.core.messages import Message
+from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, RobotMode, TurnSignal
+from onboard.contract.messages import Message
 from onboard.systems.graph.checks import RULES
-from onboard.systems.graph.messages import (
-    EdgeNotice,
-    EdgeState,
-    NodeAnswer,
-    NodeVerdict,
-    RobotAt,
-    RobotMode,
-    TurnSignal,
-)
 from tests.faults.systems import judged, withstands
 from tests.graph.sites import busy_orders, hall, made
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from onboard.systems.graph.messages import NodeAnswer, NodeVerdict, VisitList, five, stops_of
+from onboard.contract.graph import NodeAnswer, NodeVerdict, VisitList
+from onboard.systems.graph.fields import five, stops_of
 from onboard.wire.codec import codecs
 from tests.wire.samples import frames_of
 

@@ -12,22 +12,21 @@ from bus_sim.session import play
 from bus_sim.sites import find_site
 from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.stage import Stage
-from onboard.controller.shell import Controller
-from onboard.core.codes import KindCode, TokenKind
-from onboard.core.messages import Bid, CallForProposals, Message, TokenGrant
-from onboard.systems.graph.checks import RULES
-from onboard.systems.graph.messages import (
+from onboard.contract.codes import KindCode, OrderResult, TokenKind
+from onboard.contract.graph import (
     BodyPlace,
     EdgeNotice,
     EdgeState,
     NodeAnswer,
     NodeVerdict,
-    OrderResult,
     RobotAt,
     RobotMode,
     TurnSignal,
     VisitList,
 )
+from onboard.contract.messages import Bid, CallForProposals, Message, TokenGrant
+from onboard.controller.shell import Controller
+from onboard.systems.graph.checks import RULES
 from onboard.systems.graph.network import Graph, complete, ring
 from onboard.systems.graph.robot import GraphRobot
 from onboard.systems.graph.rules import Rules

@@ -16,8 +16,8 @@ from hil.commission.setting import Setting
 from hil.commission.walk import walk
 from hil.play import stop_fleet
 from onboard.config.site import parse_site
-from onboard.core.codes import CONTRACT_VERSION
-from onboard.core.messages import DriveOrder, Message
+from onboard.contract.codes import CONTRACT_VERSION
+from onboard.contract.messages import DriveOrder, Message
 from onboard.core.site import Site
 from tests.hil.bench_files import BENCHES
 

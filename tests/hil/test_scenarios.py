@@ -12,10 +12,10 @@ from hil.play import Outcome, play
 from hil.scenarios.registry import SCENARIOS
 from hil.scenarios.scenario import Scenario
 from hil.simulated_device import SimulatedDevice
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Bid, Diagnostic, DriveOrder, Heartbeat, Message
 from onboard.controller.shell import Controller
-from onboard.core.codes import Reason
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import Bid, Diagnostic, DriveOrder, Heartbeat, Message
 from tests.hil.bench_files import simulated
 
 #: Makes another effect, or none, of what the device does.

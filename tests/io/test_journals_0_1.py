@@ -10,22 +10,21 @@ from pathlib import Path
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import Reason, TaskPhase
+from onboard.contract.cell_device import OrderAnswer
+from onboard.contract.codes import Reason, TaskPhase
+from onboard.contract.graph_device import VisitAnswer
+from onboard.contract.messages import CarAt, Message, Reference, TaskReport, TokenGiven
+from onboard.contract.terminal import PlanStep
+from onboard.contract.turning_device import JobAnswer
 from onboard.core.effects import Actuate, Send
 from onboard.core.journal_records import Entry
 from onboard.core.journal_state import JournalState
-from onboard.core.messages import CarAt, Message, Reference, TaskReport
 from onboard.core.records import next_boot
-from onboard.core.recovery_messages import TokenGiven
 from onboard.core.site import journal_owner
 from onboard.holon.holon import Holon
 from onboard.io.journal import FileJournal
-from onboard.systems.cell.messages import OrderAnswer
-from onboard.systems.graph.messages import VisitAnswer
 from onboard.systems.registry import condition_for, factory_for
 from onboard.systems.terminal.desk import Desk
-from onboard.systems.terminal.messages import PlanStep
-from onboard.systems.turning.messages import JobAnswer
 
 FOLDER = Path(__file__).parent / "journals_0_1"
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 from onboard.io.endings import Ending, ending_of
 from onboard.io.lives import HEALTHY_US, LIMIT, LastLife, Lives
 

@@ -2,18 +2,9 @@
 
 from collections.abc import Mapping
 
-from onboard.core.codes import (
-    ANY_STATION,
-    Criterion,
-    DriveMode,
-    KindCode,
-    MachineState,
-    Operation,
-    ShuttleMode,
-    Side,
-)
-from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import (
+from onboard.contract.codes import Criterion, DriveMode, KindCode, MachineState, Operation, ShuttleMode, Side
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import (
     BusTime,
     CallForProposals,
     DriveOrder,
@@ -24,6 +15,7 @@ from onboard.core.messages import (
     Reference,
     ShuttleState,
 )
+from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.program import Handling, Work

@@ -4,10 +4,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from onboard.core.authority import station_token
-from onboard.core.codes import (
-    ANY_STATION,
-    OUTSIDE,
+from onboard.contract.codes import (
     DeskInput,
     DeskText,
     DoorPosition,
@@ -20,8 +17,8 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Effect, Record, Send, Tell
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import (
     BayState,
     BusTime,
     CallForProposals,
@@ -31,6 +28,7 @@ from onboard.core.messages import (
     DoorState,
     DriveState,
     EmergencyStop,
+    Go,
     Message,
     Reference,
     ShuttleState,
@@ -39,8 +37,9 @@ from onboard.core.messages import (
     TokenGrant,
     TokenHeld,
 )
+from onboard.core.authority import station_token
+from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.negotiation.winners import LOST_AFTER_US
-from onboard.core.recovery_messages import Go
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.bay_memory import winner_record

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import pytest
 
+from onboard.contract.codes import KindCode, LegAction, TokenKind
+from onboard.contract.messages import CallForProposals, Itinerary, Stamp, TokenGrant, TokenHeld
 from onboard.core.authority import TokenBook
-from onboard.core.codes import KindCode, LegAction, TokenKind
-from onboard.core.messages import CallForProposals, Itinerary, Stamp, TokenGrant, TokenHeld
 from onboard.core.negotiation import Negotiation, Proposal
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.car_park.giving_way import Answer, GivingWay

@@ -1,8 +1,8 @@
 """A plan that is late is told later, but not by time that nobody needs."""
 
 from bus_sim.sites import find_site
-from onboard.core.codes import LegAction
-from onboard.core.messages import Stamp
+from onboard.contract.codes import LegAction
+from onboard.contract.messages import Stamp
 from onboard.core.site import Segment
 from onboard.systems.car_park.program import Program, Step
 from onboard.ways.site import way_site

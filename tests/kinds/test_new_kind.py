@@ -14,10 +14,10 @@ from bus_sim.options import RunOptions
 from bus_sim.run import BusRun, buses_of
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.contract.codes import Criterion, KindCode, Operation, TaskPhase
+from onboard.contract.messages import NO_REFERENCE, Award, Bid, Message, Reference, TaskReport
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import Criterion, KindCode, Operation, TaskPhase
 from onboard.core.effects import Effect
-from onboard.core.messages import NO_REFERENCE, Award, Bid, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Segment, Site

@@ -1,9 +1,9 @@
 """A place is one robot's: who has lost its place to another leaves its car elsewhere, and nobody brings a second."""
 
+from onboard.contract.codes import Grade, KindCode, LegAction, Reason, ShuttleMode
+from onboard.contract.messages import CarAt, Itinerary, Reference, Stamp
 from onboard.core.authority import station_token
-from onboard.core.codes import Grade, KindCode, LegAction, Reason, ShuttleMode
 from onboard.core.effects import Record
-from onboard.core.messages import CarAt, Itinerary, Reference, Stamp
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.program import Handling, Step, Work, to_itinerary

@@ -1,7 +1,7 @@
 """A robot that has failed waits for a person, and does nothing meanwhile but say what it gives back."""
 
-from onboard.core.codes import DriveMode, KindCode, MachineState, ShuttleMode, Side
-from onboard.core.messages import BusTime, DriveState, ShuttleState
+from onboard.contract.codes import DriveMode, KindCode, MachineState, ShuttleMode, Side
+from onboard.contract.messages import BusTime, DriveState, ShuttleState
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from tests.sites import one_floor

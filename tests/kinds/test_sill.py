@@ -1,11 +1,8 @@
 """A sill is crossed on the gate and the lift's word under that gate: never on an earlier word, a plan or a clock."""
 
 from bus_sim.sites import find_site
-from onboard.core.authority import segment_token
-from onboard.core.behaviour import Fleet
-from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, Reason, ShuttleMode, Side, TokenKind
-from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import (
+from onboard.contract.codes import DriveMode, Grade, KindCode, LegAction, Reason, ShuttleMode, Side, TokenKind
+from onboard.contract.messages import (
     BusTime,
     DriveOrder,
     DriveState,
@@ -20,6 +17,9 @@ from onboard.core.messages import (
     TokenGrant,
     TokenRequest,
 )
+from onboard.core.authority import segment_token
+from onboard.core.behaviour import Fleet
+from onboard.core.effects import Actuate, Effect, Send
 from onboard.core.site import Segment
 from onboard.holon.holon import Holon
 from onboard.systems.car_park.lift import Lift

@@ -2,20 +2,8 @@
 
 import pytest
 
-from onboard.core.codes import (
-    CallResult,
-    Grade,
-    LegAction,
-    MachineState,
-    Reason,
-    ShuttleMode,
-)
-from onboard.core.messages import (
-    Award,
-    Itinerary,
-    Reference,
-    Stamp,
-)
+from onboard.contract.codes import CallResult, Grade, LegAction, MachineState, Reason, ShuttleMode
+from onboard.contract.messages import Award, Itinerary, Reference, Stamp
 from onboard.core.site import Segment
 from onboard.systems.car_park.program import Phase, Program, Step, to_itinerary
 from tests.kinds.board import AWARDED, BOOT, MOVED_US, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, Board, Entry

@@ -1,8 +1,8 @@
 """A robot whose plan changes while it waits for rights, or while it drives."""
 
-from onboard.core.codes import DriveMode, TokenKind
+from onboard.contract.codes import DriveMode, TokenKind
+from onboard.contract.messages import DriveState, TokenGrant
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import DriveState, TokenGrant
 from onboard.core.site import Segment
 from onboard.systems.car_park.travel import Carriage
 from tests.kinds.test_turning import PITCH_MM, ROBOT, carriage, get, orders

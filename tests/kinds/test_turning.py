@@ -1,9 +1,9 @@
 """A carriage before, in and after a turn: what it asks for, orders and tells (design, section 5)."""
 
+from onboard.contract.codes import DriveMode, KindCode, Reason, TokenKind
+from onboard.contract.messages import DriveOrder, DriveState, Progress, TokenGrant, TokenRequest
 from onboard.core.authority import TokenBook, segment_token
-from onboard.core.codes import DriveMode, KindCode, Reason, TokenKind
 from onboard.core.effects import Actuate, Effect, Send
-from onboard.core.messages import DriveOrder, DriveState, Progress, TokenGrant, TokenRequest
 from onboard.core.negotiation import Negotiation
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark

@@ -1,7 +1,7 @@
 """A robot counts on others giving way only where it finds no way around them, and where they have somewhere to go."""
 
-from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
+from onboard.contract.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
+from onboard.contract.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.generation import YIELDING_US, CarParkGeneration
 from onboard.systems.car_park.program import Program

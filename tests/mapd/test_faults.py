@@ -6,16 +6,11 @@ from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
 from bus_sim.systems.mapd.importers.mapf import Wanted
 from onboard.config.site import parse_site
-from onboard.core.messages import Bid, Message
+from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState
+from onboard.contract.messages import Bid, Message
 from onboard.systems.mapd.auction import Task
 from onboard.systems.mapd.calls import award_of, call_of
-from onboard.systems.mapd.messages import (
-    NO_TASK,
-    PathHead,
-    PathMoves,
-    StepRound,
-    StepState,
-)
+from onboard.systems.mapd.fields import NO_TASK
 from tests.faults.systems import PLANTS, judged, withstands
 from tests.mapd.sites import drawn, made
 

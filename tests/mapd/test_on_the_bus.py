@@ -13,8 +13,8 @@ from bus_sim.session import play
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.steps import Day
 from onboard.cli import main as onboard
-from onboard.core.messages import Award, Bid, CallForProposals, Reference
-from onboard.systems.mapd.messages import StepRound, StepState
+from onboard.contract.mapd import StepRound, StepState
+from onboard.contract.messages import Award, Bid, CallForProposals, Reference
 from onboard.systems.mapd.site import Mapd
 from onboard.wire.codec import codecs
 from onboard.wire.dbc_file import system_layouts

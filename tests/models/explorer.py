@@ -16,13 +16,23 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from bus_sim.sites import find_site
+from onboard.contract.codes import KindCode, MachineState, Reason, TokenKind
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import (
+    Message,
+    SyncDone,
+    SyncRequest,
+    TokenDispute,
+    TokenGiven,
+    TokenGrant,
+    TokenHeld,
+    TokenRequest,
+    TokenSeen,
+)
 from onboard.core.authority import Grant, TokenBook, TokenKey, genesis_holder
 from onboard.core.belief import Belief
-from onboard.core.codes import NOBODY, KindCode, MachineState, Reason, TokenKind
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import Message, SyncRequest, TokenGrant, TokenHeld, TokenRequest
 from onboard.core.mirror import Mirror, Peer
-from onboard.core.recovery_messages import SyncDone, TokenDispute, TokenGiven, TokenSeen
 from onboard.holon.witness import Doubt, Witness
 from onboard.systems.car_park.site import car_park
 from tests.core.token_words import hear

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from onboard.contract.codes import TokenKind
+from onboard.contract.messages import Bid, TokenGrant, TokenHeld
 from onboard.core.authority import TokenBook, TokenKey, genesis_holder
-from onboard.core.codes import TokenKind
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import Bid, TokenGrant, TokenHeld
 from onboard.core.negotiation.initiator import Event as InitiatorEvent
 from onboard.core.negotiation.initiator import Initiator
 from onboard.core.negotiation.initiator import State as InitiatorState

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from onboard.contract.codes import TokenKind
 from onboard.core.authority import TokenKey
-from onboard.core.codes import TokenKind
 from tests.models.recorder import Call, Recorder
 from tests.models.spin import NEGOTIATION, TOKEN, first_refused
 

@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator
 
 from bus_sim.cli import main
 from bus_sim.sites import find_site
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.gateway.publisher import Outgoing, Publisher
 from onboard.gateway.settings import GatewaySettings
 from onboard.systems.contract import codecs_for

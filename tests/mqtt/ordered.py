@@ -9,7 +9,7 @@ from typing import Any
 from bus_sim.can.node import SimulatedBus
 from bus_sim.run import BusRun
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.core.site import Site
 from onboard.gateway.gateway import Gateway
 from onboard.gateway.reports import Reports

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
-from onboard.core.messages import Award, Bid, CallForProposals, Reference
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason
+from onboard.contract.messages import Award, Bid, CallForProposals, Reference
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.settings import GatewaySettings
 from onboard.history.history import CALL_LIMIT, TASK_LIMIT

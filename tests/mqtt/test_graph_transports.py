@@ -4,9 +4,9 @@ from typing import Any
 
 import pytest
 
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import CallForProposals, TaskReport
-from onboard.systems.graph.messages import VisitList
+from onboard.contract.codes import TaskPhase
+from onboard.contract.graph import VisitList
+from onboard.contract.messages import CallForProposals, TaskReport
 from tests.mqtt.ordered import NODE
 from tests.mqtt.test_named_orders import run
 

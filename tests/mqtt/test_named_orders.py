@@ -12,9 +12,9 @@ from bus_sim.options import RunOptions
 from bus_sim.run import BusRun
 from bus_sim.session import play
 from bus_sim.systems.stage import Stage
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import TaskReport
-from onboard.systems.graph.messages import RobotAt, RobotMode, VisitList
+from onboard.contract.codes import TaskPhase
+from onboard.contract.graph import RobotAt, RobotMode, VisitList
+from onboard.contract.messages import TaskReport
 from tests.graph.sites import hall, made
 from tests.mqtt.logs import VERSIONS, validator
 from tests.mqtt.ordered import NODE, FatalJournal, Ordered, park_and_order

@@ -14,12 +14,12 @@ from bus_sim.systems.mapd.plant import make_plant as mapd_plant
 from bus_sim.systems.stage import Stage
 from bus_sim.systems.terminal.playing import play as play_terminal
 from bus_sim.systems.terminal.run import TerminalRun
-from onboard.core.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode
-from onboard.core.messages import Heartbeat, ManualOrder, ManualState
+from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode
+from onboard.contract.graph import RobotAt
+from onboard.contract.messages import Heartbeat, ManualOrder, ManualState
 from onboard.core.site import Site
 from onboard.gateway.machines import Machines
 from onboard.gateway.pauses import Pauses
-from onboard.systems.graph.messages import RobotAt
 from tests.graph.sites import hall, made
 from tests.mapd.sites import made as made_floor
 from tests.mqtt.logs import VERSIONS, validator

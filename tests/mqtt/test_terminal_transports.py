@@ -9,9 +9,9 @@ import pytest
 from bus_sim.options import RunOptions
 from bus_sim.systems.terminal.playing import play
 from bus_sim.systems.terminal.run import Outcome, TerminalRun
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import CallForProposals, Message, TaskReport
-from onboard.systems.terminal.messages import BoxOrder, TaskTerms
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import CallForProposals, Message, TaskReport
+from onboard.contract.terminal import BoxOrder, TaskTerms
 from tests.mqtt.ordered import NODE, Ordered
 from tests.terminal.seeds import short
 

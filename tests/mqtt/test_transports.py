@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import CallResult, Operation, OperatorAction
-from onboard.core.messages import Award, CallForProposals, OperatorOrder, Reference
+from onboard.contract.codes import CallResult, Operation, OperatorAction
+from onboard.contract.messages import Award, CallForProposals, OperatorOrder, Reference
 from tests.mqtt.ordered import Ordered, park_and_order, said
 from tests.mqtt.played import MemoryJournal
 from tests.sites import one_floor

@@ -8,9 +8,17 @@ from typing import Any
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import KindCode, MachineState, OperatorAction, Reason
-from onboard.core.messages import Blocked, EmergencyStop, Heartbeat, OperatorOrder, Progress, Reference, Waiting
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import KindCode, MachineState, OperatorAction, Reason
+from onboard.contract.messages import (
+    Blocked,
+    EmergencyStop,
+    Halted,
+    Heartbeat,
+    OperatorOrder,
+    Progress,
+    Reference,
+    Waiting,
+)
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.settings import GatewayError, GatewaySettings
 from tests.mqtt.logs import EPOCH_US, VERSIONS, content, published, record, validator

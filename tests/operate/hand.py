@@ -3,9 +3,8 @@
 from collections.abc import Sequence
 
 from bus_sim.sites import find_site
-from onboard.core.codes import CONTRACT_VERSION, MachineState, Reason
-from onboard.core.messages import Heartbeat, Message
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason
+from onboard.contract.messages import Halted, Heartbeat, Message
 from onboard.operate.order import Order
 from onboard.operate.park import Park
 from onboard.operate.wishes import Maker

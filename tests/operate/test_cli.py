@@ -8,9 +8,8 @@ import pytest
 
 from bus_sim.sites import find_site, site_text
 from onboard.cli import main as onboard
-from onboard.core.codes import Reason
-from onboard.core.messages import EmergencyStop, Message
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import Reason
+from onboard.contract.messages import EmergencyStop, Halted, Message
 from onboard.wire.codec import fleet_codec
 
 SITE = find_site("small")

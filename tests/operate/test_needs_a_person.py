@@ -1,11 +1,11 @@
 """A machine that stands with a car is told as such: on the bus by the lowest live machine, and by status."""
 
 from bus_sim.sites import find_site
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CarAt, Halted, Reference
 from onboard.core.authority import TokenBook
-from onboard.core.codes import ANY_STATION, MachineState, Reason
-from onboard.core.messages import CarAt, Reference
 from onboard.core.mirror import Peer
-from onboard.core.recovery_messages import Halted
 from onboard.core.site import Segment
 from onboard.holon.presence import Presence
 from onboard.operate.park import Park

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import MachineState, ManualMode, Reason
-from onboard.core.messages import Blocked, Clear, Heartbeat, ManualOrder
+from onboard.contract.codes import MachineState, ManualMode, Reason
+from onboard.contract.messages import Blocked, Clear, Heartbeat, ManualOrder
 from onboard.core.site import Segment
 from onboard.operate.blocks import Mark
 from onboard.operate.holds import Hold

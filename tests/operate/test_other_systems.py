@@ -17,15 +17,25 @@ from bus_sim.systems.orders import Orders
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.system import Occasion
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.codes import MachineState, Reason
-from onboard.core.messages import Award, Bid, CallForProposals, Heartbeat, Message, TokenGrant, TokenHeld, TokenRequest
-from onboard.core.recovery_messages import Halted, TokenGiven
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.graph import NodeAnswer
+from onboard.contract.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    Halted,
+    Heartbeat,
+    Message,
+    TokenGiven,
+    TokenGrant,
+    TokenHeld,
+    TokenRequest,
+)
 from onboard.core.site import Site
 from onboard.operate.names import OperateError
 from onboard.operate.park import Park
 from onboard.operate.status import Status
 from onboard.operate.wishes import Wish, maker_of
-from onboard.systems.graph.messages import NodeAnswer
 from tests.faults.systems import PLANTS
 
 AT_S, OFF_S, END_S = 30, 3, 60

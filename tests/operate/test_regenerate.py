@@ -4,16 +4,22 @@ from collections.abc import Callable
 
 import pytest
 
-from onboard.core.authority import TokenKey, genesis_holder, segment_token
-from onboard.core.codes import CONTRACT_VERSION, MachineState, Reason, RegenerationPhase, TokenKind
-from onboard.core.messages import Blocked, CarAt, Heartbeat, Message, Progress, Reference, TokenHeld
-from onboard.core.recovery_messages import (
+from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason, RegenerationPhase, TokenKind
+from onboard.contract.messages import (
+    Blocked,
+    CarAt,
+    Heartbeat,
+    Message,
+    Progress,
+    Reference,
     Regeneration,
     RegenerationState,
     TokenAssigned,
+    TokenHeld,
     TokenSeen,
-    assignment_digest,
 )
+from onboard.core.assignments import assignment_digest
+from onboard.core.authority import TokenKey, genesis_holder, segment_token
 from onboard.core.site import Segment
 from onboard.operate.names import OperateError
 from onboard.operate.wishes import Wish, maker_of

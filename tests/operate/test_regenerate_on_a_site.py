@@ -6,9 +6,8 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import Reason, RegenerationPhase, TaskPhase
-from onboard.core.messages import Heartbeat, TaskReport
-from onboard.core.recovery_messages import Halted, Regeneration
+from onboard.contract.codes import Reason, RegenerationPhase, TaskPhase
+from onboard.contract.messages import Halted, Heartbeat, Regeneration, TaskReport
 from tests.system.scene import Scene, play, stays
 
 SITE = find_site("small")

@@ -4,9 +4,8 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import Reason
-from onboard.core.messages import EmergencyStop, Progress
-from onboard.core.recovery_messages import Go, Halted
+from onboard.contract.codes import Reason
+from onboard.contract.messages import EmergencyStop, Go, Halted, Progress
 from onboard.operate.wishes import Wish, maker_of
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays

@@ -2,9 +2,8 @@
 
 import pytest
 
-from onboard.core.codes import MachineState, Reason
-from onboard.core.messages import EmergencyStop, ManualOrder
-from onboard.core.recovery_messages import Go
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.messages import EmergencyStop, Go, ManualOrder
 from onboard.operate.names import OperateError
 from onboard.operate.wishes import Wish, maker_of
 from tests.operate.hand import ALL, SITE, Hand, beat, halted

@@ -6,8 +6,8 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import MachineState, TaskPhase
-from onboard.core.messages import Award, Heartbeat, Progress, TaskReport
+from onboard.contract.codes import MachineState, TaskPhase
+from onboard.contract.messages import Award, Heartbeat, Progress, TaskReport
 from onboard.operate.wishes import Wish, maker_of
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays

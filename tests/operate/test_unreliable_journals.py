@@ -6,10 +6,22 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import MachineState, Reason, RegenerationPhase
+from onboard.contract.codes import MachineState, Reason, RegenerationPhase
+from onboard.contract.messages import (
+    BusTime,
+    Diagnostic,
+    DriveOrder,
+    Halted,
+    Heartbeat,
+    Message,
+    Regeneration,
+    RegenerationState,
+    ShuttleOrder,
+    SyncDone,
+    SyncRequest,
+    TokenSeen,
+)
 from onboard.core.journal_state import JournalState
-from onboard.core.messages import BusTime, Diagnostic, DriveOrder, Heartbeat, Message, ShuttleOrder, SyncRequest
-from onboard.core.recovery_messages import Halted, Regeneration, RegenerationState, SyncDone, TokenSeen
 from tests.system.scene import Scene, play, stays
 
 SITE = find_site("small")

@@ -15,8 +15,8 @@ from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
 from bus_sim.systems.car_park.plant.world import World
 from onboard.config.site import parse_site
-from onboard.core.codes import DoorAction, DoorName, LightColour, ShuttleAction, Side
-from onboard.core.messages import DoorOrder, DriveOrder, LightOrder, Message, ShuttleOrder
+from onboard.contract.codes import DoorAction, DoorName, LightColour, ShuttleAction, Side
+from onboard.contract.messages import DoorOrder, DriveOrder, LightOrder, Message, ShuttleOrder
 from onboard.core.site import Station
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.site import WaySite

@@ -2,8 +2,8 @@
 
 import pytest
 
-from onboard.core.codes import DriveMode, ShuttleAction, ShuttleMode
-from onboard.core.messages import DriveOrder, DriveState, ShuttleState
+from onboard.contract.codes import DriveMode, ShuttleAction, ShuttleMode
+from onboard.contract.messages import DriveOrder, DriveState, ShuttleState
 from tests.plant.support import ROBOT, SECOND, Bench
 from tests.sites import one_floor
 

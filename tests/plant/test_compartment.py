@@ -2,8 +2,17 @@
 
 import pytest
 
-from onboard.core.codes import DeskInput, DeskText, DoorAction, DoorName, DoorPosition, LightColour, ShuttleAction, Side
-from onboard.core.messages import BayState, DeskEvent, DeskOrder, DoorOrder, DoorState, Reference
+from onboard.contract.codes import (
+    DeskInput,
+    DeskText,
+    DoorAction,
+    DoorName,
+    DoorPosition,
+    LightColour,
+    ShuttleAction,
+    Side,
+)
+from onboard.contract.messages import BayState, DeskEvent, DeskOrder, DoorOrder, DoorState, Reference
 from onboard.core.site import Station
 from tests.plant.support import CAR, COMPARTMENT, ROBOT, SECOND, Bench
 

@@ -7,8 +7,8 @@ import pytest
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody, random_car
 from bus_sim.systems.car_park.plant.customer import Outcome, State
-from onboard.core.codes import DeskText
-from onboard.core.messages import DeskOrder, Reference
+from onboard.contract.codes import DeskText
+from onboard.contract.messages import DeskOrder, Reference
 from tests.plant.support import COMPARTMENT, SECOND, Bench
 from tests.plant.valet import Valet
 

@@ -3,8 +3,8 @@
 import pytest
 
 from bus_sim.systems.car_park.plant.bodies import Aboard
-from onboard.core.codes import DriveMode, ShuttleAction, ShuttleMode, Side
-from onboard.core.messages import DriveOrder, DriveState, PlatformState, ShuttleOrder
+from onboard.contract.codes import DriveMode, ShuttleAction, ShuttleMode, Side
+from onboard.contract.messages import DriveOrder, DriveState, PlatformState, ShuttleOrder
 from onboard.core.site import Segment
 from onboard.ways.kinematics import run_duration_us
 from tests.plant.support import CAR, LEFT, RIGHT, ROBOT, SECOND, Bench, three_floors

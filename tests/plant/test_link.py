@@ -10,9 +10,9 @@ from bus_sim.can.medium import Medium
 from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import LoopTimers
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.codes import LightColour
+from onboard.contract.codes import LightColour
+from onboard.contract.messages import LightOrder, Message
 from onboard.core.frame import Frame
-from onboard.core.messages import LightOrder, Message
 from onboard.ports.bus import BusHealth, FrameHandler
 from onboard.wire.codec import device_codec
 from onboard.wire.decoder import Decoder

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from bus_sim.systems.car_park.plant.motion import driving, standing
 from bus_sim.systems.car_park.plant.oracle import least_distance
-from onboard.core.codes import DoorName, DoorPosition, ShuttleAction, Side
+from onboard.contract.codes import DoorName, DoorPosition, ShuttleAction, Side
 from onboard.core.site import Station
 from tests.plant.support import CAR, COMPARTMENT, ROBOT, SECOND, Bench
 from tests.sites import one_floor

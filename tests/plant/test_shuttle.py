@@ -3,8 +3,8 @@
 import pytest
 
 from bus_sim.systems.car_park.plant.bodies import Aboard, CarBody
-from onboard.core.codes import ShuttleAction, ShuttleMode, Side
-from onboard.core.messages import ShuttleOrder, ShuttleState
+from onboard.contract.codes import ShuttleAction, ShuttleMode, Side
+from onboard.contract.messages import ShuttleOrder, ShuttleState
 from onboard.core.site import Station
 from tests.plant.support import CAR, ROBOT, SECOND, Bench
 

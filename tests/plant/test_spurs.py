@@ -3,8 +3,8 @@
 import pytest
 
 from bus_sim.systems.car_park.plant.motion import driving, standing
-from onboard.core.codes import DriveMode, ShuttleAction, ShuttleMode, Side
-from onboard.core.messages import DriveOrder, DriveState, ShuttleState
+from onboard.contract.codes import DriveMode, ShuttleAction, ShuttleMode, Side
+from onboard.contract.messages import DriveOrder, DriveState, ShuttleState
 from onboard.core.site import Segment
 from tests.plant.support import ROBOT, SECOND, Bench
 from tests.sites import one_floor

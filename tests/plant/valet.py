@@ -3,7 +3,7 @@
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from onboard.core.codes import (
+from onboard.contract.codes import (
     DeskInput,
     DeskText,
     DoorAction,
@@ -14,7 +14,7 @@ from onboard.core.codes import (
     ShuttleAction,
     ShuttleMode,
 )
-from onboard.core.messages import (
+from onboard.contract.messages import (
     BayState,
     DeskEvent,
     DeskOrder,

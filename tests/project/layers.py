@@ -13,14 +13,11 @@ from pathlib import Path
 #: What holds no decision: values and names that every layer may share.
 CORE_TYPES = (
     "onboard.contract",
-    "onboard.core.codes",
     "onboard.core.frame",
     "onboard.core.journal_records",
     "onboard.core.journal_state",
-    "onboard.core.messages",
     "onboard.core.records",
-    "onboard.core.recovery_messages",
-    "onboard.core.remedies",
+    "onboard.holon.remedies",
     "onboard.core.serial",
     "onboard.core.site",
     "onboard.ways.site",

@@ -28,7 +28,7 @@ def test_every_package_of_onboard_has_a_line_in_the_table() -> None:
 
 def tree(root: Path, sources: dict[str, str]) -> Path:
     """A small source tree: the files given, and an empty ``__init__.py`` in each of their packages."""
-    for name in ("onboard/core/messages.py", "onboard/ways/sipp.py", "onboard/trace/candump.py", *sources):
+    for name in ("onboard/contract/messages.py", "onboard/ways/sipp.py", "onboard/trace/candump.py", *sources):
         file = root / name
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(sources.get(name, ""), encoding="utf-8")
@@ -82,7 +82,7 @@ WRONG = [
     ("onboard/trace/page.py", "from onboard.controller import shell"),
     ("onboard/trace/page.py", "from onboard.core import sipp"),
     ("onboard/trace/page.py", "from onboard.ports.bus import Bus"),
-    ("dbc/__init__.py", "from onboard.core import messages"),
+    ("dbc/__init__.py", "from onboard.contract import messages"),
     ("dbc/__init__.py", "import cantools"),
     ("bus_sim/run.py", "import can"),
     ("bus_sim/run.py", "import hil"),
@@ -102,12 +102,12 @@ def test_a_wrong_import_is_reported_with_its_file(tmp_path: Path, file: str, sou
 
 
 RIGHT = {
-    "onboard/core/a.py": "from dataclasses import dataclass\nfrom onboard.core.messages import Message\nimport heapq",
+    "onboard/core/a.py": "from onboard.contract.messages import Message\nimport heapq",
     "onboard/core/b.py": "from . import messages\nfrom .sipp import plan_route\nkept = {id(b): b for b in ()}",
     "onboard/systems/cell/a.py": "from onboard.ways.sipp import plan_route",
     "onboard/wire/dbc_file.py": "import cantools\nfrom dbc import fleet_dbc_text",
-    "onboard/wire/codec.py": "from onboard.core import messages as m\nfrom onboard.wire.dbc_file import read_layouts",
-    "onboard/ports/bus.py": "from typing import Protocol\nfrom onboard.core.messages import Message",
+    "onboard/wire/codec.py": "from onboard.contract import messages\nfrom onboard.wire import dbc_file",
+    "onboard/ports/bus.py": "from typing import Protocol\nfrom onboard.contract.messages import Message",
     "onboard/config/site.py": "import tomllib\nfrom pathlib import Path\nfrom onboard.ways.sipp import plan_route",
     "onboard/controller/shell.py": "import asyncio\nfrom onboard.core import sipp\nimport onboard.wire.codec",
     "onboard/io/pycan.py": "import can\nimport threading\nfrom onboard.ports.bus import Bus",

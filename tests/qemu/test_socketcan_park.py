@@ -10,9 +10,17 @@ import pytest
 from hil.guest.machine import GuestRun, run_guest
 from hil.guest.quick import QUICK
 from onboard.config.site import parse_site
-from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
-from onboard.core.messages import EmergencyStop, Heartbeat, Itinerary, Message, Progress, SyncRequest, TaskReport
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase
+from onboard.contract.messages import (
+    EmergencyStop,
+    Halted,
+    Heartbeat,
+    Itinerary,
+    Message,
+    Progress,
+    SyncRequest,
+    TaskReport,
+)
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records
 from onboard.wire.codec import fleet_codec

@@ -12,8 +12,8 @@ from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.core.site import Site
 from onboard.trace.check.checks import Checks, Verdict
 from onboard.wire.codec import Codec, device_codec, fleet_codec

@@ -6,14 +6,13 @@ import pytest
 
 from bus_sim.cli import main
 from bus_sim.sites import find_site
+from onboard.contract.codes import KindCode, Reason
+from onboard.contract.messages import Halted, Message, TokenGrant
+from onboard.contract.terminal_device import MoveOrder
 from onboard.core.authority import TokenBook
-from onboard.core.codes import KindCode, Reason
 from onboard.core.effects import Effect
-from onboard.core.messages import Message, TokenGrant
-from onboard.core.recovery_messages import Halted
 from onboard.core.site import Needs, Site
 from onboard.holon.taking_part import TakingPart
-from onboard.systems.terminal.messages import MoveOrder
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.listener import Listener
 from onboard.trace.readers.open_log import Log

@@ -8,7 +8,7 @@ import pytest
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import run
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 from onboard.core.frame import Frame
 from onboard.wire.codec import fleet_codec
 from onboard.wire.dbc_file import fleet_layouts

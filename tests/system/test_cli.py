@@ -14,9 +14,9 @@ import pytest
 
 from bus_sim.cli import main as bus_sim
 from onboard.cli import main as onboard
-from onboard.core.codes import MachineState
+from onboard.contract.codes import MachineState
+from onboard.contract.messages import Award, Bid, Heartbeat, Message, Progress, TokenGrant
 from onboard.core.frame import Frame
-from onboard.core.messages import Award, Bid, Heartbeat, Message, Progress, TokenGrant
 from onboard.io.open_bus import BusSettings, open_bus
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder

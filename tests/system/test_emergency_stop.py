@@ -7,17 +7,18 @@ import pytest
 from bus_sim.run import FLEET
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import MachineState, Reason
-from onboard.core.messages import (
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.messages import (
     DoorOrder,
     DriveOrder,
     EmergencyStop,
+    Go,
+    Halted,
     Heartbeat,
     Message,
     Progress,
     ShuttleOrder,
 )
-from onboard.core.recovery_messages import Go, Halted
 from onboard.wire.codec import fleet_codec
 from tests.system.scene import Scene, play, stays
 

@@ -21,7 +21,7 @@ from bus_sim.processes.plan import ProcessPlan
 from bus_sim.run import FLEET, BusRun
 from bus_sim.sites import find_site, site_text
 from bus_sim.systems.registry import simulated_names
-from onboard.core.messages import Heartbeat, Message
+from onboard.contract.messages import Heartbeat, Message
 from onboard.systems.contract import codecs_for
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.decoder import Decoder

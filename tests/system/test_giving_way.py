@@ -2,8 +2,8 @@
 
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
-from onboard.core.codes import Grade, LegAction, TaskPhase
-from onboard.core.messages import CallForProposals, Itinerary, TaskReport
+from onboard.contract.codes import Grade, LegAction, TaskPhase
+from onboard.contract.messages import CallForProposals, Itinerary, TaskReport
 from onboard.core.negotiation import Estimator
 from onboard.core.site import Site
 from tests.system.scene import Scene, play, stays

@@ -6,8 +6,8 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.demand import Demand
-from onboard.core.codes import Grade, TaskPhase
-from onboard.core.messages import Bid, Itinerary, Stamp, TaskReport
+from onboard.contract.codes import Grade, TaskPhase
+from onboard.contract.messages import Bid, Itinerary, Stamp, TaskReport
 from tests.system.scene import Scene, play
 
 CARS = 14

@@ -10,16 +10,8 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import MachineState, ManualMode, Reason, ShuttleMode, TaskPhase
-from onboard.core.messages import (
-    Bid,
-    Heartbeat,
-    ManualOrder,
-    ManualState,
-    Progress,
-    ShuttleState,
-    TaskReport,
-)
+from onboard.contract.codes import MachineState, ManualMode, Reason, ShuttleMode, TaskPhase
+from onboard.contract.messages import Bid, Heartbeat, ManualOrder, ManualState, Progress, ShuttleState, TaskReport
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
 from onboard.trace.story.why import Why

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.messages import Heartbeat
+from onboard.contract.messages import Heartbeat
 from onboard.io.open_bus import BusSettings, open_bus
 from tests.io.test_socketcand import free_port
 from tests.system.test_cli import Listener

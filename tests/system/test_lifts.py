@@ -4,9 +4,8 @@ import pytest
 
 from bus_sim.sites import find_site
 from onboard.config.site import parse_site
-from onboard.core.authority import TokenKey, segment_token
-from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, Operation, TaskPhase
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, DriveMode, Grade, KindCode, LegAction, Operation, TaskPhase
+from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,
@@ -17,6 +16,7 @@ from onboard.core.messages import (
     TaskReport,
     TokenGrant,
 )
+from onboard.core.authority import TokenKey, segment_token
 from onboard.ways.lifts import gate, platform
 from onboard.ways.site import way_site
 from tests.system.scene import Scene, play, stays

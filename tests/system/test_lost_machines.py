@@ -10,8 +10,8 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from onboard.config.site import parse_site
-from onboard.core.codes import CallResult, MachineState, Operation, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Heartbeat, Progress, TaskReport
+from onboard.contract.codes import CallResult, MachineState, Operation, TaskPhase
+from onboard.contract.messages import Award, CallForProposals, Heartbeat, Progress, TaskReport
 from onboard.core.site import Site
 from tests.system.scene import Scene, play, stays
 

@@ -9,10 +9,11 @@ from bus_sim.faults.arm import arm
 from bus_sim.faults.injection import parse_injection
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import CallResult, Grade, MachineState, Reason
+from onboard.contract.constants import SEEN_VERSION_BITS
+from onboard.contract.messages import Award, Bid, Blocked, CallForProposals, Clear, Heartbeat, Itinerary, Progress
 from onboard.controller.shell import Controller
 from onboard.core.authority import genesis_holder, segment_token, station_token
-from onboard.core.codes import SEEN_VERSION_BITS, CallResult, Grade, MachineState, Reason
-from onboard.core.messages import Award, Bid, Blocked, CallForProposals, Clear, Heartbeat, Itinerary, Progress
 from onboard.core.site import Segment
 from onboard.holon import holon
 from onboard.systems.car_park.compartment import Compartment

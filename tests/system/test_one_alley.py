@@ -3,16 +3,8 @@
 import pytest
 
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import CallResult, DriveMode, Grade, LegAction, TaskPhase
-from onboard.core.messages import (
-    Award,
-    Bid,
-    CallForProposals,
-    DriveState,
-    Heartbeat,
-    Itinerary,
-    TaskReport,
-)
+from onboard.contract.codes import CallResult, DriveMode, Grade, LegAction, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, DriveState, Heartbeat, Itinerary, TaskReport
 from onboard.core.site import Segment
 from tests.sites import one_floor
 from tests.system.scene import Scene, play, stays

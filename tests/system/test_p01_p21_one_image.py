@@ -13,9 +13,10 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import Award, CallForProposals, Heartbeat, Reference, Stamp, TaskReport
 from onboard.controller.shell import Controller
-from onboard.core.codes import ANY_STATION, CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Heartbeat, Reference, Stamp, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms

@@ -7,8 +7,8 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import DriveMode, KindCode, LegAction, ShuttleAction, ShuttleMode
-from onboard.core.messages import DriveState, Itinerary, PlatformState, Progress, ShuttleOrder, ShuttleState
+from onboard.contract.codes import DriveMode, KindCode, LegAction, ShuttleAction, ShuttleMode
+from onboard.contract.messages import DriveState, Itinerary, PlatformState, Progress, ShuttleOrder, ShuttleState
 from onboard.systems.car_park.site import car_park
 from onboard.ways.site import WaySite
 from tests.sites import one_floor

@@ -7,8 +7,8 @@ import pytest
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
-from onboard.core.codes import Grade, LegAction, MachineState, Operation, Side, TaskPhase
-from onboard.core.messages import CallForProposals, Heartbeat, Itinerary, TaskReport
+from onboard.contract.codes import Grade, LegAction, MachineState, Operation, Side, TaskPhase
+from onboard.contract.messages import CallForProposals, Heartbeat, Itinerary, TaskReport
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Station
 from onboard.systems.car_park.site import CarPark, car_park

@@ -3,8 +3,17 @@
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import Criterion, DoorPosition, DriveMode, Grade, LegAction, Operation, TaskPhase
-from onboard.core.messages import Award, Bid, BusTime, CallForProposals, DoorState, DriveState, Itinerary, TaskReport
+from onboard.contract.codes import Criterion, DoorPosition, DriveMode, Grade, LegAction, Operation, TaskPhase
+from onboard.contract.messages import (
+    Award,
+    Bid,
+    BusTime,
+    CallForProposals,
+    DoorState,
+    DriveState,
+    Itinerary,
+    TaskReport,
+)
 from onboard.core.serial import from_bus_ms
 from tests.system.scene import Scene, play, stays
 

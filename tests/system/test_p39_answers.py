@@ -6,8 +6,9 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.baselines.session_lock import SessionLocks
-from onboard.core.codes import ANY_STATION, Criterion, Grade, KindCode, LegAction, Operation, Side
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
+from onboard.contract.codes import Criterion, Grade, KindCode, LegAction, Operation, Side
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms

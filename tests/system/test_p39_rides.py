@@ -5,8 +5,8 @@ import dataclasses
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import CallResult, Grade, KindCode, LegAction, Operation
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Reference, TokenGrant
+from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, Operation
+from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, Reference, TokenGrant
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.site import CarPark, RideCalls, car_park
 from onboard.ways.lifts import gate, platform

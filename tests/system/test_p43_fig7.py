@@ -12,8 +12,8 @@ import pytest
 
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
-from onboard.core.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Side
-from onboard.core.messages import Bid, CallForProposals, Heartbeat, Itinerary, Leg, Message, Stamp
+from onboard.contract.codes import CONTRACT_VERSION, Grade, KindCode, LegAction, MachineState, Side
+from onboard.contract.messages import Bid, CallForProposals, Heartbeat, Itinerary, Leg, Message, Stamp
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.occupancy import itinerary_windows

@@ -8,9 +8,8 @@ from bus_sim.can.node import SimulatedBus
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.planted.tools import replace
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import CallResult, Grade, KindCode, Operation, Reason, TaskPhase
-from onboard.core.frame import Frame
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, Grade, KindCode, Operation, Reason, TaskPhase
+from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,
@@ -20,6 +19,7 @@ from onboard.core.messages import (
     Message,
     TaskReport,
 )
+from onboard.core.frame import Frame
 from onboard.core.serial import from_bus_ms
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.robot import Robot

@@ -2,8 +2,7 @@
 
 import pytest
 
-from onboard.core.codes import (
-    ANY_STATION,
+from onboard.contract.codes import (
     CallResult,
     DeskInput,
     DeskText,
@@ -17,7 +16,8 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import (
     Award,
     BayState,
     Bid,

@@ -2,8 +2,7 @@
 
 import pytest
 
-from onboard.core.codes import (
-    OUTSIDE,
+from onboard.contract.codes import (
     DeskInput,
     DeskText,
     DoorPosition,
@@ -13,7 +12,8 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.messages import (
+from onboard.contract.constants import OUTSIDE
+from onboard.contract.messages import (
     Award,
     BayState,
     CallForProposals,

@@ -15,7 +15,7 @@ from bus_sim.systems.car_park.plant.bodies import Aboard
 from bus_sim.systems.car_park.show import Clock, draw
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop
-from onboard.core.codes import KindCode, MachineState
+from onboard.contract.codes import KindCode, MachineState
 from onboard.core.site import Station
 from onboard.systems.car_park.site import car_park
 from onboard.trace.candump_reader import CandumpReader

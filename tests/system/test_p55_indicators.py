@@ -16,8 +16,8 @@ from bus_sim.session import run_site
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.day import Day
 from bus_sim.systems.car_park.summary import RunSummary
-from onboard.core.codes import CallResult, Operation, TaskPhase
-from onboard.core.messages import Award, Bid, CallForProposals, Progress, TaskReport
+from onboard.contract.codes import CallResult, Operation, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, Progress, TaskReport
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.indicators import FleetIndicators, Indicators
 from onboard.wire.codec import fleet_codec

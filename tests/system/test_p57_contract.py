@@ -9,9 +9,9 @@ from bus_sim.run import FLEET
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from dbc import device_dbc_text, fleet_dbc_text
-from onboard.core.codes import CallResult, Criterion, KindCode, Operation, TaskPhase
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, TaskReport
 from onboard.core.frame import Frame
-from onboard.core.messages import Award, Bid, CallForProposals, TaskReport
 from onboard.wire.dbc_file import fleet_layouts
 from onboard.wire.site_dbc import site_dbc
 from tests.system.scene import Scene, play, stays

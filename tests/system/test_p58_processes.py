@@ -17,7 +17,7 @@ import pytest
 
 from bus_sim.cli import main as bus_sim
 from onboard.config.site import parse_site
-from onboard.core.messages import Award, CallForProposals, Heartbeat, Message, TaskReport
+from onboard.contract.messages import Award, CallForProposals, Heartbeat, Message, TaskReport
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records
 from onboard.wire.codec import fleet_codec

@@ -16,18 +16,8 @@ from bus_sim.journal import SimulatedJournal
 from bus_sim.run import EventLog, NoWatchdog
 from bus_sim.serve.socketcand import SocketcandServer
 from bus_sim.virtual_time import LoopClock
-from onboard.controller.shell import Controller, Ports
-from onboard.core.codes import (
-    DeskInput,
-    DoorAction,
-    DoorName,
-    DoorPosition,
-    LightColour,
-    Reason,
-    TaskPhase,
-)
-from onboard.core.frame import Frame
-from onboard.core.messages import (
+from onboard.contract.codes import DeskInput, DoorAction, DoorName, DoorPosition, LightColour, Reason, TaskPhase
+from onboard.contract.messages import (
     Award,
     BayState,
     Bid,
@@ -41,6 +31,8 @@ from onboard.core.messages import (
     Reference,
     TaskReport,
 )
+from onboard.controller.shell import Controller, Ports
+from onboard.core.frame import Frame
 from onboard.holon.holon import Holon
 from onboard.io.open_bus import BusSettings, open_bus
 from onboard.ports.bus import Bus

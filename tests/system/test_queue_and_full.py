@@ -7,8 +7,8 @@ import pytest
 from bus_sim.systems.car_park.plant.customer import Outcome, State
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
-from onboard.core.codes import DeskText, Operation, TaskPhase
-from onboard.core.messages import CallForProposals, CarAt, DeskOrder, TaskReport
+from onboard.contract.codes import DeskText, Operation, TaskPhase
+from onboard.contract.messages import CallForProposals, CarAt, DeskOrder, TaskReport
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.ways.site import way_site

@@ -6,8 +6,8 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import TaskReport
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import TaskReport
 from tests.system.scene import Scene, play, stays
 
 #: The robot that wins both tasks of the scene on the small site, and the lift that it rides.

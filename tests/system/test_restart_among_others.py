@@ -10,7 +10,7 @@ from bus_sim.cli import main as bus_sim
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.plant.customer import TABLE, Event, State
 from onboard.cli import main as onboard
-from onboard.core.messages import Progress
+from onboard.contract.messages import Progress
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder

@@ -7,10 +7,7 @@ import pytest
 
 from bus_sim.systems.car_park.demand import Demand, Stay
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.authority import TokenKey, segment_token
-from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import (
-    ANY_STATION,
+from onboard.contract.codes import (
     CallResult,
     Criterion,
     DeskText,
@@ -24,8 +21,8 @@ from onboard.core.codes import (
     Side,
     TaskPhase,
 )
-from onboard.core.effects import Effect, Report, Send
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import (
     Award,
     Bid,
     BusTime,
@@ -40,6 +37,9 @@ from onboard.core.messages import (
     Stamp,
     TaskReport,
 )
+from onboard.core.authority import TokenKey, segment_token
+from onboard.core.behaviour import BehaviourFactory, Fleet
+from onboard.core.effects import Effect, Report, Send
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import to_bus_ms
@@ -208,7 +208,7 @@ def test_p52_an_operators_order_takes_the_same_path_as_a_customers_press() -> No
         for frame in fleet_codec().encode(order):
             bus.send(frame)  # type: ignore[attr-defined]  # a SimulatedBus
 
-    from onboard.core.codes import OperatorAction
+    from onboard.contract.codes import OperatorAction
 
     scene = play(one_floor(), stays((0, None)), before=gateway, extra_s=400)
     called = [call.operation for _, call in scene.all(CallForProposals)]

@@ -12,9 +12,17 @@ from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.show import draw_floor
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.config.site import parse_site
+from onboard.contract.codes import DriveMode, Grade, KindCode, LegAction, TaskPhase
+from onboard.contract.messages import (
+    CallForProposals,
+    DriveOrder,
+    DriveState,
+    Itinerary,
+    Progress,
+    TaskReport,
+    TokenGrant,
+)
 from onboard.core.authority import segment_token
-from onboard.core.codes import DriveMode, Grade, KindCode, LegAction, TaskPhase
-from onboard.core.messages import CallForProposals, DriveOrder, DriveState, Itinerary, Progress, TaskReport, TokenGrant
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark, car_park
 from onboard.trace.view import SiteView

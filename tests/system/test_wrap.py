@@ -4,10 +4,10 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import Grade
+from onboard.contract.messages import Award, Itinerary, TaskReport
 from onboard.controller.shell import Controller
 from onboard.core.bus_time import BUS_TIME_MODULUS
-from onboard.core.codes import Grade
-from onboard.core.messages import Award, Itinerary, TaskReport
 from onboard.core.serial import BUS_MS_MODULUS
 from tests.system.scene import Scene, play, stays
 

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import NO_REFERENCE
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import NO_REFERENCE
+from onboard.contract.terminal import Action
 from onboard.core.site import Machine, Segment, Timing
-from onboard.systems.terminal.messages import Action
 from onboard.systems.terminal.plan import Load, Plan, VisitKey, drive_steps, handling_steps
 from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, Terminal
 from onboard.systems.terminal.traffic import Node, Traffic

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import pytest
 
-from onboard.core.messages import NO_REFERENCE
-from onboard.systems.terminal.messages import Action
+from onboard.contract.messages import NO_REFERENCE
+from onboard.contract.terminal import Action
 from onboard.systems.terminal.plan import Load, Plan, Step, VisitKey
 from onboard.systems.terminal.site import Entity, EntityKind
 from onboard.systems.terminal.traffic import Traffic

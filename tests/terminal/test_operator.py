@@ -9,9 +9,9 @@ from bus_sim.options import RunOptions
 from bus_sim.systems.terminal.playing import play
 from bus_sim.systems.terminal.run import Outcome, TerminalRun
 from onboard.config.problems import ConfigError
-from onboard.core.codes import ManualMode
-from onboard.core.messages import Bid, CallForProposals, ManualState, Message
-from onboard.systems.terminal.messages import StepReport, StepResult
+from onboard.contract.codes import ManualMode
+from onboard.contract.messages import Bid, CallForProposals, ManualState, Message
+from onboard.contract.terminal import StepReport, StepResult
 from tests.terminal.seeds import short
 
 Said = list[tuple[int, Message]]

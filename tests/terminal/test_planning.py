@@ -7,10 +7,11 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.terminal.table import plan_table
-from onboard.core.codes import Criterion, KindCode, Operation
-from onboard.core.messages import CallForProposals, Reference
+from onboard.contract.codes import Criterion, KindCode, Operation
+from onboard.contract.messages import CallForProposals, Reference
+from onboard.contract.terminal import Action, Verb
+from onboard.contract.terminal_device import MissionKey
 from onboard.systems.terminal.generation import VehicleGeneration
-from onboard.systems.terminal.messages import Action, MissionKey, Verb
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.missions import Orders, types_of
 from onboard.systems.terminal.plan import Plan, PlanReader, Step, to_frames

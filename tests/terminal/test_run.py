@@ -14,19 +14,19 @@ from bus_sim.systems.terminal.playing import play
 from bus_sim.systems.terminal.run import Outcome, TerminalRun
 from bus_sim.systems.terminal.show import summary_lines
 from bus_sim.systems.terminal.table import picture
-from onboard.core.codes import CallResult, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Message, TaskReport
-from onboard.systems.terminal.messages import (
+from onboard.contract.codes import CallResult, TaskPhase
+from onboard.contract.messages import Award, CallForProposals, Message, TaskReport
+from onboard.contract.terminal import (
     Action,
     Assignment,
     LaneState,
-    MoveOrder,
     PlanHead,
     PlanStep,
     PlanTask,
     StepReport,
     StepResult,
 )
+from onboard.contract.terminal_device import MoveOrder
 from onboard.systems.terminal.vehicle import Vehicle, terminal
 from onboard.trace.candump_reader import CandumpReader
 from onboard.trace.check.checks import Checks, check_records

@@ -3,8 +3,17 @@
 from functools import cache
 
 from onboard.config.site import parse_site
-from onboard.core.codes import CallResult, Criterion, KindCode, MachineState, Operation, Reason, TaskPhase, TokenKind
-from onboard.core.messages import (
+from onboard.contract.codes import (
+    CallResult,
+    Criterion,
+    KindCode,
+    MachineState,
+    Operation,
+    Reason,
+    TaskPhase,
+    TokenKind,
+)
+from onboard.contract.messages import (
     NO_REFERENCE,
     Award,
     Bid,

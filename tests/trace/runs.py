@@ -6,7 +6,7 @@ from tempfile import mkdtemp
 
 from bus_sim.cli import main
 from bus_sim.sites import find_site
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.trace.listener import Listener, Said
 from onboard.trace.readers.open_log import Log
 from onboard.wire.codec import codecs

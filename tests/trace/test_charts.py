@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.messages import Progress, Reference
+from onboard.contract.messages import Progress, Reference
 from onboard.systems.car_park.diagram import Picture, watch
 from onboard.trace.chart.sequence import Chart, chart
 from onboard.trace.cli import main

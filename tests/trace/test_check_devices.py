@@ -2,9 +2,7 @@
 
 import pytest
 
-from onboard.core.codes import (
-    ANY_STATION,
-    OUTSIDE,
+from onboard.contract.codes import (
     DeskInput,
     DeskText,
     DoorAction,
@@ -18,7 +16,8 @@ from onboard.core.codes import (
     Side,
     TaskPhase,
 )
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import (
     BayState,
     DeskEvent,
     DeskOrder,

@@ -2,9 +2,17 @@
 
 import pytest
 
-from onboard.core.codes import DriveMode, KindCode, MachineState, Reason, TokenKind
-from onboard.core.messages import BusTime, DriveOrder, DriveState, Heartbeat, Message, PlatformState, TokenHeld
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import DriveMode, KindCode, MachineState, Reason, TokenKind
+from onboard.contract.messages import (
+    BusTime,
+    DriveOrder,
+    DriveState,
+    Halted,
+    Heartbeat,
+    Message,
+    PlatformState,
+    TokenHeld,
+)
 from onboard.core.site import Segment
 from tests.trace.checking import (
     ER1,

@@ -3,8 +3,8 @@
 import pytest
 
 from onboard.config.site import parse_site
-from onboard.core.codes import DriveMode
-from onboard.core.messages import DriveOrder, DriveState, Message
+from onboard.contract.codes import DriveMode
+from onboard.contract.messages import DriveOrder, DriveState, Message
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark, car_park
 from tests.sites import ONE_FLOOR

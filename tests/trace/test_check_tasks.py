@@ -2,9 +2,9 @@
 
 import pytest
 
-from onboard.core.codes import ANY_STATION, OUTSIDE, CallResult, KindCode, MachineState, Reason, TaskPhase
-from onboard.core.messages import BusTime, Heartbeat, Message, Reference
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import BusTime, Halted, Heartbeat, Message, Reference
 from tests.sites import one_floor
 from tests.trace.checking import (
     MR1,

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.codes import (
-    ANY_STATION,
+from onboard.contract.codes import (
     CallResult,
     Criterion,
     Grade,
@@ -18,7 +17,8 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import (
     Award,
     Bid,
     CallForProposals,

@@ -7,20 +7,20 @@ from pathlib import Path
 import pytest
 
 from bus_sim.sites import find_site
+from onboard.contract.cell import ArmPhase, ArmProgress
+from onboard.contract.graph import RobotAt
+from onboard.contract.mapd import StepState
+from onboard.contract.terminal import LaneState, StepReport, StepResult
+from onboard.contract.turning import LathePhase, LatheProgress
 from onboard.systems.cell.diagram import CellDiagram
-from onboard.systems.cell.messages import ArmPhase, ArmProgress
 from onboard.systems.cell.site import Cell
 from onboard.systems.graph.diagram import GraphDiagram
-from onboard.systems.graph.messages import RobotAt
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.mapd.diagram import MapdDiagram
-from onboard.systems.mapd.messages import StepState
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.terminal.diagram import TerminalDiagram
-from onboard.systems.terminal.messages import LaneState, StepReport, StepResult
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.systems.turning.diagram import TurningDiagram
-from onboard.systems.turning.messages import LathePhase, LatheProgress
 from onboard.systems.turning.site import Turning
 from onboard.trace.chart.over_time import Rows
 from onboard.trace.cli import main

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.messages import Bid, BusTime, Progress
+from onboard.contract.messages import Bid, BusTime, Progress
 from onboard.trace.cli import main
 from tests.tools import require_tool, run_tool
 from tests.trace.runs import SITE_FILE, fleet_of, run_log

@@ -3,8 +3,7 @@
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import (
-    ANY_STATION,
+from onboard.contract.codes import (
     CallResult,
     Criterion,
     Grade,
@@ -16,7 +15,8 @@ from onboard.core.codes import (
     Side,
     TaskPhase,
 )
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import (
     Award,
     Bid,
     BusTime,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from onboard.core.messages import Bid
+from onboard.contract.messages import Bid
 from onboard.trace.cli import main
 from onboard.wire.codec import fleet_codec
 from tests.trace.runs import SITE_FILE, fleet_of, run_log

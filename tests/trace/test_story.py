@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from bus_sim.cli import main as bus_sim
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
 from onboard.trace.cli import main
 from onboard.trace.story.why import TaskStory, Why
 from tests.trace.runs import SITE, SITE_FILE, first, fleet_of, run_log

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bus_sim.cli import main as bus_sim
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import CallForProposals, TaskReport
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import CallForProposals, TaskReport
 from onboard.history.calls import is_task
 from onboard.trace.listener import Said
 from onboard.trace.story.why import TaskStory, Why

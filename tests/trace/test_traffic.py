@@ -4,7 +4,7 @@ import pytest
 
 from bus_sim.sites import find_site
 from bus_sim.systems.car_park.response import Measured, measure
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.car_park.traffic import excess, operation, power_up, reasons
 from onboard.trace.response import ANYBODY, Stream, fifo_bounds
 from onboard.wire.dbc_file import fleet_layouts

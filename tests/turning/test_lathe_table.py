@@ -5,14 +5,15 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
+from onboard.contract.messages import Reference, TaskReport
+from onboard.contract.turning import LatheAction, NcMode
+from onboard.contract.turning_device import LatheOrder, NcState
 from onboard.core.effects import Actuate, Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord
-from onboard.core.messages import Reference, TaskReport
 from onboard.core.motion_authority import ALONE, acts, authorised
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.systems.turning.machine import TABLE, Control, Deed, LatheMachine
-from onboard.systems.turning.messages import LatheAction, LatheOrder, NcMode, NcState
 from onboard.systems.turning.records import JobRecord, JobStageRecord, Stage
 
 LATHE, BATCH = 3, 5

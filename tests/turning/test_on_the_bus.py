@@ -14,14 +14,14 @@ from bus_sim.systems.stage import Stage
 from bus_sim.systems.turning.nc import ProgramError, run_program
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
-from onboard.core.codes import Criterion, KindCode, Operation
-from onboard.core.messages import Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.contract.codes import Criterion, KindCode, Operation, OrderResult
+from onboard.contract.messages import Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.contract.turning import BillBar, BillCutting, LathePhase, LatheProgress, TurningOrder
 from onboard.holon.holon import Holon
 from onboard.systems.turning.checks import RULES
 from onboard.systems.turning.generation import LatheGeneration
 from onboard.systems.turning.lathe import Job, LatheState
 from onboard.systems.turning.machine import LatheMachine
-from onboard.systems.turning.messages import BillBar, BillCutting, LathePhase, LatheProgress, OrderResult, TurningOrder
 from onboard.systems.turning.process import generate
 from onboard.systems.turning.site import Turning, Wanted
 from tests.faults.systems import judged, withstands
@@ -152,7 +152,7 @@ def test_each_checker_finds_what_it_is_for() -> None:
         "bills-add-up": [BillCutting(1, 9, 1, 100, 0), BillBar(1, 9, 1, 50, 900)],
         "one-lathe": [TaskReport(1, task, 1, 0, 0), TaskReport(2, task, 1, 0, 0)],  # type: ignore[arg-type]  # as numbers
     }
-    from onboard.systems.turning.messages import BillWaiting
+    from onboard.contract.turning import BillWaiting
 
     broken["bills-add-up"].insert(1, BillWaiting(1, 9, 1, 10, 10))
     for name, messages in broken.items():

@@ -1,9 +1,9 @@
 """A set of tokens that cannot be had says ever less: at most a frame a second in the long run (rule 10)."""
 
+from onboard.contract.codes import Reason
+from onboard.contract.messages import TokenGrant, TokenHeld, TokenRequest
 from onboard.core.authority import TokenBook, segment_token
-from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import TokenGrant, TokenHeld, TokenRequest
 from onboard.core.site import Segment
 from onboard.ways.all_or_none import AllOrNone
 from tests.sites import one_floor

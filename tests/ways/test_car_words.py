@@ -2,8 +2,9 @@
 
 import pytest
 
-from onboard.core.codes import ANY_STATION, Reason, TokenKind
-from onboard.core.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
+from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import BusTime, CarAt, Message, Reference, TokenGrant, TokenHeld
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.ways.mirror import way_mirror

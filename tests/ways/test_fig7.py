@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import pytest
 
-from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.messages import Itinerary, Leg, Stamp
+from onboard.contract.codes import Grade, LegAction, Side
+from onboard.contract.messages import Itinerary, Leg, Stamp
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.kinematics import run_duration_us

@@ -1,7 +1,7 @@
 import pytest
 
-from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.messages import Itinerary, Leg, Stamp
+from onboard.contract.codes import Grade, LegAction, Side
+from onboard.contract.messages import Itinerary, Leg, Stamp
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.lift_uses import (

@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
-from onboard.core.codes import NOBODY, Grade, LegAction, Reason, Side
-from onboard.core.messages import Itinerary, Leg, Progress, Stamp
+from onboard.contract.codes import Grade, LegAction, Reason, Side
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Itinerary, Leg, Progress, Stamp
 from onboard.core.site import Segment
 from onboard.ways.passing import Plan
 from onboard.ways.passing_order import PassingOrder

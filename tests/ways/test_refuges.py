@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from onboard.core.codes import KindCode, Side
+from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.site import CarPark
 from onboard.ways.refuges import open_refuges, refuges

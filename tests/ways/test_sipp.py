@@ -4,8 +4,8 @@ from itertools import pairwise
 
 import pytest
 
-from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.messages import Itinerary, Leg, Stamp
+from onboard.contract.codes import Grade, LegAction, Side
+from onboard.contract.messages import Itinerary, Leg, Stamp
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import CarPark

@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from onboard.core.codes import Grade, LegAction, Reason, Side
-from onboard.core.messages import Itinerary, Leg, Progress, Stamp, Waiting
+from onboard.contract.codes import Grade, LegAction, Reason, Side
+from onboard.contract.messages import Itinerary, Leg, Progress, Stamp, Waiting
 from onboard.core.mirror import Mirror
 from onboard.ways.standing import STANDS_AFTER_US, WAITS_AFTER_US, Standing
 from tests.sites import one_floor

@@ -8,7 +8,7 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 from bus_sim.sites import find_site
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.trace.listener import Listener

@@ -11,7 +11,7 @@ import pytest
 
 from bus_sim.sites import find_site
 from onboard.cli import main as onboard
-from onboard.core.messages import Heartbeat
+from onboard.contract.messages import Heartbeat
 from onboard.trace.frame_bits import frame_bits
 from onboard.trace.raw import RawFrame
 from onboard.trace.readers.open_log import Log

@@ -14,8 +14,8 @@ from websockets.sync.client import ClientConnection, connect
 
 from bus_sim.cli import main as bus_sim
 from bus_sim.sites import find_site
-from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
-from onboard.core.messages import Award, CallForProposals, Message, Reference
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason
+from onboard.contract.messages import Award, CallForProposals, Message, Reference
 from onboard.history.history import CALL_LIMIT, TASK_LIMIT
 from onboard.trace.view import SiteView
 from onboard.web.app import CommandError

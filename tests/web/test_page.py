@@ -5,8 +5,8 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Blocked, CallForProposals, Clear, Message, TaskReport
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import Blocked, CallForProposals, Clear, Message, TaskReport
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import Decoder

@@ -7,8 +7,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from bus_sim.sites import find_site
-from onboard.core.codes import ANY_STATION, OUTSIDE, TaskPhase
-from onboard.core.messages import Award, Bid, CallForProposals, CarAt, Progress, Reference, TaskReport
+from onboard.contract.codes import TaskPhase
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import Award, Bid, CallForProposals, CarAt, Progress, Reference, TaskReport
 from onboard.core.site import Segment
 from onboard.systems.car_park.site import car_park
 from tests.web.browser import drawn, rows, served

@@ -9,14 +9,16 @@ from typing import Any
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Message, TaskReport
-from onboard.systems.cell.messages import ArmState, PartAt
-from onboard.systems.graph.messages import BodyPlace, BodyState
-from onboard.systems.mapd.messages import StepState
-from onboard.systems.terminal.messages import MoveState
+from onboard.contract.cell import PartAt
+from onboard.contract.cell_device import ArmState
+from onboard.contract.codes import TaskPhase
+from onboard.contract.graph import BodyPlace
+from onboard.contract.graph_device import BodyState
+from onboard.contract.mapd import StepState
+from onboard.contract.messages import Message, TaskReport
+from onboard.contract.terminal_device import MoveState
+from onboard.contract.turning_device import NcState
 from onboard.systems.terminal.site import EntityKind, Terminal
-from onboard.systems.turning.messages import NcState
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import along, part, spot_on
 from onboard.web.film import Film

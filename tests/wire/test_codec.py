@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbc import device_dbc_text, fleet_dbc_text
-from onboard.core.codes import (
+from onboard.contract.codes import (
     Criterion,
     Grade,
     KindCode,
@@ -19,8 +19,8 @@ from onboard.core.codes import (
     Side,
     TokenKind,
 )
+from onboard.contract.messages import CallForProposals, Heartbeat, Itinerary, Leg, Message, Reference, Stamp, TokenGrant
 from onboard.core.frame import Frame
-from onboard.core.messages import CallForProposals, Heartbeat, Itinerary, Leg, Message, Reference, Stamp, TokenGrant
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.dbc_file import fleet_layouts
 from onboard.wire.decoder import MAX_SETS, SET_TIMEOUT_US, Decoder

@@ -8,8 +8,9 @@ import pytest
 
 from dbc import device_dbc_text, fleet_dbc_text
 from onboard.config.site import parse_site
-from onboard.core.codes import CONTRACT, CONTRACT_VERSION, MAX_NODE_ID, OperatorAction
-from onboard.core.messages import OperatorOrder, Reference
+from onboard.contract.codes import CONTRACT, CONTRACT_VERSION, OperatorAction
+from onboard.contract.constants import MAX_NODE_ID
+from onboard.contract.messages import OperatorOrder, Reference
 from onboard.wire import network_doc
 from onboard.wire.codec import fleet_codec
 from onboard.wire.dbc_file import read_layouts

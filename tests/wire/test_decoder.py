@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dbc import device_dbc_text, fleet_dbc_text
-from onboard.core.codes import Criterion, Grade, KindCode, LegAction, Operation, Reason, Side, TokenKind
-from onboard.core.frame import Frame
-from onboard.core.messages import (
+from onboard.contract.codes import Criterion, Grade, KindCode, LegAction, Operation, Reason, Side, TokenKind
+from onboard.contract.messages import (
     CallForProposals,
     EmergencyStop,
+    Go,
     Itinerary,
     Leg,
     Message,
@@ -23,7 +23,7 @@ from onboard.core.messages import (
     SyncRequest,
     TokenHeld,
 )
-from onboard.core.recovery_messages import Go
+from onboard.core.frame import Frame
 from onboard.wire.codec import Codec, device_codec, fleet_codec
 from onboard.wire.dbc_file import MessageLayout, device_layouts, fleet_layouts
 from onboard.wire.decoder import MAX_SETS, SET_TIMEOUT_US, Decoder

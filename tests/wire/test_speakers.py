@@ -2,10 +2,18 @@
 
 import pytest
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import Award, Blocked, CallForProposals, EmergencyStop, Itinerary, OperatorOrder, TokenGrant
-from onboard.core.recovery_messages import Go
-from onboard.systems.graph.messages import NodeAnswer, VisitList
+from onboard.contract.codes import KindCode
+from onboard.contract.graph import NodeAnswer, VisitList
+from onboard.contract.messages import (
+    Award,
+    Blocked,
+    CallForProposals,
+    EmergencyStop,
+    Go,
+    Itinerary,
+    OperatorOrder,
+    TokenGrant,
+)
 from onboard.systems.registry import find_system, system_names
 from onboard.wire.codec import codecs, fleet_codec
 from tests.wire.samples import frames_of

@@ -16,8 +16,8 @@ import pytest
 
 from bus_sim.cli import main as bus_sim
 from bus_sim.sites import find_site
+from onboard.contract.messages import Message
 from onboard.core.frame import Frame
-from onboard.core.messages import Message
 from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.codec import fleet_codec
 from onboard.wire.site_dbc import site_dbc

@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 
-from onboard.core.codes import Criterion, KindCode, Operation, Reason
-from onboard.core.messages import CallForProposals, Reference
+from onboard.contract.codes import Criterion, KindCode, Operation, Reason
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.wire.codec import fleet_codec
 from onboard.wire.decoder import SET_TIMEOUT_US, Decoder
 

@@ -3,12 +3,13 @@
 from collections.abc import Sequence
 
 from bus_sim.sites import find_site
+from onboard.contract.codes import Reason
+from onboard.contract.graph import RouteAction
+from onboard.contract.graph_device import RouteOrder
+from onboard.contract.messages import Message
 from onboard.core.authority import TokenBook
-from onboard.core.codes import Reason
 from onboard.core.effects import Actuate, Effect
-from onboard.core.messages import Message
 from onboard.core.motion_authority import ALONE, MotionAuthority, authorised
-from onboard.systems.graph.messages import RouteAction, RouteOrder
 from onboard.work.device_link import DeviceLink
 
 AGAIN_US = 500_000

@@ -6,9 +6,9 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import Reference
 from onboard.core.effects import Record
-from onboard.core.messages import Reference
 from onboard.holon.holon import Holon
 from onboard.systems.cell.contracts import Goal
 from onboard.systems.cell.desk import Order as GoalOrder

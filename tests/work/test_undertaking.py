@@ -6,10 +6,10 @@ from itertools import product
 import pytest
 
 from bus_sim.sites import find_site
-from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason, TaskPhase
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason, TaskPhase
+from onboard.contract.messages import Award, CallForProposals, Reference, TaskReport
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.journal_records import JournalRecord
-from onboard.core.messages import Award, CallForProposals, Reference, TaskReport
 from onboard.holon.holon import Holon
 from onboard.systems.cell.records import ContractRecord, StageRecord
 from onboard.systems.cell.records import Stage as ContractStage

@@ -5,7 +5,7 @@ from dataclasses import replace
 from bus_sim.faults.devices import filter_incoming, filter_outgoing
 from bus_sim.faults.injection import Injection
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.messages import DeskEvent, DriveOrder, DriveState, Message
+from onboard.contract.messages import DeskEvent, DriveOrder, DriveState, Message
 
 
 def sensor_stuck(simulation: Simulation, injection: Injection) -> None:

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from bus_sim.attacks import words
 from bus_sim.attacks.attack import Node
-from onboard.core.codes import OperatorAction
-from onboard.core.messages import CarAt, Message, OperatorOrder, Reference
+from onboard.contract.codes import OperatorAction
+from onboard.contract.messages import CarAt, Message, OperatorOrder, Reference
 from onboard.systems.car_park.site import car_park
 
 

@@ -10,8 +10,8 @@ from bus_sim.faults.operators import STATION
 from bus_sim.systems.car_park.by_hand import Hand
 from bus_sim.systems.car_park.simulation import Simulation
 from bus_sim.web.run_source import Arguments, RunSource
-from onboard.core.codes import Reason
-from onboard.core.messages import Blocked, Clear
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Blocked, Clear
 from onboard.core.site import Segment
 from onboard.ports.bus import Bus
 from onboard.ways.site import TrackKind, way_site

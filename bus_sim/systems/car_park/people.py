@@ -8,7 +8,7 @@ from bus_sim.faults.injection import Injection
 from bus_sim.systems.car_park.plant.customer import Customer, Event
 from bus_sim.systems.car_park.plant.motion import standing
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import DoorName, DoorPosition
+from onboard.contract.codes import DoorName, DoorPosition
 from onboard.ways.site import way_site
 
 #: Somebody who waits for the right moment looks again after this, us (ours).

@@ -10,9 +10,9 @@ from bus_sim.run import run_until
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import VirtualTimeLoop, run_on
-from onboard.core.codes import TaskPhase
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import TaskReport
 from onboard.core.frame import Frame
-from onboard.core.messages import TaskReport
 from onboard.core.site import Site
 from onboard.systems.registry import part
 from onboard.trace.response import Stream, fifo_bounds, priority_bounds

@@ -10,7 +10,7 @@ from rich.console import Console, Group
 from rich.live import Live
 from rich.text import Text
 
-from onboard.core.codes import KindCode, MachineState, Side
+from onboard.contract.codes import KindCode, MachineState, Side
 from onboard.core.site import Segment, Station
 from onboard.trace.view import SiteView
 from onboard.ways.lifts import lift_at, lift_tracks, sill

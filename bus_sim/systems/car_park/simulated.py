@@ -22,8 +22,8 @@ from bus_sim.systems.car_park.window import choose_window, with_short_eve
 from bus_sim.systems.stranger import Stranger
 from bus_sim.systems.system import HAND_SPEED, Action, Faulted, Occasion, SimulatedSystem
 from bus_sim.virtual_time import VirtualTimeLoop
+from onboard.contract.codes import KindCode
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import KindCode
 from onboard.core.site import Site
 from onboard.systems.car_park.site import CarPark
 

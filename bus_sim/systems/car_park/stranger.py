@@ -7,11 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from bus_sim.systems.stranger import Stranger
+from onboard.contract.codes import Grade, KindCode, LegAction, MachineState, Operation, Reason, Side, TaskPhase
+from onboard.contract.messages import CallForProposals, Itinerary, Leg, Message, Progress, Stamp, TaskReport
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
-from onboard.core.codes import Grade, KindCode, LegAction, MachineState, Operation, Reason, Side, TaskPhase
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Message, Progress, Stamp, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, Proposal
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms

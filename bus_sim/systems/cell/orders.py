@@ -6,8 +6,8 @@ from dataclasses import replace
 from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant
 from bus_sim.systems.orders import Orders, last_of, tally_of
 from bus_sim.systems.stage import Tally
+from onboard.contract.codes import OrderResult
 from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.messages import OrderResult
 from onboard.systems.cell.site import Cell, Wish
 
 #: Points are drawn so far from edges of areas and obstacles at least, mm. Ours.

@@ -9,23 +9,13 @@ from math import hypot
 
 from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
-from onboard.core.messages import Message, Reference
+from onboard.contract.cell import ArmMode, GripAction, GripMode
+from onboard.contract.cell_device import ArmOrder, ArmState, GripOrder, GripState, OrderAnswer, OrderFrom, OrderTo
+from onboard.contract.codes import OrderResult
+from onboard.contract.messages import Message, Reference
 from onboard.core.serial import is_newer
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point
-from onboard.systems.cell.messages import (
-    ArmMode,
-    ArmOrder,
-    ArmState,
-    GripAction,
-    GripMode,
-    GripOrder,
-    GripState,
-    OrderAnswer,
-    OrderFrom,
-    OrderResult,
-    OrderTo,
-)
 from onboard.systems.cell.site import Cell, Wish
 
 #: A moving drive that hears no order for this long stops (dbc/cell.dbc).

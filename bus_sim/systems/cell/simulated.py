@@ -4,7 +4,7 @@ from bus_sim.systems.cell.orders import ORDER_S, draw, last_s
 from bus_sim.systems.cell.plant import make_plant
 from bus_sim.systems.cell.stage import CellStage
 from bus_sim.systems.orders import OrderedSystem, Orders
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.cell.site import Cell
 
 SIMULATED = OrderedSystem(

@@ -11,9 +11,9 @@ from bus_sim.systems.cell.tree import ContractTree
 from bus_sim.systems.cell.view import CellView
 from bus_sim.systems.orders import Orders
 from bus_sim.systems.stage import Stage, Tally
-from onboard.core.messages import Reference
+from onboard.contract.codes import OrderResult
+from onboard.contract.messages import Reference
 from onboard.systems.cell.contracts import Goal
-from onboard.systems.cell.messages import OrderResult
 from onboard.systems.cell.robot import ArmRobot
 from onboard.systems.cell.site import Cell
 

@@ -3,11 +3,7 @@
 from dataclasses import dataclass, field
 
 from bus_sim.systems.cell.text import printed
-from onboard.core.codes import CallResult, TaskPhase
-from onboard.core.messages import Message, Reference, TaskReport
-from onboard.history.calls import CallAnswered, CallOpened, Calls
-from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.messages import (
+from onboard.contract.cell import (
     ArmProgress,
     GoalEnd,
     GoalStart,
@@ -17,8 +13,12 @@ from onboard.systems.cell.messages import (
     MoveTo,
     OfferHigh,
     OfferLow,
-    from_halves,
 )
+from onboard.contract.codes import CallResult, TaskPhase
+from onboard.contract.messages import Message, Reference, TaskReport
+from onboard.history.calls import CallAnswered, CallOpened, Calls
+from onboard.systems.cell.fields import from_halves
+from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.site import Cell
 
 _ORIGIN = Point(0, 0)

@@ -8,7 +8,7 @@ from bus_sim.session import play
 from bus_sim.systems.graph.certify.optimum import least_steps, some_tasks
 from bus_sim.systems.graph.certify.search import Tasks
 from bus_sim.systems.graph.plant import GraphPlant
-from onboard.core.codes import KindCode, Side
+from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.graph.network import Graph
 from onboard.systems.graph.site import FactoryGraph, Order

@@ -4,9 +4,11 @@ from typing import Protocol
 
 from bus_sim.devices.link import DeviceLink
 from bus_sim.devices.timers import Timer, Timers
-from onboard.core.messages import Message
+from onboard.contract.graph import BodyPlace, RouteAction
+from onboard.contract.graph_device import ApproachSensor, BodyState, RouteOrder
+from onboard.contract.messages import Message
 from onboard.core.site import Machine
-from onboard.systems.graph.messages import NO_NODE, ApproachSensor, BodyPlace, BodyState, RouteAction, RouteOrder
+from onboard.systems.graph.fields import NO_NODE
 from onboard.systems.graph.site import FactoryGraph, edge
 
 #: A moving drive that hears no order for this long stops (dbc/graph.dbc).

@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 
 from bus_sim.attacks import words
-from onboard.core.codes import KindCode
-from onboard.core.messages import Message
-from onboard.systems.graph.messages import NodeAnswer, NodeVerdict, TurnSignal, VisitList, five
+from onboard.contract.codes import KindCode
+from onboard.contract.graph import NodeAnswer, NodeVerdict, TurnSignal, VisitList
+from onboard.contract.messages import Message
+from onboard.systems.graph.fields import five
 from onboard.systems.graph.site import FactoryGraph
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from bus_sim.systems.graph.plant import ORIGIN_US, GraphPlant
 from bus_sim.systems.orders import Orders, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.stage import Tally
-from onboard.systems.graph.messages import OrderResult
+from onboard.contract.codes import OrderResult
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph, Order
 
 #: So many orders name their robot. Ours.

@@ -10,8 +10,11 @@ from functools import partial
 from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.graph.body import Body
-from onboard.core.messages import Message
-from onboard.systems.graph.messages import BodyPlace, OrderResult, VisitAnswer, VisitKey, five
+from onboard.contract.codes import OrderResult
+from onboard.contract.graph import BodyPlace
+from onboard.contract.graph_device import VisitAnswer, VisitKey
+from onboard.contract.messages import Message
+from onboard.systems.graph.fields import five
 from onboard.systems.graph.site import FactoryGraph, Order, Rules, edge
 
 #: Orders begin so long after power-up, us: the machines find each other first.

@@ -1,7 +1,7 @@
 """The graph in a terminal: every node with the robots in it, every edge with the robot on it, and the orders."""
 
 from bus_sim.systems.graph.plant import GraphPlant
-from onboard.systems.graph.messages import BodyPlace
+from onboard.contract.graph import BodyPlace
 
 #: Characters of an edge.
 WIDTH = 24

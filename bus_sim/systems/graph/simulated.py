@@ -6,7 +6,7 @@ from bus_sim.systems.graph.orders import ORDER_S, draw, last_s, usual
 from bus_sim.systems.graph.plant import make_plant
 from bus_sim.systems.graph.stage import GraphStage
 from bus_sim.systems.orders import OrderedSystem
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.graph.site import FactoryGraph
 
 SIMULATED = OrderedSystem(

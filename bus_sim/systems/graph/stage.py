@@ -8,8 +8,9 @@ from bus_sim.systems.graph.orders import count
 from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.graph.show import picture
 from bus_sim.systems.stage import Stage, Tally
-from onboard.core.messages import Bid, CallForProposals
-from onboard.systems.graph.messages import EdgeNotice, NodeAnswer, NodeVerdict, OrderResult, TurnSignal
+from onboard.contract.codes import OrderResult
+from onboard.contract.graph import EdgeNotice, NodeAnswer, NodeVerdict, TurnSignal
+from onboard.contract.messages import Bid, CallForProposals
 from onboard.systems.graph.site import FactoryGraph
 
 if TYPE_CHECKING:  # the page's libraries are an extra

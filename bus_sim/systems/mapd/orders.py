@@ -6,7 +6,7 @@ from statistics import fmean
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.orders import Ended, Orders, nothing_to_draw, tally
 from bus_sim.systems.stage import Tally
-from onboard.systems.mapd.messages import OrderResult
+from onboard.contract.codes import OrderResult
 from onboard.systems.mapd.site import FAR, Mapd, Task
 
 #: So many endpoints are looked at to see how long ways are. Ours.

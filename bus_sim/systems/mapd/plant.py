@@ -9,17 +9,12 @@ from functools import partial
 
 from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
-from onboard.core.messages import Message
+from onboard.contract.codes import OrderResult
+from onboard.contract.mapd import CartAction
+from onboard.contract.mapd_device import CartOrder, CartState, TransportAnswer, TransportKey
+from onboard.contract.messages import Message
 from onboard.core.site import Machine
-from onboard.systems.mapd.messages import (
-    NO_TASK,
-    CartAction,
-    CartOrder,
-    CartState,
-    OrderResult,
-    TransportAnswer,
-    TransportKey,
-)
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.site import Mapd, Task
 
 #: Bodies tell where they are, and unanswered orders are said again, this often, us (dbc/mapd.dbc).

@@ -1,7 +1,7 @@
 """A pick-up and delivery site in a terminal: the map with its robots, or one line a robot where there is no map."""
 
 from bus_sim.systems.mapd.plant import UnitPlant
-from onboard.systems.mapd.messages import NO_TASK
+from onboard.systems.mapd.fields import NO_TASK
 
 _MARKS = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
 

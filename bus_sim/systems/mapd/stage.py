@@ -8,8 +8,8 @@ from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import token_passing
 from bus_sim.systems.mapd.show import picture
 from bus_sim.systems.stage import Stage, Tally
-from onboard.core.messages import CallForProposals
-from onboard.systems.mapd.messages import StepRound
+from onboard.contract.mapd import StepRound
+from onboard.contract.messages import CallForProposals
 
 
 class MapdStage(Stage[UnitPlant]):

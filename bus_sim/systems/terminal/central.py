@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 from bus_sim.options import RunOptions
 from bus_sim.systems.terminal.playing import play
 from bus_sim.systems.terminal.run import Outcome, TerminalRun
+from onboard.contract.codes import KindCode
+from onboard.contract.terminal import Assignment, TaskTerms
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import KindCode
 from onboard.core.effects import Effect, Record, Send
 from onboard.core.negotiation import Estimator
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Site
 from onboard.systems.registry import factory_for
 from onboard.systems.terminal.desk import Desk, DeskFactory, DeskGeneration
-from onboard.systems.terminal.messages import Assignment, TaskTerms
 from onboard.systems.terminal.missions import Transport
 from onboard.systems.terminal.search import Job, Search, remaining
 from onboard.systems.terminal.site import Terminal

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from bus_sim.attacks import words
-from onboard.core.messages import Message
-from onboard.systems.terminal.messages import BoxOrder
+from onboard.contract.messages import Message
+from onboard.contract.terminal import BoxOrder
 from onboard.systems.terminal.site import EntityKind
 from onboard.systems.terminal.vehicle import terminal
 

@@ -8,7 +8,7 @@ from bus_sim.systems.orders import Orders
 from bus_sim.systems.stage import Tally
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.plant import TerminalPlant
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, StationKind, Terminal
 
 #: Boxes of a mission at most; the first missions come so long after power-up, us. Ours.

@@ -8,21 +8,18 @@ from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.terminal.deliveries import deliveries, ordered
 from bus_sim.systems.terminal.world import VehicleBody, World
-from onboard.core.codes import KindCode, ManualMode
-from onboard.core.messages import Message
-from onboard.systems.terminal.messages import (
-    Action,
-    HandlerMode,
+from onboard.contract.codes import KindCode, ManualMode
+from onboard.contract.messages import Message
+from onboard.contract.terminal import Action, HandlerMode, MoveMode, Verb
+from onboard.contract.terminal_device import (
     HandlerOrder,
     HandlerState,
     LaneSensor,
     ManualKey,
     MissionAnswer,
     MissionKey,
-    MoveMode,
     MoveOrder,
     MoveState,
-    Verb,
 )
 from onboard.systems.terminal.missions import types_of
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press, Terminal

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from bus_sim.run import BusRun
 from bus_sim.systems.terminal.deliveries import Delivery, deliveries, ordered
 from bus_sim.systems.terminal.plant import TerminalPlant
-from onboard.core.messages import CarAt, Message
+from onboard.contract.messages import CarAt, Message
 from onboard.systems.terminal.desk import Desk
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.vehicle import Vehicle

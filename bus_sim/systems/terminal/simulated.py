@@ -6,7 +6,7 @@ from bus_sim.systems.terminal.orders import ORDER_S, draw, last_s
 from bus_sim.systems.terminal.plant import make_plant
 from bus_sim.systems.terminal.run import TerminalRun
 from bus_sim.systems.terminal.stage import TerminalStage
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.terminal.site import Terminal
 
 #: Where a person looks on: so many simulated seconds a second, unless another speed was asked for.

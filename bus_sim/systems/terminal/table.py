@@ -1,6 +1,6 @@
 """The plan table as in Fig. 3 of Le Page and Barras, and the picture of a terminal: both from the bus alone."""
 
-from onboard.systems.terminal.messages import Action
+from onboard.contract.terminal import Action
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import NO_STEP, Load
 from onboard.systems.terminal.site import Entity, EntityKind, Terminal

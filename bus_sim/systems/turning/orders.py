@@ -5,7 +5,7 @@ from dataclasses import replace
 from bus_sim.systems.orders import Orders, last_of, nothing_to_draw, tally_of
 from bus_sim.systems.stage import Tally
 from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant
-from onboard.systems.turning.messages import OrderResult
+from onboard.contract.codes import OrderResult
 from onboard.systems.turning.site import Turning, Wanted
 
 #: Parts of an order, at least and at most. Ours.

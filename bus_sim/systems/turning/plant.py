@@ -8,21 +8,11 @@ from math import hypot
 from bus_sim.devices.link import BusDeviceLink, DeviceLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.turning.nc import ProgramError, Run, contour_error_mm, run_program
-from onboard.core.messages import Message
-from onboard.systems.turning.messages import (
-    CHUNK,
-    JobAnswer,
-    JobEntry,
-    LatheAction,
-    LatheOrder,
-    NcMode,
-    NcState,
-    OrderResult,
-    ProgramEnd,
-    ProgramText,
-    ToolState,
-    crc16,
-)
+from onboard.contract.codes import OrderResult
+from onboard.contract.messages import Message
+from onboard.contract.turning import LatheAction, NcMode
+from onboard.contract.turning_device import JobAnswer, JobEntry, LatheOrder, NcState, ProgramEnd, ProgramText, ToolState
+from onboard.systems.turning.fields import CHUNK, crc16
 from onboard.systems.turning.site import Drawing, Element, Lathe, Turning, Wanted
 
 STATE_REPEAT_US = 2_000_000

@@ -4,7 +4,7 @@ from bus_sim.systems.orders import OrderedSystem, Orders
 from bus_sim.systems.turning.orders import ORDER_S, draw, last_s
 from bus_sim.systems.turning.plant import make_plant
 from bus_sim.systems.turning.stage import TurningStage
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.turning.site import Turning
 
 SIMULATED = OrderedSystem(

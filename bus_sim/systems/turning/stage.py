@@ -6,9 +6,9 @@ from bus_sim.systems.stage import Stage, Tally
 from bus_sim.systems.turning.orders import count
 from bus_sim.systems.turning.plant import TurningPlant
 from bus_sim.systems.turning.show import board
-from onboard.core.messages import Bid
+from onboard.contract.codes import OrderResult
+from onboard.contract.messages import Bid
 from onboard.systems.turning.clamping import choose_clamping
-from onboard.systems.turning.messages import OrderResult
 from onboard.systems.turning.site import Turning
 
 if TYPE_CHECKING:  # the page's libraries are an extra

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from onboard.core.codes import Criterion
+from onboard.contract.codes import Criterion
 from onboard.core.serial import ms_after
 from onboard.core.site import Site, Timing
 

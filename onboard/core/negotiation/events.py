@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol
 
-from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
-from onboard.core.messages import NO_REFERENCE, Award, CallForProposals, Itinerary, Message, Reference
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason
+from onboard.contract.messages import NO_REFERENCE, Award, CallForProposals, Itinerary, Message, Reference
 
 
 class CallKey(NamedTuple):

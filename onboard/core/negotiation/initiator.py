@@ -10,9 +10,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
-from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Operation, Reason, TaskPhase
+from onboard.contract.codes import CallResult, Criterion, Grade, Operation, Reason, TaskPhase
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, Reference, TaskReport
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Reference, TaskReport
 from onboard.core.negotiation.bidding import beats, cut_off_us, is_below
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import CallTerms, Closed, NegotiationEvent

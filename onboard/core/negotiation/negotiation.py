@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-from onboard.core.codes import NOBODY, KindCode, Reason, TaskPhase
+from onboard.contract.codes import KindCode, Reason, TaskPhase
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, LeftOut, Message, Reference, TaskReport
 from onboard.core.effects import Effect
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, LeftOut, Message, Reference, TaskReport
 from onboard.core.negotiation.bidding import ANY_TIME, DelayRule, Slot, delay_us, last_bid_us, slot_of
 from onboard.core.negotiation.counters import Counters
 from onboard.core.negotiation.events import Awarded, CallKey, CallTerms, Estimator, NegotiationEvent, PreAssigned

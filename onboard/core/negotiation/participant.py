@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from onboard.core.codes import CallResult, Reason
+from onboard.contract.codes import CallResult, Reason
+from onboard.contract.messages import Award, Bid, CallForProposals, Reference
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Bid, CallForProposals, Reference
 from onboard.core.negotiation.bidding import (
     ANY_TIME,
     DelayRule,

@@ -8,9 +8,9 @@ until it lapses soon after the outer deadline. An option never moves a machine. 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
-from onboard.core.codes import NOBODY
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.effects import Effect
-from onboard.core.messages import CallForProposals, Reference
 from onboard.core.negotiation.bidding import last_bid_us
 from onboard.core.negotiation.events import Answer, CallTerms, NegotiationEvent
 from onboard.core.negotiation.initiator import Initiator, State

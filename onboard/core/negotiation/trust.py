@@ -8,8 +8,8 @@ whoever fails again is found again.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Criterion
-from onboard.core.messages import LeftOut, Reference
+from onboard.contract.codes import Criterion
+from onboard.contract.messages import LeftOut, Reference
 from onboard.core.negotiation.bidding import cost_difference
 from onboard.core.serial import to_bus_ms
 

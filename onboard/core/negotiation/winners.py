@@ -8,9 +8,10 @@ what it is about may be in the winner's custody. Words that repeat themselves ar
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
 
-from onboard.core.codes import NOBODY, CallResult, Criterion, Reason
+from onboard.contract.codes import CallResult, Criterion, Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Reference
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Reference
 from onboard.core.mirror import Obstacle
 from onboard.core.negotiation.events import NegotiationEvent
 from onboard.core.negotiation.negotiation import Negotiation

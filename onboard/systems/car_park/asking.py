@@ -7,7 +7,7 @@ that lift taken until then, and asks again for what has changed.
 
 from dataclasses import dataclass
 
-from onboard.core.messages import CallForProposals
+from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import Answer, Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution

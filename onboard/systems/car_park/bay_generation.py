@@ -5,8 +5,8 @@ Independent of the others' plans (row P21), unlike the robot's: it knows only it
 
 from dataclasses import dataclass
 
-from onboard.core.codes import Criterion, Operation
-from onboard.core.messages import CallForProposals
+from onboard.contract.codes import Criterion, Operation
+from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine

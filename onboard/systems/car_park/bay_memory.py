@@ -8,11 +8,12 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import Operation
+from onboard.contract.constants import OUTSIDE
+from onboard.contract.messages import CarAt, Reference
 from onboard.core.authority import TokenKey
-from onboard.core.codes import OUTSIDE, Operation
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
-from onboard.core.messages import CarAt, Reference
 from onboard.core.records import RetiredRecord, TokenGivenRecord
 from onboard.core.serial import successor
 from onboard.systems.car_park.bay_task import queue_ticket

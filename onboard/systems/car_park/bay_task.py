@@ -5,9 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from onboard.core.authority import TokenKey
-from onboard.core.codes import (
-    OUTSIDE,
+from onboard.contract.codes import (
     CallResult,
     Criterion,
     DeskInput,
@@ -18,8 +16,10 @@ from onboard.core.codes import (
     Reason,
     TaskPhase,
 )
+from onboard.contract.constants import OUTSIDE
+from onboard.contract.messages import Award, BayState, CallForProposals, Reference, TaskReport, TokenRefusal
+from onboard.core.authority import TokenKey
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, BayState, CallForProposals, Reference, TaskReport, TokenRefusal
 from onboard.core.negotiation import CallTerms
 from onboard.systems.car_park.site import CarLimits
 from onboard.ways.mirror import WayMirror

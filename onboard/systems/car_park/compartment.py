@@ -8,12 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey, station_token
-from onboard.core.codes import (
-    ANY_STATION,
-    NOBODY,
-    OUTSIDE,
-    TASK_VERSION_BITS,
+from onboard.contract.codes import (
     CallResult,
     DeskInput,
     DeskText,
@@ -29,8 +24,8 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Effect, Report, Send
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION, NOBODY, OUTSIDE, TASK_VERSION_BITS
+from onboard.contract.messages import (
     BayState,
     CarAt,
     DeskEvent,
@@ -42,6 +37,8 @@ from onboard.core.messages import (
     TokenRefusal,
     TokenRequest,
 )
+from onboard.core.authority import TokenKey, station_token
+from onboard.core.effects import Effect, Report, Send
 from onboard.core.negotiation import EVENT_TYPES, Awarded, AwardedAgain, Closed, NegotiationEvent
 from onboard.core.serial import successor
 from onboard.core.site import Station

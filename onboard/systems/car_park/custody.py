@@ -9,10 +9,11 @@ knows the token.
 
 from collections.abc import Container, Iterable
 
+from onboard.contract.codes import Reason, TokenKind
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import CarAt, Reference, TokenGrant
 from onboard.core.authority import TokenKey
-from onboard.core.codes import ANY_STATION, OUTSIDE, Reason, TokenKind
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import CarAt, Reference, TokenGrant
 from onboard.core.site import Station
 from onboard.systems.car_park.bay_memory import car_record
 from onboard.ways.mirror import WayFleet, WayMirror

@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple
 
-from onboard.core.codes import MOBILE_KINDS, Grade, LegAction, TokenKind
-from onboard.core.messages import BusTime, Itinerary, Leg, Progress, TokenGrant, TokenHeld
+from onboard.contract.codes import Grade, LegAction, TokenKind
+from onboard.contract.constants import MOBILE_KINDS
+from onboard.contract.messages import BusTime, Itinerary, Leg, Progress, TokenGrant, TokenHeld
 from onboard.core.serial import ms_after
 from onboard.core.site import Segment, Site
 from onboard.trace.chart.over_time import BOTTOM, GAP, LEFT, RIGHT, TOP, WIDTH, name_machines, time_axis

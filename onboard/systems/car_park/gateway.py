@@ -6,8 +6,9 @@ It is the same path as a customer's press (row P52), and the compartment calls f
 from collections.abc import Callable
 from typing import Any
 
-from onboard.core.codes import ANY_STATION, OUTSIDE, Operation, OperatorAction
-from onboard.core.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
+from onboard.contract.codes import Operation, OperatorAction
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
 from onboard.gateway.dialect import Json
 from onboard.gateway.edge import Body, Edge
 from onboard.gateway.order import Order, Wish

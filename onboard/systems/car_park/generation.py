@@ -10,8 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import ANY_STATION, Criterion, Grade, LegAction, Operation
-from onboard.core.messages import CallForProposals, Stamp
+from onboard.contract.codes import Criterion, Grade, LegAction, Operation
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals, Stamp
 from onboard.core.negotiation import Needs, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine, Segment, Station

@@ -12,8 +12,8 @@ Wherever the two plans want one segment at one time:
 from dataclasses import dataclass
 from enum import Enum
 
+from onboard.contract.codes import LegAction
 from onboard.core.authority import segment_token
-from onboard.core.codes import LegAction
 from onboard.core.serial import ranks_before
 from onboard.systems.car_park.program import Program, Step
 from onboard.ways.kinematics import run_duration_us

@@ -8,10 +8,11 @@ for anew by their initiators. A task whose car is aboard is never given back: it
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import Grade, LegAction, Reason, TaskPhase
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
 from onboard.core.authority import segment_token, station_token
-from onboard.core.codes import NOBODY, Grade, LegAction, Reason, TaskPhase
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.messages import CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport
 from onboard.core.site import Segment
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration

@@ -7,10 +7,11 @@ to the actuator.
 
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import ShuttleAction, ShuttleMode
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import ShuttleOrder, ShuttleState
 from onboard.core.authority import TokenKey, station_token
-from onboard.core.codes import ANY_STATION, ShuttleAction, ShuttleMode
 from onboard.core.effects import Effect, Record
-from onboard.core.messages import ShuttleOrder, ShuttleState
 from onboard.core.motion_authority import Permit, authorised
 from onboard.core.serial import successor
 from onboard.systems.car_park import custody

@@ -7,9 +7,9 @@ begun. Let go, it plans the same work anew from where it stands.
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import DriveMode, LegAction, TaskPhase
+from onboard.contract.codes import DriveMode, LegAction, TaskPhase
+from onboard.contract.messages import ManualOrder, Message, Reference, TaskReport
 from onboard.core.effects import Effect
-from onboard.core.messages import ManualOrder, Message, Reference, TaskReport
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.program import Phase

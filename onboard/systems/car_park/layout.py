@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from onboard.config.reader import Table, type_name
 from onboard.config.toml_lines import path_text
-from onboard.core.codes import Side
+from onboard.contract.codes import Side
 from onboard.core.site import Segment, Station
 from onboard.ways.site import Track, TrackKind
 

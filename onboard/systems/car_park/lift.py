@@ -9,11 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
-from onboard.core.authority import TokenKey, segment_token
-from onboard.core.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
-from onboard.core.effects import Effect, Record, Send
-from onboard.core.journal_records import records_in
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, DriveMode, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
+from onboard.contract.messages import (
     Award,
     DriveOrder,
     DriveState,
@@ -24,6 +21,9 @@ from onboard.core.messages import (
     Progress,
     TaskReport,
 )
+from onboard.core.authority import TokenKey, segment_token
+from onboard.core.effects import Effect, Record, Send
+from onboard.core.journal_records import records_in
 from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, AwardedAgain, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import from_bus_ms, successor

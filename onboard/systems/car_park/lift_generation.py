@@ -7,8 +7,8 @@ before the bid is answered from the schedule: the others' rides, and the options
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Criterion, LegAction, Operation
-from onboard.core.messages import CallForProposals, Reference
+from onboard.contract.codes import Criterion, LegAction, Operation
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine

@@ -3,7 +3,7 @@
 from onboard.config.fleet import Fleet
 from onboard.config.reader import Table
 from onboard.config.toml_lines import path_text
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment
 from onboard.systems.car_park.layout import FIRST_LIFT, SIDES, Layout
 from onboard.ways.site import Track

@@ -7,10 +7,10 @@ which do nothing when they come twice; a desk that hears the number of its last 
 
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour, Reason
+from onboard.contract.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference
 from onboard.core.authority import TokenKey
-from onboard.core.codes import DeskText, DoorAction, DoorName, DoorPosition, LightColour, Reason
 from onboard.core.effects import Effect, Record, Tell
-from onboard.core.messages import BayState, DeskOrder, DoorOrder, DoorState, LightOrder, Reference
 from onboard.core.motion_authority import ALONE, MotionAuthority, Permit, authorised
 from onboard.core.serial import successor
 from onboard.systems.car_park.records import DoorRecord

@@ -7,9 +7,10 @@ lower stamp; the other leaves its car elsewhere. A place in which a car stands i
 
 from dataclasses import dataclass
 
+from onboard.contract.codes import LegAction
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import Itinerary
 from onboard.core.authority import station_token
-from onboard.core.codes import ANY_STATION, LegAction
-from onboard.core.messages import Itinerary
 from onboard.core.site import Station
 from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
-from onboard.core.codes import Grade, LegAction, Side
-from onboard.core.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
+from onboard.contract.codes import Grade, LegAction, Side
+from onboard.contract.messages import CallForProposals, Itinerary, Leg, Reference, Stamp
 from onboard.core.serial import from_bus_ms, successor, to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.ways.lifts import lift_at, platform_on, sill

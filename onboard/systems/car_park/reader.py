@@ -5,7 +5,7 @@ from dataclasses import replace
 from onboard.config.fleet import Fleet
 from onboard.config.reader import Common, Table
 from onboard.config.timing import read_timing
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.car_park.constants import read_constants
 from onboard.systems.car_park.layout import Layout, read_layout
 from onboard.systems.car_park.machines import read_fleet, read_stewards

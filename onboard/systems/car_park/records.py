@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import DoorAction, DoorName, Operation
+from onboard.contract.codes import DoorAction, DoorName, Operation
+from onboard.contract.messages import Reference
 from onboard.core.journal_records import UNSAID, End, JournalRecord, Keep, RecordTypes, Which
-from onboard.core.messages import Reference
 from onboard.systems.car_park.program import Handling, Phase
 
 _CAR = ("car",)

@@ -8,17 +8,11 @@ say that the carrier stands (design, section 5).
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 
-from onboard.core.codes import (
-    TASK_VERSION_BITS,
-    CallResult,
-    Criterion,
-    KindCode,
-    LegAction,
-    ShuttleMode,
-)
+from onboard.contract.codes import CallResult, Criterion, KindCode, LegAction, ShuttleMode
+from onboard.contract.constants import TASK_VERSION_BITS
+from onboard.contract.messages import Award, CallForProposals, CarAt, Reference, ShuttleState
 from onboard.core.effects import Effect, Record
 from onboard.core.journal_records import Entry, JournalRecord, records_in
-from onboard.core.messages import Award, CallForProposals, CarAt, Reference, ShuttleState
 from onboard.core.records import BootRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station

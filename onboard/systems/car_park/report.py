@@ -1,6 +1,6 @@
 """What a car park is, in lines for a person: size, machines, refuges, and what the loss of a lift strands."""
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Segment, Station
 from onboard.systems.car_park.room import ranges_text, robots_of, robots_text, room_text
 from onboard.ways.reach import hidden_by, reached, stranded_by

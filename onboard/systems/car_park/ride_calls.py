@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import replace
 
-from onboard.core.codes import Criterion, KindCode, LegAction, Operation
+from onboard.contract.codes import Criterion, KindCode, LegAction, Operation
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.effects import Effect
-from onboard.core.messages import CallForProposals, Reference
 from onboard.core.negotiation import Answer, CallTerms
 from onboard.systems.car_park.program import Step
 from onboard.ways.lifts import sill

@@ -5,19 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from onboard.core.authority import TokenKey
-from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import (
-    CallResult,
-    Grade,
-    KindCode,
-    LegAction,
-    MachineState,
-    Reason,
-    TaskPhase,
-)
-from onboard.core.effects import Effect, Halt, Report, Send
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, Grade, KindCode, LegAction, MachineState, Reason, TaskPhase
+from onboard.contract.messages import (
     Award,
     CallForProposals,
     DriveState,
@@ -29,6 +18,9 @@ from onboard.core.messages import (
     Stamp,
     TaskReport,
 )
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet
+from onboard.core.effects import Effect, Halt, Report, Send
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Answer as LiftAnswer
 from onboard.core.negotiation import Awarded, AwardedAgain, Estimator, NegotiationEvent, PreAssigned, Released

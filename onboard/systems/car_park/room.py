@@ -9,7 +9,7 @@ from itertools import groupby
 
 from onboard.config.fleet import Fleet
 from onboard.config.reader import Table
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.ways.reach import passages
 from onboard.ways.refuges import open_refuges

@@ -2,14 +2,8 @@
 
 from typing import Any
 
-from onboard.core.codes import KindCode, LegAction, TokenKind
-from onboard.core.messages import (
-    BayState,
-    DoorState,
-    Message,
-    Progress,
-    ShuttleState,
-)
+from onboard.contract.codes import KindCode, LegAction, TokenKind
+from onboard.contract.messages import BayState, DoorState, Message, Progress, ShuttleState
 from onboard.core.site import Segment
 from onboard.trace.scene.scene import Json
 from onboard.trace.view import SiteView

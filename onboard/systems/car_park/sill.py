@@ -7,10 +7,10 @@ back, the lift does not move. No time, no plan and no earlier word stands for it
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import Reason
+from onboard.contract.messages import Progress, SyncRequest
 from onboard.core.authority import segment_token
-from onboard.core.codes import Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Progress, SyncRequest
 from onboard.core.site import Segment
 from onboard.ways.lifts import GATE_INDEX, gate, lift_index_of, platform, says_standing
 from onboard.ways.mirror import WayFleet

@@ -7,8 +7,9 @@ that I am in. The time that this may last decides nothing but how soon somebody 
 
 from dataclasses import dataclass
 
+from onboard.contract.codes import KindCode
+from onboard.contract.constants import NOBODY
 from onboard.core.authority import segment_token
-from onboard.core.codes import NOBODY, KindCode
 from onboard.core.serial import ranks_before
 from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import Final, NamedTuple
 
-from onboard.core.codes import DriveMode, LegAction, ShuttleMode
+from onboard.contract.codes import DriveMode, LegAction, ShuttleMode
+from onboard.contract.messages import CallForProposals, Stamp
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.messages import CallForProposals, Stamp
 from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.generation import CarParkGeneration

@@ -7,10 +7,20 @@ winner, journals that, and then says FORFEITED; whoever wants the task done call
 
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import CallResult, Operation, Reason, TaskPhase, TokenKind
+from onboard.contract.constants import NOBODY, OUTSIDE, TASK_VERSION_BITS
+from onboard.contract.messages import (
+    Award,
+    CallForProposals,
+    CarAt,
+    Itinerary,
+    Message,
+    Reference,
+    TaskReport,
+    TokenGrant,
+)
 from onboard.core.authority import TokenKey, station_token
-from onboard.core.codes import NOBODY, OUTSIDE, TASK_VERSION_BITS, CallResult, Operation, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, CallForProposals, CarAt, Itinerary, Message, Reference, TaskReport, TokenGrant
 from onboard.core.mirror import Obstacle
 from onboard.core.negotiation.winners import patience_us
 from onboard.core.petitions import UNORDERED

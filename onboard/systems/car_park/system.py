@@ -1,6 +1,6 @@
 """A robotized car park: robots, lifts and compartments."""
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.car_park.compartment_factory import CompartmentFactory
 from onboard.systems.car_park.lift_factory import LiftFactory
 from onboard.systems.car_park.records import RECORDS

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Site
 from onboard.trace.frame_length import longest_frame_bits
 from onboard.trace.response import ANYBODY, Stream

@@ -11,10 +11,10 @@ until it is turned back its axis is the spur's, with the mouth at index 0; there
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 
+from onboard.contract.codes import DriveMode, Reason, TokenKind
+from onboard.contract.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.authority import TokenKey, segment_token
-from onboard.core.codes import DriveMode, Reason, TokenKind
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import DriveOrder, DriveState, Progress, Waiting
 from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.serial import successor
 from onboard.core.site import Segment

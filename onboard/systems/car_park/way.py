@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from onboard.core.codes import LegAction
+from onboard.contract.codes import LegAction
 from onboard.core.site import Segment
 from onboard.systems.car_park.program import Step
 from onboard.ways.lifts import lift_at, platform

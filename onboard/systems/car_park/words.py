@@ -1,7 +1,7 @@
 """Words of a robotized car park: cars by their tickets, compartments by name, places as p(2,7)F."""
 
-from onboard.core.codes import Operation, TaskPhase
-from onboard.core.messages import Reference
+from onboard.contract.codes import Operation, TaskPhase
+from onboard.contract.messages import Reference
 from onboard.systems.words import SiteWords
 from onboard.ways.site import WaySite
 

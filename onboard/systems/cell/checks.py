@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from math import isfinite
 
-from onboard.core.messages import Bid, CallForProposals, Reference
-from onboard.systems.cell.messages import ArmProgress, GoalPath, OfferHigh, OfferLow, PartAt, from_halves, nodes_of
+from onboard.contract.cell import ArmProgress, GoalPath, OfferHigh, OfferLow, PartAt
+from onboard.contract.messages import Bid, CallForProposals, Reference
+from onboard.systems.cell.fields import from_halves, nodes_of
 from onboard.systems.cell.site import Area, Cell, Point
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding

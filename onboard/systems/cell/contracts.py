@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from onboard.core.codes import TokenKind
-from onboard.core.messages import Reference
+from onboard.contract.codes import TokenKind
+from onboard.contract.messages import Reference
 from onboard.core.serial import ms_after
 from onboard.core.token_keys import TokenKey
 from onboard.systems.cell.geometry import Area, Point, shortest_way, way_length_m

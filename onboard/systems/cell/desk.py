@@ -8,12 +8,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from onboard.contract.cell import ArmProgress, PartAt
+from onboard.contract.cell_device import OrderAnswer, OrderFrom, OrderTo
+from onboard.contract.codes import KindCode, OrderResult, Reason, TokenKind
+from onboard.contract.messages import CallForProposals, Message, Reference
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import KindCode, Reason, TokenKind
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
-from onboard.core.messages import CallForProposals, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.serial import to_bus_ms
@@ -22,7 +24,6 @@ from onboard.systems.cell.contracts import Goal, part_token
 from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import Hearsay
-from onboard.systems.cell.messages import ArmProgress, OrderAnswer, OrderFrom, OrderResult, OrderTo, PartAt
 from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderState, WorkOrder

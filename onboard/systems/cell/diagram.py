@@ -1,7 +1,7 @@
 """A cell over time: a row an arm, bars for what it does, and a line for each part that goes from arm to arm."""
 
-from onboard.core.messages import Message, Reference
-from onboard.systems.cell.messages import ArmPhase, ArmProgress, PartAt
+from onboard.contract.cell import ArmPhase, ArmProgress, PartAt
+from onboard.contract.messages import Message, Reference
 from onboard.systems.cell.site import Cell
 from onboard.trace.chart.over_time import Bar, Line, Panel, Rows
 

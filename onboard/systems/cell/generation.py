@@ -3,15 +3,16 @@
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
-from onboard.core.codes import ANY_STATION, Criterion, KindCode, Operation
-from onboard.core.messages import CallForProposals, Reference
+from onboard.contract.codes import Criterion, KindCode, Operation
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.negotiation import Answer, CallKey, CallTerms, Needs, Proposal
 from onboard.core.serial import from_bus_ms, successor
 from onboard.core.site import Machine
 from onboard.systems.cell.contracts import Arm, Contract, Goal, Move, filtered, moves
+from onboard.systems.cell.fields import MAX_PATH
 from onboard.systems.cell.geometry import Point, distance_m, shortest_way, way_length_m
 from onboard.systems.cell.goal_frames import Hearsay, cost_of_bid, goal_messages, offer_messages
-from onboard.systems.cell.messages import MAX_PATH
 from onboard.systems.cell.site import Cell
 
 #: Sub-goals remembered, so that one and the same part of a goal keeps its name when it is looked at again.

@@ -3,10 +3,7 @@
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from onboard.core.messages import Bid, CallForProposals, Message, Reference
-from onboard.systems.cell.contracts import Contract, Goal
-from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.messages import (
+from onboard.contract.cell import (
     GoalEnd,
     GoalPath,
     GoalStart,
@@ -18,11 +15,11 @@ from onboard.systems.cell.messages import (
     OfferHigh,
     OfferLow,
     OfferNodes,
-    five,
-    from_halves,
-    halves,
-    nodes_of,
 )
+from onboard.contract.messages import Bid, CallForProposals, Message, Reference
+from onboard.systems.cell.contracts import Contract, Goal
+from onboard.systems.cell.fields import five, from_halves, halves, nodes_of
+from onboard.systems.cell.geometry import Point
 
 #: Most goals and offers remembered of others; the oldest go first. A goal is called for right after it is told.
 MAX_KNOWN = 256

@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from onboard.contract.messages import Reference
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Reference
 from onboard.systems.cell.contracts import Contract, Goal, Move
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.records import ContractLostRecord, ContractRecord, Stage, StageRecord

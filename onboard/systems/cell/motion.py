@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass, field
 
+from onboard.contract.cell import ArmMode
+from onboard.contract.cell_device import ArmOrder, ArmState
+from onboard.contract.codes import Reason
 from onboard.core.authority import TokenKey
-from onboard.core.codes import Reason
 from onboard.core.effects import Effect
 from onboard.core.motion_authority import MotionAuthority, authorised
 from onboard.systems.cell.contracts import Arm
 from onboard.systems.cell.geometry import Area, Point, crosses, shortest_way
-from onboard.systems.cell.messages import ArmMode, ArmOrder, ArmState
 from onboard.work.device_link import DeviceLink
 
 #: The position sensor tells whole millimetres: a robot on an obstacle's border may seem so far inside.

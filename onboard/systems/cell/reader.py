@@ -6,7 +6,7 @@ from dataclasses import replace
 from onboard.config.fleet import Fleet
 from onboard.config.reader import Common, Table
 from onboard.config.timing import read_timing
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.cell.site import MAX_COORDINATE_MM, Area, Arm, Cell, Point, Wish
 

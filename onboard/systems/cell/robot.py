@@ -8,11 +8,13 @@ them is ``active``, the most urgent whose part this robot may take (row C15).
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from onboard.contract.cell import ArmMode, ArmPhase, ArmProgress, GripAction, GripMode, PartAt
+from onboard.contract.cell_device import ArmState, GripOrder, GripState
+from onboard.contract.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import CallResult, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Message, Reference, SyncRequest, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import authorised
 from onboard.core.negotiation import Awarded, Closed, Estimator, NegotiationEvent, PreAssigned, Released
@@ -23,17 +25,6 @@ from onboard.systems.cell.generation import ArmGeneration, call_terms
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.goal_frames import contract_messages
 from onboard.systems.cell.memory import Undertaking, lost_record, stage_record, undertakings, won_record
-from onboard.systems.cell.messages import (
-    ArmMode,
-    ArmPhase,
-    ArmProgress,
-    ArmState,
-    GripAction,
-    GripMode,
-    GripOrder,
-    GripState,
-    PartAt,
-)
 from onboard.systems.cell.motion import Driver
 from onboard.systems.cell.records import Stage
 from onboard.systems.cell.site import Cell

@@ -4,9 +4,9 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from typing import TypeVar
 
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Message, Reference, TaskReport
-from onboard.systems.cell.messages import ArmPhase, ArmProgress, GoalEnd, GoalStart, MoveFrom, MoveTo, PartAt
+from onboard.contract.cell import ArmPhase, ArmProgress, GoalEnd, GoalStart, MoveFrom, MoveTo, PartAt
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import Message, Reference, TaskReport
 from onboard.systems.cell.site import Area, Cell
 from onboard.trace.scene.scene import Json, Spot, shape, still
 from onboard.trace.view import SiteView

@@ -1,6 +1,6 @@
 """A manufacturing cell: arms and the goal desk."""
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.cell.desk import DeskFactory
 from onboard.systems.cell.records import RECORDS
 from onboard.systems.cell.robot import ArmFactory

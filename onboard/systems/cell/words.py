@@ -2,9 +2,9 @@
 
 from collections import OrderedDict
 
-from onboard.core.codes import ANY_STATION
-from onboard.core.messages import CallForProposals, Message, Reference
-from onboard.systems.cell.messages import ArmPhase, ArmProgress, GoalEnd, GoalStart
+from onboard.contract.cell import ArmPhase, ArmProgress, GoalEnd, GoalStart
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals, Message, Reference
 from onboard.systems.cell.site import Cell
 from onboard.systems.words import SiteWords
 

@@ -6,23 +6,17 @@ Rows G04 to G06, G15 to G22. An agent acts on signals for its own node and on wh
 from dataclasses import dataclass, field
 from zlib import crc32
 
+from onboard.contract.codes import KindCode, MachineState, Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, TurnSignal
+from onboard.contract.messages import Heartbeat, Message, TokenGrant
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import NOBODY, KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Heartbeat, Message, TokenGrant
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator, NegotiationEvent
 from onboard.core.site import Machine, Site
-from onboard.systems.graph.messages import (
-    NO_NODE,
-    EdgeNotice,
-    EdgeState,
-    NodeAnswer,
-    NodeVerdict,
-    RobotAt,
-    TurnSignal,
-)
+from onboard.systems.graph.fields import NO_NODE
 from onboard.systems.graph.network import NOWHERE, Edge, edge
 from onboard.systems.graph.rights import edge_token, keeper, slot_token
 from onboard.systems.graph.rules import Heading, Rules, are_head_on, kept_edge, may_enter, other_edges

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 
-from onboard.systems.graph.messages import NO_NODE, EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, TurnSignal
+from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, TurnSignal
+from onboard.systems.graph.fields import NO_NODE
 from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding

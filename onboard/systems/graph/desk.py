@@ -4,25 +4,19 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar
 
+from onboard.contract.codes import KindCode, OrderResult, Reason, TaskPhase
+from onboard.contract.constants import NOBODY
+from onboard.contract.graph import RobotAt, RobotMode, VisitList
+from onboard.contract.graph_device import VisitAnswer, VisitKey
+from onboard.contract.messages import Message, Reference, TaskReport
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import NOBODY, KindCode, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
 from onboard.core.journal_records import records_in
-from onboard.core.messages import Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.site import Machine, Site
 from onboard.systems.graph.errands import TRANSPORT_STOPS
-from onboard.systems.graph.messages import (
-    OrderResult,
-    RobotAt,
-    RobotMode,
-    VisitAnswer,
-    VisitKey,
-    VisitList,
-    five,
-    stops_of,
-)
+from onboard.systems.graph.fields import five, stops_of
 from onboard.systems.graph.planning import call_terms, least_finish_ms
 from onboard.systems.graph.records import VisitRecord
 from onboard.systems.graph.site import FactoryGraph

@@ -1,7 +1,7 @@
 """A factory graph over time: a row a node, neighbours near each other, and robots from node to node."""
 
-from onboard.core.messages import Message
-from onboard.systems.graph.messages import RobotAt, RobotMode
+from onboard.contract.graph import RobotAt, RobotMode
+from onboard.contract.messages import Message
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.graph.words import node_name
 from onboard.trace.chart.over_time import Bar, Line, Panel, Rows, by_distance

@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from onboard.contract.messages import Reference
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Reference
 from onboard.systems.graph.records import ErrandLostRecord, ErrandRecord
 
 #: From here to there: an errand that was called for and not begun.

@@ -3,13 +3,14 @@
 from collections.abc import Callable
 from typing import Any
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import Message
+from onboard.contract.codes import KindCode
+from onboard.contract.graph import RobotAt, VisitList
+from onboard.contract.messages import Message
 from onboard.gateway.edge import Body, Edge
 from onboard.gateway.order import Order, Wish
 from onboard.gateway.whereabouts import Tracker, Whereabouts
 from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
-from onboard.systems.graph.messages import NO_NODE, RobotAt, VisitList, five
+from onboard.systems.graph.fields import NO_NODE, five
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
 from onboard.trace.view import SiteView
 

@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import pairwise
 
-from onboard.core.codes import Criterion, KindCode, Operation
-from onboard.core.messages import CallForProposals, Reference
+from onboard.contract.codes import Criterion, KindCode, Operation
+from onboard.contract.graph import RobotAt
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.negotiation import CallKey, CallTerms, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
 from onboard.systems.graph.errands import Errand
-from onboard.systems.graph.messages import NO_NODE, RobotAt
+from onboard.systems.graph.fields import NO_NODE
 from onboard.systems.graph.network import NOWHERE, Direction, Graph
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph

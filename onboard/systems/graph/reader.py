@@ -7,7 +7,7 @@ from typing import Any
 from onboard.config.fleet import Fleet
 from onboard.config.reader import Common, Table
 from onboard.config.timing import read_timing
-from onboard.core.codes import KindCode, Side
+from onboard.contract.codes import KindCode, Side
 from onboard.core.site import Segment, Station
 from onboard.systems.graph.site import MAX_CAPACITY, MAX_NODE, MAX_STOPS, FactoryGraph, Graph, Order, Rules, edge
 

@@ -5,6 +5,7 @@ Both are taken up in the order in which they first came.
 
 from dataclasses import dataclass, field
 
+from onboard.contract.messages import Reference
 from onboard.core.journal_records import (
     MOST_OVER,
     UNSAID,
@@ -15,7 +16,6 @@ from onboard.core.journal_records import (
     Which,
     stored_as,
 )
-from onboard.core.messages import Reference
 from onboard.work.order_life import OVER, OrderState
 
 _TASK = ("task",)

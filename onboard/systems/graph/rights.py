@@ -4,8 +4,8 @@ An edge's token is that of segment (lower end, higher end); a slot's that of sta
 host of the (lower) node's agent at first, but for the slots in which robots stand.
 """
 
+from onboard.contract.codes import Side
 from onboard.core.authority import TokenKey, segment_token, station_token
-from onboard.core.codes import Side
 from onboard.core.site import Segment, Station
 from onboard.systems.graph.network import edge
 from onboard.systems.graph.site import FactoryGraph

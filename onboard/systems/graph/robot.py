@@ -6,31 +6,28 @@ asked for before the edge, so that nobody who holds an edge waits for anything b
 
 from dataclasses import dataclass, field
 
-from onboard.core.authority import TokenKey
-from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase, TokenKind
-from onboard.core.effects import Effect, Send
-from onboard.core.messages import Heartbeat, ManualOrder, Message, Reference, TaskReport
-from onboard.core.mirror import Mirror
-from onboard.core.motion_authority import Permit, authorised
-from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
-from onboard.core.site import Machine, Site
-from onboard.systems.graph.errands import TRANSPORT_STOPS, Errand, errand_record, errands, lost_record
-from onboard.systems.graph.messages import (
-    NO_NODE,
-    ApproachSensor,
+from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.contract.graph import (
     BodyPlace,
-    BodyState,
     NodeAnswer,
     NodeVerdict,
     RobotAt,
     RobotMode,
     RouteAction,
-    RouteOrder,
     TurnSignal,
     VisitList,
-    stops_of,
 )
+from onboard.contract.graph_device import ApproachSensor, BodyState, RouteOrder
+from onboard.contract.messages import Heartbeat, ManualOrder, Message, Reference, TaskReport
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet
+from onboard.core.effects import Effect, Send
+from onboard.core.mirror import Mirror
+from onboard.core.motion_authority import Permit, authorised
+from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
+from onboard.core.site import Machine, Site
+from onboard.systems.graph.errands import TRANSPORT_STOPS, Errand, errand_record, errands, lost_record
+from onboard.systems.graph.fields import NO_NODE, stops_of
 from onboard.systems.graph.network import NOWHERE
 from onboard.systems.graph.planning import Position, RobotPlanning, told_way
 from onboard.systems.graph.rights import edge_token, keeper, slot_token

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass
 
-from onboard.core.codes import Operation
-from onboard.core.messages import Message, Reference
-from onboard.systems.graph.messages import NO_NODE, EdgeNotice, EdgeState, RobotAt, VisitList, stops_of
+from onboard.contract.codes import Operation
+from onboard.contract.graph import EdgeNotice, EdgeState, RobotAt, VisitList
+from onboard.contract.messages import Message, Reference
+from onboard.systems.graph.fields import NO_NODE, stops_of
 from onboard.systems.graph.site import FactoryGraph
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import NEARLY, Json, Spot, along, shape, still

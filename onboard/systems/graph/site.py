@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Machine, Needs, Site
 from onboard.systems.graph.network import Edge, Graph, edge
 from onboard.systems.graph.rules import Rules

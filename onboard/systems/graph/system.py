@@ -1,6 +1,6 @@
 """A factory graph: robots, the nodes that host their agents, and the desk."""
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.graph.agents import HostFactory
 from onboard.systems.graph.desk import DeskFactory
 from onboard.systems.graph.records import RECORDS

@@ -1,8 +1,10 @@
 """Words of a factory graph: nodes as N7, edges as N3-N7, orders by their numbers."""
 
-from onboard.core.codes import ANY_STATION, TokenKind
-from onboard.core.messages import Message, Reference
-from onboard.systems.graph.messages import NO_NODE, RobotAt, RobotMode
+from onboard.contract.codes import TokenKind
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.graph import RobotAt, RobotMode
+from onboard.contract.messages import Message, Reference
+from onboard.systems.graph.fields import NO_NODE
 from onboard.systems.graph.site import FactoryGraph
 from onboard.systems.words import SiteWords
 

@@ -9,7 +9,7 @@ As both sides order by the same cost, that ends in the one stable outcome whatev
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from onboard.core.messages import Bid, CallForProposals
+from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.negotiation import Proposal
 from onboard.core.site import Timing
 from onboard.systems.mapd.calls import task_of

@@ -1,11 +1,11 @@
 """Tasks as calls of the core: each stands until a robot has it aboard, and is open for bids in each round."""
 
-from onboard.core.codes import CallResult, Criterion, KindCode, Operation, Reason
-from onboard.core.messages import Award, Bid, CallForProposals, Reference
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason
+from onboard.contract.mapd import StepRound
+from onboard.contract.messages import Award, Bid, CallForProposals, Reference
 from onboard.core.negotiation import CallTerms
 from onboard.core.serial import to_bus_ms
 from onboard.systems.mapd.auction import Task
-from onboard.systems.mapd.messages import StepRound
 
 #: Bits of a round in a bid, and of a step in an award (dbc/fleet.dbc: itinerary_version, task_version).
 _ROUND, _STEP = 0xFF, 0x7F

@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, field
 
+from onboard.contract.mapd import CartAction
+from onboard.contract.mapd_device import CartOrder, CartState
 from onboard.core.effects import Effect
 from onboard.core.motion_authority import Permit
-from onboard.systems.mapd.messages import CartAction, CartOrder, CartState
 from onboard.work.device_link import DeviceLink
 
 #: An order that is not taken up is said again after this, us (dbc/mapd.dbc).

@@ -3,17 +3,10 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.messages import Award, Bid, CallForProposals
+from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn
+from onboard.contract.messages import Award, Bid, CallForProposals
 from onboard.systems.mapd.calls import is_of_step, mark_of, task_of
-from onboard.systems.mapd.messages import (
-    MOVE_BITS,
-    MOVES_A_FRAME,
-    PathHead,
-    PathMoves,
-    StepRound,
-    StepState,
-    StepTurn,
-)
+from onboard.systems.mapd.fields import MOVE_BITS, MOVES_A_FRAME
 from onboard.systems.mapd.site import Mapd
 from onboard.trace.check.calls import CROSSING_US
 from onboard.trace.check.event import Event, Finding

@@ -7,28 +7,19 @@ told of a step it has written down before, so that a desk that starts again tell
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import KindCode, MachineState, OrderResult, Reason
+from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn, TurnRequest
+from onboard.contract.mapd_device import TransportAnswer, TransportKey
+from onboard.contract.messages import Award, Bid, Message, Reference, SyncRequest
 from onboard.core.authority import TokenKey
-from onboard.core.codes import KindCode, MachineState, Reason
 from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Award, Bid, Message, Reference, SyncRequest
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
 from onboard.systems.mapd.auction import Task
 from onboard.systems.mapd.calls import award_of, call_of, mark_of, number_of, terms_of
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
-from onboard.systems.mapd.messages import (
-    NO_TASK,
-    OrderResult,
-    PathHead,
-    PathMoves,
-    StepRound,
-    StepState,
-    StepTurn,
-    TransportAnswer,
-    TransportKey,
-    TurnRequest,
-)
 from onboard.systems.mapd.records import AwardsRecord, RoundRecord, ServedRecord, TransportRecord
 from onboard.systems.mapd.rights import resource_of
 from onboard.systems.mapd.site import Mapd

@@ -1,7 +1,7 @@
 """A floor over time: of a map two panels, columns and rows; of a network its cells, neighbours near each other."""
 
-from onboard.core.messages import Message
-from onboard.systems.mapd.messages import StepState
+from onboard.contract.mapd import StepState
+from onboard.contract.messages import Message
 from onboard.systems.mapd.site import Mapd
 from onboard.trace.chart.over_time import Line, Panel, Rows, by_distance
 

@@ -2,15 +2,16 @@
 
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import Reason
+from onboard.contract.mapd import CartAction
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import Reason
 from onboard.core.effects import Effect
 from onboard.core.motion_authority import Permit, authorised
 from onboard.systems.mapd.cart import Cart
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.memory import served_record, step_record
-from onboard.systems.mapd.messages import NO_TASK, CartAction
 from onboard.systems.mapd.paths import Path
 from onboard.systems.mapd.rights import cell_token, resource_of
 from onboard.systems.mapd.site import Mapd

@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from onboard.core.messages import Message
+from onboard.contract.mapd import StepState
+from onboard.contract.messages import Message
 from onboard.gateway.edge import Edge
 from onboard.gateway.whereabouts import Tracker, Whereabouts
-from onboard.systems.mapd.messages import StepState
 from onboard.systems.mapd.site import Mapd
 
 

@@ -5,12 +5,13 @@ Made of frames alone, so that all have the same once all have heard all frames o
 
 from dataclasses import dataclass, field
 
-from onboard.core.messages import Bid, CallForProposals
+from onboard.contract.mapd import PathHead, PathMoves, StepState
+from onboard.contract.messages import Bid, CallForProposals
 from onboard.core.serial import is_newer
 from onboard.systems.mapd.auction import Rule, Task
 from onboard.systems.mapd.calls import task_of
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.floor import Floor
-from onboard.systems.mapd.messages import NO_TASK, PathHead, PathMoves, StepState
 from onboard.systems.mapd.moves import Assembly
 from onboard.systems.mapd.paths import Path, Paths
 

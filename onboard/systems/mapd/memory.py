@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from onboard.core.effects import Record
 from onboard.core.journal_records import Entry, records_in
-from onboard.systems.mapd.messages import NO_TASK
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.paths import Path
 from onboard.systems.mapd.records import PathRecord, ServedRecord, SetOutRecord
 

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+from onboard.contract.mapd import PathHead, PathMoves
 from onboard.core.effects import Effect, Send
+from onboard.systems.mapd.fields import MOST_MOVES, MOVE_BITS, MOVES_A_FRAME
 from onboard.systems.mapd.floor import Floor
-from onboard.systems.mapd.messages import MOST_MOVES, MOVE_BITS, MOVES_A_FRAME, PathHead, PathMoves
 from onboard.systems.mapd.paths import Path
 
 _MASK = (1 << MOVE_BITS) - 1

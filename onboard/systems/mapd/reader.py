@@ -6,9 +6,9 @@ from onboard.config.fleet import Fleet
 from onboard.config.problems import nearest
 from onboard.config.reader import Common, Table
 from onboard.config.timing import read_timing
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
-from onboard.systems.mapd.messages import MOST_WAYS
+from onboard.systems.mapd.fields import MOST_WAYS
 from onboard.systems.mapd.site import (
     FAR,
     FREE,

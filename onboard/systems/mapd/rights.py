@@ -4,8 +4,8 @@ It is that of a station, so that each robot's first cell is its own from the beg
 first. Later a right goes from robot to robot: who leaves a cell passes its right on to whoever comes there next.
 """
 
+from onboard.contract.codes import Side
 from onboard.core.authority import TokenKey, station_token
-from onboard.core.codes import Side
 from onboard.core.site import Station
 
 _PER_SIDE = 127

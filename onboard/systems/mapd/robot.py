@@ -9,28 +9,30 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 
+from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase
+from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState, StepTurn, TurnRequest
+from onboard.contract.mapd_device import CartState
+from onboard.contract.messages import (
+    Award,
+    Bid,
+    CallForProposals,
+    Message,
+    Reference,
+    SyncRequest,
+    TaskReport,
+    TokenGrant,
+)
 from onboard.core.authority import TokenKey
-from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, SyncRequest, TaskReport, TokenGrant
 from onboard.core.negotiation.bidding import ANY_TIME
 from onboard.core.serial import successor
 from onboard.systems.mapd.auction import Offer, Rule, cost
 from onboard.systems.mapd.bidding import Round, UnitGeneration, bid_timing
 from onboard.systems.mapd.calls import mark_of
 from onboard.systems.mapd.driving import Driving
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
 from onboard.systems.mapd.memory import path_record, read_past
-from onboard.systems.mapd.messages import (
-    NO_TASK,
-    CartState,
-    PathHead,
-    PathMoves,
-    StepRound,
-    StepState,
-    StepTurn,
-    TurnRequest,
-)
 from onboard.systems.mapd.moves import path_frames
 from onboard.systems.mapd.paths import Path
 from onboard.systems.mapd.search import find_path

@@ -7,18 +7,11 @@ is told to the view from here.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from onboard.core.codes import CallResult
-from onboard.core.messages import Award, CallForProposals, Message, Reference
-from onboard.systems.mapd.messages import (
-    MOVE_BITS,
-    MOVES_A_FRAME,
-    NO_TASK,
-    CartState,
-    PathHead,
-    PathMoves,
-    StepState,
-    StepTurn,
-)
+from onboard.contract.codes import CallResult
+from onboard.contract.mapd import PathHead, PathMoves, StepState, StepTurn
+from onboard.contract.mapd_device import CartState
+from onboard.contract.messages import Award, CallForProposals, Message, Reference
+from onboard.systems.mapd.fields import MOVE_BITS, MOVES_A_FRAME, NO_TASK
 from onboard.systems.mapd.site import FREE, Mapd
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import Json, Spot, along, shape, still

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Needs, Site
 from onboard.systems.mapd.auction import Task
 from onboard.systems.mapd.floor import FAR, FREE, Floor, Line, grid_floor, lasting_rests, network_floor

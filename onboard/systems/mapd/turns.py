@@ -2,9 +2,10 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.messages import Award
+from onboard.contract.mapd import StepTurn
+from onboard.contract.messages import Award
 from onboard.systems.mapd.calls import is_of_step
-from onboard.systems.mapd.messages import NO_TASK, StepTurn
+from onboard.systems.mapd.fields import NO_TASK
 
 
 @dataclass

@@ -1,9 +1,10 @@
 """Words of a pick-up and delivery site: cells by the names of its map, tasks by their numbers."""
 
-from onboard.core.codes import Criterion, TokenKind
-from onboard.core.messages import Message, Reference
+from onboard.contract.codes import Criterion, TokenKind
+from onboard.contract.mapd import StepState
+from onboard.contract.messages import Message, Reference
 from onboard.core.site import Station
-from onboard.systems.mapd.messages import NO_TASK, StepState
+from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.rights import resource_number
 from onboard.systems.mapd.site import Mapd
 from onboard.systems.words import SiteWords

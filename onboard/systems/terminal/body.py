@@ -2,17 +2,10 @@
 
 from dataclasses import dataclass, field
 
+from onboard.contract.terminal import Action, HandlerMode, MoveMode
+from onboard.contract.terminal_device import HandlerOrder, HandlerState, MoveOrder, MoveState
 from onboard.core.effects import Effect
 from onboard.core.motion_authority import Permit
-from onboard.systems.terminal.messages import (
-    Action,
-    HandlerMode,
-    HandlerOrder,
-    HandlerState,
-    MoveMode,
-    MoveOrder,
-    MoveState,
-)
 from onboard.work.device_link import DeviceLink
 
 #: Orders are repeated so often, us (dbc/terminal.dbc).

@@ -3,17 +3,11 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from onboard.core.codes import ANY_STATION, TokenKind
-from onboard.core.messages import CarAt
-from onboard.systems.terminal.messages import (
-    HandlerState,
-    MoveOrder,
-    MoveState,
-    PlanHead,
-    PlanStep,
-    StepReport,
-    StepResult,
-)
+from onboard.contract.codes import TokenKind
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CarAt
+from onboard.contract.terminal import PlanHead, PlanStep, StepReport, StepResult
+from onboard.contract.terminal_device import HandlerState, MoveOrder, MoveState
 from onboard.systems.terminal.site import Entity, EntityKind, Terminal
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding

@@ -7,9 +7,7 @@ whoever plans to carry it.
 from dataclasses import dataclass, field
 from functools import partial
 
-from onboard.core.authority import TokenKey
-from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import (
+from onboard.contract.codes import (
     CallResult,
     Criterion,
     KindCode,
@@ -20,8 +18,7 @@ from onboard.core.codes import (
     TaskPhase,
     TokenKind,
 )
-from onboard.core.effects import Effect, Halt, Record, Report, Send, Tell
-from onboard.core.messages import (
+from onboard.contract.messages import (
     CallForProposals,
     CarAt,
     Heartbeat,
@@ -32,22 +29,16 @@ from onboard.core.messages import (
     TaskReport,
     TokenGrant,
 )
+from onboard.contract.terminal import BoxOrder, LaneState, PlanHead, StepReport, TaskTerms
+from onboard.contract.terminal_device import LaneSensor, ManualKey, MissionAnswer, MissionKey
+from onboard.core.authority import TokenKey
+from onboard.core.behaviour import BehaviourFactory, Fleet
+from onboard.core.effects import Effect, Halt, Record, Report, Send, Tell
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import EVENT_TYPES, CallTerms, Closed, Estimator, NegotiationEvent
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine, Site
 from onboard.systems.terminal.memory import box_record, read_boxes
-from onboard.systems.terminal.messages import (
-    BoxOrder,
-    LaneSensor,
-    LaneState,
-    ManualKey,
-    MissionAnswer,
-    MissionKey,
-    PlanHead,
-    StepReport,
-    TaskTerms,
-)
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.missions import Orders, Transport
 from onboard.systems.terminal.routes import least_end_ms

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from onboard.core.codes import TokenKind
-from onboard.core.messages import Message, TokenGrant, TokenHeld
-from onboard.systems.terminal.messages import LaneState, PlanHead, PlanStep, StepReport, StepResult
+from onboard.contract.codes import TokenKind
+from onboard.contract.messages import Message, TokenGrant, TokenHeld
+from onboard.contract.terminal import LaneState, PlanHead, PlanStep, StepReport, StepResult
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.chart.over_time import Bar, Line, Panel, Rows
 

@@ -4,13 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from onboard.core.messages import CarAt, Message
+from onboard.contract.messages import CarAt, Message
+from onboard.contract.terminal import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
 from onboard.gateway.edge import Edge
 from onboard.gateway.order import Order, Wish
 from onboard.gateway.records import Life
 from onboard.gateway.whereabouts import Tracker, Whereabouts
 from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes
-from onboard.systems.terminal.messages import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
 

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, field, replace
 
-from onboard.core.codes import Operation
-from onboard.core.messages import CallForProposals
+from onboard.contract.codes import Operation
+from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Machine

@@ -5,9 +5,9 @@ That step is the next one of its plan, and it too needs its rights: a person's o
 
 from dataclasses import dataclass
 
-from onboard.core.codes import ManualMode
+from onboard.contract.codes import ManualMode
+from onboard.contract.messages import ManualOrder
 from onboard.core.effects import Effect
-from onboard.core.messages import ManualOrder
 from onboard.systems.terminal.traffic import Owned
 from onboard.work import manual
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable
 
+from onboard.contract.messages import CarAt, Reference
+from onboard.contract.terminal import Action
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import CarAt, Reference
-from onboard.systems.terminal.messages import Action
 from onboard.systems.terminal.plan import Load, Plan, Step, VisitKey
 from onboard.systems.terminal.records import BoxRecord, PlanRecord, StepOverRecord
 

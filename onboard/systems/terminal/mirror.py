@@ -3,11 +3,12 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import ANY_STATION, Grade
+from onboard.contract.codes import Grade
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CarAt, Heartbeat, Message, SyncRequest
+from onboard.contract.terminal import LaneState, PlanHead, PlanStep, PlanTask, StepReport, StepResult, TaskTerms
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import CarAt, Heartbeat, Message, SyncRequest
 from onboard.core.serial import from_bus_ms, is_newer
-from onboard.systems.terminal.messages import LaneState, PlanHead, PlanStep, PlanTask, StepReport, StepResult, TaskTerms
 from onboard.systems.terminal.plan import Plan, PlanReader
 from onboard.systems.terminal.site import EntityKind, StationKind, Terminal
 from onboard.systems.terminal.traffic import Traffic

@@ -4,10 +4,11 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import TaskPhase
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import Reference
+from onboard.contract.terminal import Verb
+from onboard.contract.terminal_device import MissionKey
 from onboard.core.journal_records import Entry, records_in
-from onboard.core.messages import Reference
-from onboard.systems.terminal.messages import MissionKey, Verb
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.records import OrdersRecord
 from onboard.systems.terminal.site import EntityKind, Terminal

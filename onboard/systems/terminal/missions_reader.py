@@ -5,7 +5,7 @@ from typing import Protocol
 
 from onboard.config.problems import nearest
 from onboard.config.reader import Table
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Machine
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press
 

@@ -6,9 +6,9 @@ Times are bus time in us, or seconds where a test says so: nothing here depends 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.messages import Message, Reference
+from onboard.contract.messages import Message, Reference
+from onboard.contract.terminal import Action, PlanHead, PlanStep, PlanTask
 from onboard.core.serial import BUS_MS_MODULUS, from_bus_ms, to_bus_ms
-from onboard.systems.terminal.messages import Action, PlanHead, PlanStep, PlanTask
 from onboard.systems.terminal.site import EntityKind, Terminal
 
 #: Most steps of a plan: their numbers have five bits, and 31 means none.

@@ -3,16 +3,16 @@
 from collections import deque
 from dataclasses import dataclass, field, replace
 
+from onboard.contract.codes import Grade, Reason, TaskPhase
+from onboard.contract.messages import CallForProposals, Itinerary, Stamp, TaskReport
+from onboard.contract.terminal import Assignment, StepReport, StepResult
 from onboard.core.behaviour import Fleet
-from onboard.core.codes import Grade, Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Report, Send
-from onboard.core.messages import CallForProposals, Itinerary, Stamp, TaskReport
 from onboard.core.negotiation import Awarded, NegotiationEvent, PreAssigned, Released
 from onboard.core.serial import successor, to_bus_ms
 from onboard.systems.terminal.body import Body
 from onboard.systems.terminal.generation import VehicleGeneration, job_of
 from onboard.systems.terminal.memory import plan_record, read_plan
-from onboard.systems.terminal.messages import Assignment, StepReport, StepResult
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import Load, Plan, PlanReader, to_frames
 from onboard.systems.terminal.search import Job, remaining

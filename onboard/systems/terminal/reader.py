@@ -7,7 +7,7 @@ from onboard.config.fleet import Fleet
 from onboard.config.problems import nearest
 from onboard.config.reader import Common, Table
 from onboard.config.timing import read_timing
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.terminal.missions_reader import read_blockages, read_missions, read_presses
 from onboard.systems.terminal.site import Box, Entity, EntityKind, StationKind, Terminal

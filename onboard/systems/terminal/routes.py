@@ -2,7 +2,7 @@
 
 import heapq
 
-from onboard.core.messages import CallForProposals
+from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import RestartPolicy
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.systems.terminal.site import EntityKind, Terminal

@@ -7,19 +7,12 @@ as well, the slot that it is in counts.
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from onboard.core.codes import ANY_STATION, TokenKind
-from onboard.core.messages import CarAt, Message
+from onboard.contract.codes import TokenKind
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CarAt, Message
+from onboard.contract.terminal import Action, LaneState, MoveMode, PlanHead, PlanStep, StepReport, StepResult
+from onboard.contract.terminal_device import MoveState
 from onboard.systems.terminal.chart import BAY, MARGIN, chart_of
-from onboard.systems.terminal.messages import (
-    Action,
-    LaneState,
-    MoveMode,
-    MoveState,
-    PlanHead,
-    PlanStep,
-    StepReport,
-    StepResult,
-)
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.scene.scene import NEARLY, Json, Spot, along, part, shape, spot_on, still
 from onboard.trace.view import SiteView

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from onboard.core.messages import Reference
-from onboard.systems.terminal.messages import Action
+from onboard.contract.messages import Reference
+from onboard.contract.terminal import Action
 from onboard.systems.terminal.plan import (
     MAX_STEPS,
     NO_STEP,

@@ -10,8 +10,8 @@ from enum import Enum
 from functools import cached_property
 from typing import ClassVar, NamedTuple
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import Reference
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import Reference
 from onboard.core.site import Needs, Site
 
 

@@ -1,6 +1,6 @@
 """A container terminal: vehicles and the mission desk."""
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.system import System
 from onboard.systems.terminal.desk import DeskFactory
 from onboard.systems.terminal.records import RECORDS

@@ -7,11 +7,14 @@ section 5), so a wrong mirror costs time and nothing else. In an area every vehi
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase, TokenKind
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
+from onboard.contract.terminal import Action, Assignment, HandlerMode, MoveMode, StepResult
+from onboard.contract.terminal_device import HandlerState, MoveState
 from onboard.core.authority import TokenKey, segment_token
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import ANY_STATION, KindCode, MachineState, Reason, TaskPhase, TokenKind
 from onboard.core.effects import Effect, Record, Send
-from onboard.core.messages import CallForProposals, CarAt, Heartbeat, ManualOrder, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import Permit, authorised
 from onboard.core.negotiation import Estimator, NegotiationEvent
@@ -20,15 +23,6 @@ from onboard.systems.terminal.body import Body
 from onboard.systems.terminal.generation import VehicleGeneration
 from onboard.systems.terminal.manual import Manual
 from onboard.systems.terminal.memory import box_record, read_boxes
-from onboard.systems.terminal.messages import (
-    Action,
-    Assignment,
-    HandlerMode,
-    HandlerState,
-    MoveMode,
-    MoveState,
-    StepResult,
-)
 from onboard.systems.terminal.mirror import TerminalMirror
 from onboard.systems.terminal.plan import Load
 from onboard.systems.terminal.planner import Planner

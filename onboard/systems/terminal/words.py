@@ -1,8 +1,8 @@
 """Words of a container terminal: boxes, lanes and stations by the names of the site file."""
 
-from onboard.core.codes import ANY_STATION
-from onboard.core.messages import Message, Reference
-from onboard.systems.terminal.messages import Action, PlanHead, PlanStep, StepReport, StepResult
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import Message, Reference
+from onboard.contract.terminal import Action, PlanHead, PlanStep, StepReport, StepResult
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.words import SiteWords, plain
 

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import CallResult, TaskPhase
-from onboard.core.messages import Award, Bid, CallForProposals, Reference, TaskReport
-from onboard.systems.turning.messages import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
+from onboard.contract.codes import CallResult, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, Reference, TaskReport
+from onboard.contract.turning import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
 from onboard.trace.check.calls import BidsGoDown, BidsInTime, CallsClosed
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture

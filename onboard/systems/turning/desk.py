@@ -3,25 +3,19 @@
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
+from onboard.contract.codes import KindCode, OrderResult
+from onboard.contract.messages import Bid, Message, Reference
+from onboard.contract.turning import BillBar, LathePhase, LatheProgress
+from onboard.contract.turning_device import JobAnswer, JobEntry
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import KindCode
 from onboard.core.effects import Effect
 from onboard.core.journal_records import records_in
-from onboard.core.messages import Bid, Message, Reference
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import CallTerms, Estimator
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.site import Machine, Site
 from onboard.systems.turning.generation import call_terms, least_cents, longest_us, turning
 from onboard.systems.turning.lathe import Job
-from onboard.systems.turning.messages import (
-    BillBar,
-    JobAnswer,
-    JobEntry,
-    LathePhase,
-    LatheProgress,
-    OrderResult,
-)
 from onboard.systems.turning.records import JobOrderRecord, JobOrderStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import WorkOrder

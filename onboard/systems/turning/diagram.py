@@ -1,7 +1,7 @@
 """A turning cell over time: a row a lathe, a bar for each order, light while it is set up for, dark while it turns."""
 
-from onboard.core.messages import Message, Reference
-from onboard.systems.turning.messages import LathePhase, LatheProgress
+from onboard.contract.messages import Message, Reference
+from onboard.contract.turning import LathePhase, LatheProgress
 from onboard.systems.turning.site import Turning
 from onboard.trace.chart.over_time import Bar, Panel, Rows
 

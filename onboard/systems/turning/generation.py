@@ -6,14 +6,15 @@ It looks at no other machine: of the two kinds of task-generation functions in t
 from dataclasses import dataclass, field, replace
 from itertools import chain
 
-from onboard.core.codes import ANY_STATION, Criterion, KindCode, Operation
-from onboard.core.messages import Bid, CallForProposals, Message, Reference
+from onboard.contract.codes import Criterion, KindCode, Operation
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import Bid, CallForProposals, Message, Reference
+from onboard.contract.turning import BillBar, BillCutting, BillWaiting, TurningOrder
 from onboard.core.negotiation import CallKey, CallTerms, Proposal
 from onboard.core.site import Machine, Site
 from onboard.systems.turning.clamping import choose_clamping
 from onboard.systems.turning.cost import Bill
 from onboard.systems.turning.lathe import Job, Lathe, LatheState
-from onboard.systems.turning.messages import BillBar, BillCutting, BillWaiting, TurningOrder
 from onboard.systems.turning.process import Process, bar_eur, generate
 from onboard.systems.turning.site import Turning
 

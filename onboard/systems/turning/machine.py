@@ -3,28 +3,21 @@
 from dataclasses import dataclass, field
 from enum import Enum
 
+from onboard.contract.codes import KindCode, MachineState, Reason, TaskPhase
+from onboard.contract.messages import Message, Reference, TaskReport
+from onboard.contract.turning import LatheAction, LathePhase, LatheProgress, NcMode
+from onboard.contract.turning_device import LatheOrder, NcState, ToolState
 from onboard.core.authority import TokenKey
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import KindCode, MachineState, Reason, TaskPhase
 from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import JournalRecord, records_in
-from onboard.core.messages import Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.negotiation import Awarded, Estimator, NegotiationEvent, PreAssigned, Released
 from onboard.core.site import Machine, Site
+from onboard.systems.turning.fields import text_frames
 from onboard.systems.turning.generation import LatheGeneration
 from onboard.systems.turning.lathe import Job
-from onboard.systems.turning.messages import (
-    LatheAction,
-    LatheOrder,
-    LathePhase,
-    LatheProgress,
-    NcMode,
-    NcState,
-    ToolState,
-    text_frames,
-)
 from onboard.systems.turning.process import Process
 from onboard.systems.turning.records import JobLostRecord, JobOverRecord, JobRecord, JobStageRecord, Stage
 from onboard.systems.turning.site import Turning

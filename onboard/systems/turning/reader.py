@@ -5,7 +5,7 @@ from itertools import pairwise
 from onboard.config.fleet import Fleet
 from onboard.config.reader import Common, Table
 from onboard.config.timing import read_timing
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
 from onboard.systems.turning.site import (
     At,

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from enum import Enum
 
+from onboard.contract.messages import Reference
 from onboard.core.journal_records import MOST_OVER, End, JournalRecord, Keep, RecordTypes, stored_as
-from onboard.core.messages import Reference
 from onboard.systems.turning.lathe import Job
 from onboard.work.order_records import OrderRecord, OrderStateRecord
 

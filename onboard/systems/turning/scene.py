@@ -2,15 +2,9 @@
 
 from collections import OrderedDict
 
-from onboard.core.messages import Message, Reference
-from onboard.systems.turning.messages import (
-    BillBar,
-    LathePhase,
-    LatheProgress,
-    NcMode,
-    NcState,
-    ToolState,
-)
+from onboard.contract.messages import Message, Reference
+from onboard.contract.turning import BillBar, LathePhase, LatheProgress, NcMode
+from onboard.contract.turning_device import NcState, ToolState
 from onboard.systems.turning.site import Turning
 from onboard.trace.scene.scene import Json, shape, still
 from onboard.trace.view import SiteView

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Needs, Site
 from onboard.systems.turning.drawing import At, Drawing, Element, element_fault
 from onboard.systems.turning.lathe import Chuck, Job, Lathe, Material, Tool, Work

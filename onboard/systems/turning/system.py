@@ -1,6 +1,6 @@
 """A turning cell: lathes and the order desk."""
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.system import System
 from onboard.systems.turning.desk import DeskFactory
 from onboard.systems.turning.machine import LatheFactory

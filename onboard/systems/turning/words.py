@@ -2,9 +2,9 @@
 
 from collections import OrderedDict
 
-from onboard.core.codes import ANY_STATION
-from onboard.core.messages import CallForProposals, Message, Reference
-from onboard.systems.turning.messages import LathePhase, LatheProgress, TurningOrder
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals, Message, Reference
+from onboard.contract.turning import LathePhase, LatheProgress, TurningOrder
 from onboard.systems.turning.site import Turning
 from onboard.systems.words import SiteWords
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from onboard.core.messages import BusTime, Message
+from onboard.contract.messages import BusTime, Message
 from onboard.core.site import Site
 from onboard.history.clock import BusClock
 from onboard.systems.words import words_of

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from onboard.core.codes import (
-    ANY_STATION,
+from onboard.contract.codes import (
     CallResult,
     DeskInput,
     DeskText,
@@ -21,7 +20,8 @@ from onboard.core.codes import (
     ShuttleMode,
     TaskPhase,
 )
-from onboard.core.messages import (
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import (
     BayState,
     CallForProposals,
     CarAt,

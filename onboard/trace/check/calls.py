@@ -4,9 +4,9 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import NOBODY, CallResult, Criterion
-from onboard.core.messages import Award, Bid, CallForProposals, LeftOut, Progress, Reference
-from onboard.core.recovery_messages import Halted
+from onboard.contract.codes import CallResult, Criterion
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, CallForProposals, Halted, LeftOut, Progress, Reference
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule

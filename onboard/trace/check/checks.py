@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from onboard.core.codes import MachineState, Reason
+from onboard.contract.codes import MachineState, Reason
+from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.frame import Frame
-from onboard.core.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
 from onboard.systems.contract import codecs_for
 from onboard.trace.candump_reader import CandumpReader, Record

@@ -8,8 +8,8 @@ one pitch before its segment: whoever is there is turned, or turning, and is in 
 from dataclasses import dataclass
 from itertools import pairwise
 
-from onboard.core.codes import TokenKind
-from onboard.core.messages import Progress
+from onboard.contract.codes import TokenKind
+from onboard.contract.messages import Progress
 from onboard.core.site import Segment, Site
 from onboard.trace.check.tokens_seen import Token
 from onboard.ways.site import TrackKind, way_site

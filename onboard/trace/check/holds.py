@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import ManualMode
-from onboard.core.messages import ManualState
+from onboard.contract.codes import ManualMode
+from onboard.contract.messages import ManualState
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule

@@ -4,8 +4,8 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import CallResult, Operation, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Reference, TaskReport
+from onboard.contract.codes import CallResult, Operation, TaskPhase
+from onboard.contract.messages import Award, CallForProposals, Reference, TaskReport
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule

@@ -2,10 +2,21 @@
 
 from dataclasses import replace
 
-from onboard.core.codes import STILL, KindCode, MachineState, ManualMode
+from onboard.contract.codes import KindCode, MachineState, ManualMode
+from onboard.contract.constants import STILL
+from onboard.contract.messages import (
+    BusTime,
+    Halted,
+    Heartbeat,
+    ManualState,
+    Message,
+    Progress,
+    Regeneration,
+    TokenAssigned,
+    TokenGrant,
+    TokenHeld,
+)
 from onboard.core.journal_state import RIGHTS_LOST
-from onboard.core.messages import BusTime, Heartbeat, ManualState, Message, Progress, TokenGrant, TokenHeld
-from onboard.core.recovery_messages import Halted, Regeneration, TokenAssigned
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Segment, Site
 from onboard.trace.check.event import Event

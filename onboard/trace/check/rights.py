@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from onboard.core.codes import TokenKind
-from onboard.core.messages import TokenGrant, TokenHeld
+from onboard.contract.codes import TokenKind
+from onboard.contract.messages import TokenGrant, TokenHeld
 from onboard.core.serial import is_newer, successor
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture

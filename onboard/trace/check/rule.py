@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 

@@ -3,9 +3,8 @@
 from collections import OrderedDict, deque
 from typing import NamedTuple
 
-from onboard.core.codes import KindCode, RegenerationPhase, TokenKind
-from onboard.core.messages import TokenGrant, TokenHeld
-from onboard.core.recovery_messages import Regeneration, TokenAssigned
+from onboard.contract.codes import KindCode, RegenerationPhase, TokenKind
+from onboard.contract.messages import Regeneration, TokenAssigned, TokenGrant, TokenHeld
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Site, Station
 

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 
 from onboard.config.site import load_site
+from onboard.contract.messages import Heartbeat
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.messages import Heartbeat
 from onboard.core.site import Machine, Site
 from onboard.holon.holon import Holon
 from onboard.systems.contract import codecs_for

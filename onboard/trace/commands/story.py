@@ -3,7 +3,7 @@
 import argparse
 import sys
 
-from onboard.core.messages import Reference
+from onboard.contract.messages import Reference
 from onboard.core.site import Site
 from onboard.history.calls import Calls
 from onboard.systems.contract import codecs_for

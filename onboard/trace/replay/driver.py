@@ -10,10 +10,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+from onboard.contract.messages import CallForProposals
 from onboard.core.behaviour import Behaviour, BehaviourFactory, Fleet
 from onboard.core.effects import Actuate, Effect, Halt, Record, Report, Send, Tell
 from onboard.core.frame import Frame
-from onboard.core.messages import CallForProposals
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
 from onboard.core.negotiation.events import Needs, Proposal

@@ -9,7 +9,7 @@ import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 
 #: A value for JSON.
 Json = dict[str, Any]

@@ -1,6 +1,6 @@
 """The scene that a site's system draws. A system without its own has its machines' table only."""
 
-from onboard.core.messages import Message
+from onboard.contract.messages import Message
 from onboard.core.site import Site
 from onboard.systems.registry import part
 from onboard.trace.scene.scene import Json, Scene

@@ -1,7 +1,7 @@
 """Every call of a log in words: who called, who bid what and when, who won, what was promised and when it came true."""
 
-from onboard.core.codes import Operation, Reason
-from onboard.core.messages import Reference
+from onboard.contract.codes import Operation, Reason
+from onboard.contract.messages import Reference
 from onboard.history.calls import Call, is_task
 from onboard.trace.words import Words
 

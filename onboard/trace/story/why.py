@@ -7,8 +7,8 @@ fleet bus said last before it: silence, a wait that was announced, a refusal, a 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from onboard.core.codes import CallResult, Grade, LegAction, ManualMode, Operation, Reason, TaskPhase, TokenKind
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, Grade, LegAction, ManualMode, Operation, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import (
     CallForProposals,
     Heartbeat,
     Itinerary,

@@ -11,9 +11,9 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import Criterion, Grade, KindCode, Operation, Reason
+from onboard.contract.codes import Criterion, Grade, KindCode, Operation, Reason
+from onboard.contract.messages import Award, Bid, CallForProposals, Itinerary, Message, Reference, Stamp
 from onboard.core.effects import Effect, Report, Send
-from onboard.core.messages import Award, Bid, CallForProposals, Itinerary, Message, Reference, Stamp
 from onboard.core.negotiation import (
     Answer,
     Awarded,

@@ -6,8 +6,9 @@ The goods are the call's ``from_station``; costs are finishing times.
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from onboard.core.codes import ANY_STATION, Criterion, KindCode, Operation
-from onboard.core.messages import CallForProposals
+from onboard.contract.codes import Criterion, KindCode, Operation
+from onboard.contract.constants import ANY_STATION
+from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import Answer, CallTerms, Needs, Proposal, cost_difference
 from onboard.core.negotiation.events import CallKey
 from onboard.core.serial import BUS_MS_MODULUS, from_bus_ms

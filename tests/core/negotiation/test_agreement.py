@@ -6,8 +6,8 @@ import random
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from onboard.core.codes import CallResult, Criterion, Reason
-from onboard.core.messages import Bid, CallForProposals, Message
+from onboard.contract.codes import CallResult, Criterion, Reason
+from onboard.contract.messages import Bid, CallForProposals, Message
 from onboard.core.negotiation import CallKey, Slot, beats, cost_difference
 from tests.core.negotiation.fleet import CALLER, TIMING, Bus, Costs, Machine, caller, fleet, terms
 

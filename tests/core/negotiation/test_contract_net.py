@@ -4,9 +4,9 @@ import pytest
 
 from bench.negotiation import PROTOCOLS, measure
 from bus_sim.systems.car_park.baselines.contract_net import REFUSAL, ContractNetInitiator, ContractNetParticipant
-from onboard.core.codes import CallResult, KindCode
+from onboard.contract.codes import CallResult, KindCode
+from onboard.contract.messages import Award, Bid, Message
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Bid, Message
 from onboard.core.negotiation import Awarded, Closed, NegotiationEvent, Released
 from tests.core.negotiation.fleet import CALLER, START_US, TIMING, Costs, terms
 

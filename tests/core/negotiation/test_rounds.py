@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field, replace
 
-from onboard.core.codes import CallResult, Criterion, KindCode, Reason, TaskPhase
+from onboard.contract.codes import CallResult, Criterion, KindCode, Reason, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
 from onboard.core.effects import Send
-from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
 from onboard.core.negotiation import Negotiation, NegotiationEvent, Proposal, Released
 from onboard.core.negotiation.negotiation import Outcome
 from onboard.work.plain import NoEstimator

@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import pytest
 
-from onboard.core.codes import CallResult, KindCode, Reason
-from onboard.core.messages import Bid, CallForProposals, Message
+from onboard.contract.codes import CallResult, KindCode, Reason
+from onboard.contract.messages import Bid, CallForProposals, Message
 from onboard.core.negotiation import CallKey, Negotiation, Proposal, RestartPolicy, RestartStep
 from onboard.core.serial import BUS_MS_MODULUS, from_bus_ms
 from tests.core.negotiation.fleet import CALLER, START_US, TIMING, Bus, Costs, Machine, a_call, caller, fleet, terms

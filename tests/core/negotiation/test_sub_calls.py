@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from onboard.core.codes import CallResult, Reason, TaskPhase
-from onboard.core.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
+from onboard.contract.codes import CallResult, Reason, TaskPhase
+from onboard.contract.messages import Award, Bid, CallForProposals, Message, Reference, TaskReport
 from onboard.core.negotiation import CallKey
 from onboard.core.negotiation.sub_calls import HOLD_REPEATS, MAX_DEPTH
 from onboard.core.serial import from_bus_ms

@@ -7,8 +7,9 @@ from itertools import pairwise
 
 import pytest
 
-from onboard.core.codes import NOBODY, CallResult, Criterion, Grade, Reason, TaskPhase
-from onboard.core.messages import Award, Bid, Itinerary, Reference, Stamp, TaskReport
+from onboard.contract.codes import CallResult, Criterion, Grade, Reason, TaskPhase
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, Itinerary, Reference, Stamp, TaskReport
 from onboard.core.negotiation import CallKey, delay_us, initiator, participant
 from onboard.core.negotiation.bidding import Slot, in_slot, slot_of
 from onboard.core.negotiation.negotiation import FORGET_US, MAX_CALLS

@@ -1,7 +1,7 @@
 """Who wins tasks and does not do them is left out, for longer each time."""
 
-from onboard.core.codes import Criterion
-from onboard.core.messages import Reference
+from onboard.contract.codes import Criterion
+from onboard.contract.messages import Reference
 from onboard.core.negotiation.trust import OUT_OF_ALL_US, OUT_OF_TASK_US, Trust, left_out_words
 
 GOOD, BAD = 12, 11

@@ -1,8 +1,9 @@
 """Who has lost a task, by the one rule that all initiators share."""
 
-from onboard.core.codes import NOBODY, CallResult, Criterion, KindCode, Operation, Reason
+from onboard.contract.codes import CallResult, Criterion, KindCode, Operation, Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, LeftOut, Message, Reference
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Bid, LeftOut, Message, Reference
 from onboard.core.mirror import Obstacle
 from onboard.core.negotiation import CallTerms, Negotiation
 from onboard.core.negotiation.initiator import ACCEPT_WITHIN_US

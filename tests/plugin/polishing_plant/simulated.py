@@ -11,8 +11,8 @@ from bus_sim.devices.link import BusDeviceLink
 from bus_sim.devices.timers import Timers
 from bus_sim.systems.orders import Ended, OrderedSystem, Orders, tally
 from bus_sim.systems.stage import Stage, Tally
-from onboard.core.codes import KindCode
-from onboard.core.messages import Message
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import Message
 
 #: Parts come so long after power-up, us; the rack says again what has come, us.
 ORIGIN_US, AGAIN_US = 8_000_000, 2_000_000

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import TaskPhase
-from onboard.core.messages import Reference, TaskReport
+from onboard.contract.codes import TaskPhase
+from onboard.contract.messages import Reference, TaskReport
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule

@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass, field
 
+from onboard.contract.codes import Criterion, KindCode, MachineState, Operation, Reason, TaskPhase
+from onboard.contract.messages import NO_REFERENCE, CallForProposals, Message, Reference, TaskReport
 from onboard.core.behaviour import BehaviourFactory, Fleet
-from onboard.core.codes import Criterion, KindCode, MachineState, Operation, Reason, TaskPhase
 from onboard.core.effects import Effect, Send, Tell
-from onboard.core.messages import NO_REFERENCE, CallForProposals, Message, Reference, TaskReport
 from onboard.core.mirror import Mirror
 from onboard.core.motion_authority import ALONE, authorised
 from onboard.core.negotiation import Awarded, CallTerms, Closed, Estimator, NegotiationEvent, Proposal

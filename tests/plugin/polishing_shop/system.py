@@ -1,6 +1,6 @@
 """A polishing shop: a desk and its polishers."""
 
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.systems.system import System
 from polishing_shop.machines import DeskFactory, PolisherFactory
 from polishing_shop.site import Shop

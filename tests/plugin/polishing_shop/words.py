@@ -1,6 +1,6 @@
 """What a polishing shop calls things."""
 
-from onboard.core.messages import CallForProposals, Reference
+from onboard.contract.messages import CallForProposals, Reference
 from onboard.systems.words import SiteWords
 
 

@@ -9,9 +9,10 @@ reject or accept is not repeated: the specification leaves loss to the transport
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from onboard.core.codes import NOBODY, CallResult, KindCode, Reason
+from onboard.contract.codes import CallResult, KindCode, Reason
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, CallForProposals, Message
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import Award, Bid, CallForProposals, Message
 from onboard.core.negotiation import (
     Awarded,
     CallKey,

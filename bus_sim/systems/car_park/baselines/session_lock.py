@@ -8,9 +8,9 @@ Never in the normal path: put ``factories`` into a simulation before it starts.
 
 from collections.abc import Iterable
 
+from onboard.contract.codes import KindCode, LegAction
+from onboard.contract.messages import Itinerary
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import KindCode, LegAction
-from onboard.core.messages import Itinerary
 from onboard.core.mirror import Mirror
 from onboard.core.serial import from_bus_ms
 from onboard.core.site import Machine, Site

@@ -9,8 +9,9 @@ from bus_sim.systems.car_park.compare.policies import OpenTask, Order, Policy, S
 from bus_sim.systems.car_park.compare.prospect import Prospect
 from bus_sim.systems.car_park.plant.customer import State
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import NOBODY, CallResult, Grade, MachineState, Reason, TaskPhase
-from onboard.core.messages import Award, CallForProposals, Itinerary, Message, TaskReport
+from onboard.contract.codes import CallResult, Grade, MachineState, Reason, TaskPhase
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, CallForProposals, Itinerary, Message, TaskReport
 from onboard.core.negotiation import CallKey
 from onboard.systems.car_park.robot import Robot
 from onboard.ways.site import way_site

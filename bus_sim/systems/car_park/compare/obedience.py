@@ -9,10 +9,11 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import CallResult, KindCode, Operation
+from onboard.contract.constants import NOBODY
+from onboard.contract.messages import Award, Bid, CallForProposals, Message
 from onboard.core.behaviour import BehaviourFactory
-from onboard.core.codes import NOBODY, CallResult, KindCode, Operation
 from onboard.core.effects import Effect
-from onboard.core.messages import Award, Bid, CallForProposals, Message
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import (
     Awarded,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 from bus_sim.systems.car_park.compare.prospect import Prospect, serves_customer_us
-from onboard.core.messages import CallForProposals
+from onboard.contract.messages import CallForProposals
 from onboard.systems.car_park.generation import Solution
 from onboard.ways.reservations import FOREVER
 

@@ -7,8 +7,8 @@ import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from onboard.core.codes import Grade, LegAction, Operation
-from onboard.core.messages import CallForProposals, Stamp
+from onboard.contract.codes import Grade, LegAction, Operation
+from onboard.contract.messages import CallForProposals, Stamp
 from onboard.core.serial import to_bus_ms
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.generation import CarParkGeneration, Solution

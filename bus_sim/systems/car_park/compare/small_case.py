@@ -13,7 +13,7 @@ from typing import NamedTuple
 from bus_sim.systems.car_park.compare.free_flow import Acts, FreeFlow
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.plant.customer import REACTION_US
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.core.site import Segment, Site, Station
 from onboard.ways.roads import roads_of
 from onboard.ways.site import way_site

@@ -8,8 +8,8 @@ from bus_sim.systems.car_park.plant.motion import Motion, braking, driving, stan
 from bus_sim.systems.car_park.plant.rules import Rule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
 from bus_sim.systems.car_park.plant.world import Change, RobotBody, World
-from onboard.core.codes import DriveMode
-from onboard.core.messages import DriveOrder, DriveState, Message
+from onboard.contract.codes import DriveMode
+from onboard.contract.messages import DriveOrder, DriveState, Message
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment
 from onboard.ways.site import Axis, TrackKind, WaySite

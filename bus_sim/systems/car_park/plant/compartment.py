@@ -11,8 +11,8 @@ from bus_sim.devices.timers import Timers
 from bus_sim.systems.car_park.plant.bodies import CarBody
 from bus_sim.systems.car_park.plant.door import Door
 from bus_sim.systems.car_park.plant.world import BayBody, Change, World
-from onboard.core.codes import DeskInput, DeskText, DoorName, DoorPosition, LightColour
-from onboard.core.messages import (
+from onboard.contract.codes import DeskInput, DeskText, DoorName, DoorPosition, LightColour
+from onboard.contract.messages import (
     BayState,
     DeskEvent,
     DeskOrder,

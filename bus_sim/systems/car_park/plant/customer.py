@@ -17,7 +17,7 @@ from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.rules import Rule
 from bus_sim.systems.car_park.plant.world import World
-from onboard.core.messages import Reference
+from onboard.contract.messages import Reference
 
 #: From seeing that one may go to going, us (ours).
 REACTION_US = 1_000_000

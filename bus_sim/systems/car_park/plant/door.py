@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from bus_sim.devices.timers import Timer, Timers
-from onboard.core.codes import DoorAction, DoorPosition
+from onboard.contract.codes import DoorAction, DoorPosition
 
 #: The bolt's travel after the door has closed, us (ours).
 BOLT_US = 300_000

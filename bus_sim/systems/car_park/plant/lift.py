@@ -6,7 +6,7 @@ from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.motion import Motion
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
 from bus_sim.systems.car_park.plant.world import Change, World, is_at_mark
-from onboard.core.messages import DriveOrder, PlatformState
+from onboard.contract.messages import DriveOrder, PlatformState
 from onboard.ways.site import Axis, WaySite
 
 #: PlatformState is repeated at least this often (dbc/device.dbc).

@@ -14,7 +14,7 @@ from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Spa
 from bus_sim.systems.car_park.plant.shaft_rules import ShaftRules
 from bus_sim.systems.car_park.plant.spur_rules import SpurRules
 from bus_sim.systems.car_park.plant.world import BayBody, Change, RobotBody, World
-from onboard.core.codes import DoorName, DoorPosition
+from onboard.contract.codes import DoorName, DoorPosition
 from onboard.core.site import Station
 from onboard.ways.site import TrackKind
 

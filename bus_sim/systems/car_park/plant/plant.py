@@ -10,7 +10,7 @@ from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.shuttle import Shuttle
 from bus_sim.systems.car_park.plant.street import Street
 from bus_sim.systems.car_park.plant.world import World
-from onboard.core.codes import KindCode
+from onboard.contract.codes import KindCode
 from onboard.ways.site import WaySite
 
 

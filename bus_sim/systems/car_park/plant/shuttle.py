@@ -4,8 +4,8 @@ from bus_sim.devices.link import DeviceLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.motion import driving
 from bus_sim.systems.car_park.plant.world import RobotBody, World
-from onboard.core.codes import ShuttleAction, ShuttleMode, Side
-from onboard.core.messages import Message, ShuttleOrder, ShuttleState
+from onboard.contract.codes import ShuttleAction, ShuttleMode, Side
+from onboard.contract.messages import Message, ShuttleOrder, ShuttleState
 from onboard.core.site import Station
 from onboard.systems.car_park.site import car_park
 from onboard.ways.site import WaySite

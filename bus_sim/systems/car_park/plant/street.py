@@ -9,8 +9,8 @@ from bus_sim.systems.car_park.plant.compartment import Compartment
 from bus_sim.systems.car_park.plant.customer import REACTION_US, Customer, Event, Outcome, State
 from bus_sim.systems.car_park.plant.oracle import Oracle
 from bus_sim.systems.car_park.plant.world import World
-from onboard.core.codes import DeskText
-from onboard.core.messages import Reference
+from onboard.contract.codes import DeskText
+from onboard.contract.messages import Reference
 
 #: What a text on the desk means to the customer whom it concerns.
 TEXTS: dict[DeskText, Event] = {

@@ -14,7 +14,7 @@ from bus_sim.systems.car_park.plant.bodies import Aboard, CarBody, Location
 from bus_sim.systems.car_park.plant.motion import Motion, standing
 from bus_sim.systems.car_park.plant.rules import Rule
 from bus_sim.systems.car_park.plant.shaft import PlatformBody, Sill, sills_of
-from onboard.core.codes import DoorName, DoorPosition, KindCode, Side
+from onboard.contract.codes import DoorName, DoorPosition, KindCode, Side
 from onboard.core.site import Segment, Station
 from onboard.ways.site import TrackKind, WaySite
 

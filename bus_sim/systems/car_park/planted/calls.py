@@ -7,9 +7,9 @@ from typing import Any
 from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.planted.tools import at_start, hearing, replace, saying
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import CallResult, KindCode
+from onboard.contract.messages import Award, Bid, Message
 from onboard.controller.shell import Controller
-from onboard.core.codes import CallResult, KindCode
-from onboard.core.messages import Award, Bid, Message
 
 
 def _is_award(message: Message) -> bool:

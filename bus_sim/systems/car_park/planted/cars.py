@@ -9,9 +9,10 @@ from typing import Any
 from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.planted.tools import in_behaviour, replace, saying
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import ANY_STATION, OUTSIDE, KindCode, ShuttleAction, TokenKind
+from onboard.contract.codes import KindCode, ShuttleAction, TokenKind
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import CarAt, Message, ShuttleOrder, TokenGrant
 from onboard.core.effects import Send
-from onboard.core.messages import CarAt, Message, ShuttleOrder, TokenGrant
 from onboard.systems.car_park.program import Phase
 from onboard.systems.car_park.site import car_park
 from onboard.ways.tokens import car_token

@@ -9,18 +9,9 @@ from typing import Any
 from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.planted.tools import at_start, hearing, in_behaviour, replace, saying
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import CallResult, DeskInput, DeskText, DoorPosition, KindCode, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import Award, BayState, DeskEvent, DeskOrder, DoorState, DriveOrder, Message, TaskReport
 from onboard.controller.shell import Controller
-from onboard.core.codes import CallResult, DeskInput, DeskText, DoorPosition, KindCode, Reason, TaskPhase, TokenKind
-from onboard.core.messages import (
-    Award,
-    BayState,
-    DeskEvent,
-    DeskOrder,
-    DoorState,
-    DriveOrder,
-    Message,
-    TaskReport,
-)
 from onboard.ways.mirror import way_mirror
 
 _TASK_WORDS = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE)

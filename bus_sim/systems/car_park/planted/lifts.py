@@ -9,8 +9,8 @@ from typing import Any
 from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.planted.tools import hearing, in_behaviour, reaches_goal, replace
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import KindCode, Reason
-from onboard.core.messages import Message, PlatformState
+from onboard.contract.codes import KindCode, Reason
+from onboard.contract.messages import Message, PlatformState
 from onboard.ways.lifts import gate
 
 

@@ -7,9 +7,9 @@ from typing import Any
 from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.planted.tools import at_start, hearing, in_behaviour, reaches_goal, replace, saying
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import KindCode, Reason, TokenKind
+from onboard.contract.messages import CallForProposals, Itinerary, Message, Progress, TokenHeld
 from onboard.controller.shell import Controller
-from onboard.core.codes import KindCode, Reason, TokenKind
-from onboard.core.messages import CallForProposals, Itinerary, Message, Progress, TokenHeld
 
 
 def _without_erasing(simulation: Simulation) -> None:

@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.contract.codes import KindCode, Reason
+from onboard.contract.messages import Message
 from onboard.controller.shell import Controller
 from onboard.core.behaviour import Behaviour
-from onboard.core.codes import KindCode, Reason
 from onboard.core.effects import Actuate, Effect, Send, Tell
-from onboard.core.messages import Message
 from onboard.core.site import Segment
 
 #: What is said instead of one message; an empty list says nothing.

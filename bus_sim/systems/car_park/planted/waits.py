@@ -8,9 +8,9 @@ from typing import Any
 from bus_sim.systems.car_park.planted.bug import PlantedBug
 from bus_sim.systems.car_park.planted.tools import in_behaviour, replace
 from bus_sim.systems.car_park.simulation import Simulation
-from onboard.core.codes import CallResult, KindCode, ManualMode, Reason, TaskPhase, TokenKind
+from onboard.contract.codes import CallResult, KindCode, ManualMode, Reason, TaskPhase, TokenKind
+from onboard.contract.messages import ManualOrder, TaskReport
 from onboard.core.effects import Effect, Send
-from onboard.core.messages import ManualOrder, TaskReport
 from onboard.core.negotiation import Awarded, Closed
 from onboard.wire.codec import fleet_codec
 

@@ -18,7 +18,7 @@ from bus_sim.systems.graph.plant import GraphPlant
 from bus_sim.systems.graph.simulated import SIMULATED
 from bus_sim.systems.stage import Stage
 from onboard.config.site import parse_site
-from onboard.systems.graph.messages import BodyPlace
+from onboard.contract.graph import BodyPlace
 from onboard.systems.graph.network import Graph
 from onboard.systems.graph.rules import Rules
 from onboard.systems.graph.site import FactoryGraph

@@ -4,8 +4,9 @@ from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onboard.core.codes import ANY_STATION, OUTSIDE, TaskPhase, TokenKind
-from onboard.core.messages import CarAt, Reference, TaskReport
+from onboard.contract.codes import TaskPhase, TokenKind
+from onboard.contract.constants import ANY_STATION, OUTSIDE
+from onboard.contract.messages import CarAt, Reference, TaskReport
 from onboard.core.serial import is_newer
 from onboard.core.site import Station
 from onboard.trace.check.event import Event, Finding

@@ -3,8 +3,9 @@
 from collections import OrderedDict
 from collections.abc import Callable
 
-from onboard.core.codes import OUTSIDE, CallResult, DeskInput, DeskText, Operation, TaskPhase
-from onboard.core.messages import (
+from onboard.contract.codes import CallResult, DeskInput, DeskText, Operation, TaskPhase
+from onboard.contract.constants import OUTSIDE
+from onboard.contract.messages import (
     Award,
     BayState,
     CallForProposals,

@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from onboard.core.codes import DoorAction, DoorName, DoorPosition, ShuttleMode
-from onboard.core.messages import BayState, DoorOrder, DoorState, ShuttleState
+from onboard.contract.codes import DoorAction, DoorName, DoorPosition, ShuttleMode
+from onboard.contract.messages import BayState, DoorOrder, DoorState, ShuttleState
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule

@@ -7,8 +7,8 @@ overhangs its sill.
 from abc import abstractmethod
 from collections.abc import Callable
 
-from onboard.core.codes import DriveMode, KindCode
-from onboard.core.messages import DriveOrder, DriveState, Message, PlatformState, Progress
+from onboard.contract.codes import DriveMode, KindCode
+from onboard.contract.messages import DriveOrder, DriveState, Message, PlatformState, Progress
 from onboard.core.site import Segment
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.geometry import GATE_INDEX, Body, body_of, floor_of, lifts_under, occupied, swept, token_of

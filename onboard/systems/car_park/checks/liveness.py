@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from math import sqrt
 
-from onboard.core.codes import CallResult, KindCode, Operation, TaskPhase
-from onboard.core.messages import Award, CallForProposals, CarAt, Message, Progress, Reference, TaskReport, Waiting
+from onboard.contract.codes import CallResult, KindCode, Operation, TaskPhase
+from onboard.contract.messages import Award, CallForProposals, CarAt, Message, Progress, Reference, TaskReport, Waiting
 from onboard.core.site import Site
 from onboard.systems.car_park.site import car_park
 from onboard.trace.check.event import Event, Finding

@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from onboard.core.codes import KindCode
-from onboard.core.messages import DriveOrder, DriveState, Progress
+from onboard.contract.codes import KindCode
+from onboard.contract.messages import DriveOrder, DriveState, Progress
 from onboard.core.site import Segment
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.geometry import (

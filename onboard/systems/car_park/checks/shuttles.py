@@ -7,8 +7,9 @@ a car in half.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from onboard.core.codes import OUTSIDE, DriveMode, KindCode, ShuttleAction, ShuttleMode
-from onboard.core.messages import CarAt, DriveOrder, DriveState, Reference, ShuttleOrder, ShuttleState
+from onboard.contract.codes import DriveMode, KindCode, ShuttleAction, ShuttleMode
+from onboard.contract.constants import OUTSIDE
+from onboard.contract.messages import CarAt, DriveOrder, DriveState, Reference, ShuttleOrder, ShuttleState
 from onboard.core.site import Segment, Station
 from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture

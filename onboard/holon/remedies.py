@@ -1,6 +1,6 @@
 """What a person does about a machine that stands, by the reason that it gives (docs/operate.md)."""
 
-from onboard.core.codes import Reason
+from onboard.contract.codes import Reason
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.site import Site
 
