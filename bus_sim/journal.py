@@ -13,9 +13,9 @@ from onboard.io.journal import GROWTH, LEAST_BYTES
 from onboard.io.sealed import Appending, Tail, begin, read
 from onboard.ports.journal import Compaction, Entry
 
-#: One durable write of a small record on an SD card, us. Ours: cards differ by a factor of ten.
+#: One durable write of a small record on an SD card, us: cards differ by a factor of ten.
 WRITE_US = 4_000
-#: The whole journal written anew: some hundred kilobytes, a rename and two syncs, us. Ours.
+#: The whole journal written anew: some hundred kilobytes, a rename and two syncs, us.
 COMPACT_US = 60_000
 
 

@@ -25,7 +25,7 @@ from onboard.core.site import Site
 STARTS_S = 30.0
 #: The power is off for so long, s: longer than any device keeps an order.
 OFF_S = 5.0
-#: When it is cut, s after power-up: at work, with cars or loads on the way. Ours.
+#: When it is cut, s after power-up: at work, with cars or loads on the way.
 MOMENTS_S = (45.0, 75.0, 110.0)
 
 

@@ -30,11 +30,11 @@ from bus_sim.systems.stranger import Stranger
 from bus_sim.systems.system import Occasion
 from onboard.core.site import Site
 
-#: Longest run, and longest mean time between two cars, s: eleven days. Ours.
+#: Longest run, and longest mean time between two cars, s: eleven days.
 LONGEST_S = 1_000_000
-#: Most orders of a run: their numbers have 16 bits on the wire, of which some systems use a part. Ours.
+#: Most orders of a run: their numbers have 16 bits on the wire, of which some systems use a part.
 MOST_ORDERS = 10_000
-#: One fault a second: more is no fleet under faults, but a fleet that is off. Ours.
+#: One fault a second: more is no fleet under faults, but a fleet that is off.
 MOST_AN_HOUR = 3_600
 
 HELP = """\

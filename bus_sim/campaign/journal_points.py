@@ -13,9 +13,9 @@ from onboard.contract.messages import Halted, Message
 
 #: Records that are cut off the end, each number of them a point.
 MOST_LOST = 50
-#: A copy that is so many records old. Ours.
+#: A copy that is so many records old: a few tasks.
 ROLLED_BACK = (1, 10, 50)
-#: The power is off for so long, s: longer than peers wait for a sign of life, so that they notice. Ours.
+#: The power is off for so long, s: longer than peers wait for a sign of life, so that they notice.
 OFF_S = 5.0
 #: What one point does to the medium: the word of a crash, and how many records it is about.
 _HARMS: Final[tuple[tuple[str, tuple[int, ...]], ...]] = (
@@ -29,7 +29,7 @@ _HARMS: Final[tuple[tuple[str, tuple[int, ...]], ...]] = (
 )
 #: What a machine says of a journal that it cannot rely on.
 OF_JOURNALS = frozenset({Reason.JOURNAL_LOST, Reason.JOURNAL_SHORT, Reason.JOURNAL_FOREIGN})
-#: The others go on beside a machine that is held for so long, us, and then the trial is over. Ours.
+#: The others go on beside a machine that is held for so long, us, and then the trial is over.
 HELD_US = 120_000_000
 
 

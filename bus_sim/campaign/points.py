@@ -23,9 +23,9 @@ from bus_sim.virtual_time import VirtualTimeLoop, run_on
 from onboard.core.frame import Frame
 from onboard.core.site import Site
 
-#: A frame comes again so long after it came, us: after what follows it at once. Ours.
+#: A frame comes again so long after it came, us: after what follows it at once.
 AGAIN_US = 3_000
-#: A crashed controller is off for so long, s: peers do not notice it (early), or do (late). Ours.
+#: A crashed controller is off for so long, s: peers do not notice it (early), or do (late).
 RESTARTS_S = (0.5, 9.0)
 
 

@@ -18,7 +18,7 @@ SPAN_S = (20.0, 900.0)
 COUNT = (1, 4)
 COUNTS: Final[dict[str, tuple[int, int]]] = {"two-crashes": (2, 2)}
 
-#: At a rate, a fault that names a car names one of so many that came last, or the next. Ours.
+#: At a rate, a fault that names a car names one of so many that came last, or the next: an older one has left.
 CARS_AROUND = 5
 
 Draw = Callable[[random.Random, Site], dict[str, Value]]

@@ -8,7 +8,8 @@ from bus_sim.campaign.recovery import Measure
 from bus_sim.can.faults import Fault
 from bus_sim.faults.scenario import Scenario
 
-#: With all faults over and everybody served, all machines run and all mirrors are equal within this, us (ours).
+#: With all faults over and everybody served, all machines run and all mirrors are equal within this, us: several rounds
+#: of heartbeats and statements.
 CONVERGED_US = 120_000_000
 #: With all clocks right and nothing else disturbed, whoever waits then is served within this, us (issue 13, point 3).
 CLOCKS_SERVED_US = 300_000_000

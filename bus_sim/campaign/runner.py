@@ -44,7 +44,8 @@ class Plan:
     scene: Scene = Scene.ALONE
 
 
-#: Verdicts with which a run breaks off; it is played again only until so long after that, s (ours).
+#: Verdicts with which a run breaks off; it is played again only until so long after that, s: what follows changes no
+#: verdict.
 AT_ONCE, MARGIN_S = (Verdict.VIOLATION, Verdict.CRASHED), 600
 
 

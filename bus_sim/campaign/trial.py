@@ -22,7 +22,8 @@ from onboard.core.site import Site
 STEP_US = 1_000_000
 #: What the loop raises where virtual time does not go on, or not in time.
 HANGS = (StandstillError, EventLimitError)
-#: A wait that is longer than the same run's longest without faults by this counts as delayed, us (ours).
+#: A wait that is longer than the same run's longest without faults by this counts as delayed, us: about one more task
+#: before it.
 DELAY_US = 60_000_000
 
 

@@ -7,7 +7,7 @@ from onboard.core.effects import Effect
 from onboard.holon.holon import Holon
 
 #: Messages that wait for a process that stands still; beyond that the oldest stay and the newest are lost, as in the
-#: receive buffer of a socket (Linux' default holds some hundred CAN frames). Ours.
+#: receive buffer of a socket (Linux' default holds some hundred CAN frames).
 HELD_LIMIT = 300
 #: The rate of a clock that stands still.
 FROZEN_PPM = -1_000_000

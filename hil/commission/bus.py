@@ -11,7 +11,7 @@ from onboard.ports.bus import ErrorState
 TERMINATION_OHM = (54.0, 66.0)
 #: Above this one terminator is missing; below the other three or more are there, or there is a short.
 _ONE_MISSING_OHM, _TOO_MANY_OHM = 66.0, 54.0
-#: From power to a heartbeat, and from there to taking part, s. Ours: a board may boot for two minutes.
+#: From power to a heartbeat, and from there to taking part, s: a board may boot for two minutes.
 JOIN_S, PART_S = 180.0, 60.0
 _TAKING_PART = (MachineState.IDLE, MachineState.WORKING, MachineState.WAITING)
 

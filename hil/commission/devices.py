@@ -34,7 +34,7 @@ from onboard.contract.messages import (
 from onboard.core.serial import successor
 from onboard.work.timing import DeviceTiming
 
-#: Small and slow: a hand's breadth, at a pace that one can step away from. Ours.
+#: Small and slow: a hand's breadth, at a pace that one can step away from.
 STEP_MM, SPEED_MM_S = 200, 100
 #: For the emergency stop there must be time to press it.
 STOP_SPEED_MM_S = 20

@@ -6,7 +6,7 @@ from onboard.contract.codes import DriveMode
 from onboard.contract.messages import DriveState, Heartbeat
 from onboard.core.mirror import MISSED_HEARTBEATS
 
-#: The fleet's heartbeats, s: many times the longest period that a site may have would be an hour; ours.
+#: The fleet's heartbeats, s: many times the longest period that a site may have would be an hour.
 BEATS_S = 60.0
 
 

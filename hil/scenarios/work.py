@@ -31,7 +31,7 @@ from onboard.contract.messages import (
 from onboard.core.site import Machine
 from onboard.ways.site import TrackKind, way_site
 
-#: From power to taking part, s. Ours; a board may boot for a while.
+#: From power to taking part, s; a board may boot for a while.
 JOIN_S = 60.0
 #: From a car's coming to a call, and from a call to its award, s: far beyond what any site file asks for.
 CALL_S = AWARD_S = 20.0

@@ -31,21 +31,13 @@ from onboard.core.records import RetiredRecord, TokenGivenRecord, TokenGoneRecor
 from onboard.core.site import Site
 from onboard.core.token_keys import TokenKey, genesis_holder, may_exist, segment_token, station_token
 
-__all__ = [
-    "Claim",
-    "TokenBook",
-    "TokenKey",
-    "genesis_holder",
-    "may_exist",
-    "segment_token",
-    "station_token",
-]
+__all__ = ["Claim", "TokenBook", "TokenKey", "genesis_holder", "may_exist", "segment_token", "station_token"]
 
 #: Highest version of a token: 163 years of the busiest slot, so that it never wraps (28 bits in dbc/fleet.dbc).
 MAX_VERSION = (1 << 28) - 1
-#: Whoever was refused asks again after this many token repeats: the holder remembers the request. Ours.
+#: Whoever was refused asks again after this many token repeats: the holder remembers the request.
 REFUSED_REPEATS = 5
-#: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst. Ours.
+#: A grant this young is still on its way and is not said again for a request, us: one journal write, and a burst.
 IN_FLIGHT_US = 20_000
 
 

@@ -7,11 +7,11 @@ that was away asks when it is back. So the bound is for one machine, and a retur
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
-#: So many repeats come at the quick pace: they bridge lost frames. Ours.
+#: So many repeats come at the quick pace: they bridge lost frames.
 QUICK = 3
-#: The longest time between two repeats of one thing, in token repeats: 5 s at the default of 200 ms. Ours.
+#: The longest time between two repeats of one thing, in token repeats: 5 s at the default of 200 ms.
 LONGEST_REPEATS = 25
-#: The same for what is asked for without an agreed order: the oldest petition keeps all younger ones back. Ours.
+#: The same for what is asked for without an agreed order: the oldest petition keeps all younger ones back.
 UNORDERED_REPEATS = 10
 #: Petitions lapse after this many of the longest times, in halves: two repeats may be lost (rule 10).
 LAPSE_HALVES = 5

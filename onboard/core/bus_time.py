@@ -14,7 +14,7 @@ from onboard.core.serial import BUS_MS_MODULUS, away
 
 #: Largest correction that one time message makes, us: with one message in 5 s this follows drifts up to 400 ppm.
 MAX_SLEW_US = 2_000
-#: No drift and no bus delay explains an error beyond this, us: one of the two clocks has jumped. Ours; the slew limit
+#: No drift and no bus delay explains an error beyond this, us: one of the two clocks has jumped; the slew limit
 #: would need more than three minutes for it, and hours for seconds.
 FAR_US = 100_000
 #: Two errors that differ by less than this are the same, us: bus delays of some frames.
@@ -22,7 +22,7 @@ SAME_US = 20_000
 #: Sync messages missed before the clock counts as lost.
 MISSED_LIMIT = 4
 #: Who has sent bus time for less than this takes up that of another which is ahead, us: it has just been started, and
-#: its own time began with it. Ours; two periods of the message.
+#: its own time began with it; two periods of the message.
 YOUNG_US = 10_000_000
 #: Bus time on the wire counts the microseconds of 65 rounds of its milliseconds, 8.8 years, and begins anew: the most
 #: whole rounds that 48 bits hold, so that us and ms always tell the same time, also to who hears it for the first time.

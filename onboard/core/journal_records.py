@@ -16,7 +16,7 @@ from onboard.contract.messages import Reference
 
 Entry = Mapping[str, str | int]
 _TYPE = "record"
-#: Ended tasks of which a machine still knows that they are over: whoever asks again is told so. Ours.
+#: Ended tasks of which a machine still knows that they are over: whoever asks again is told so.
 MOST_OVER = 500
 
 

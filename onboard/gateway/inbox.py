@@ -10,7 +10,8 @@ from onboard.gateway.factsheet import MOST_ACTIONS, MOST_BYTES, MOST_ID
 from onboard.gateway.schema import TRANSPORT, schema
 from onboard.ports.broker import Publication
 
-#: Orders taken up at once, and how fast the allowance grows again, us an order: a burst of 20, then one a second. Ours.
+#: Orders taken up at once, and how fast the allowance grows again, us an order: a burst of 20, then one a second: more
+#: than people press, less than a fleet bus feels.
 BURST, RATE_US = 20, 1_000_000
 
 

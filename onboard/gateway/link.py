@@ -11,7 +11,8 @@ from onboard.ports.broker import Broker, BrokerError, Publication, Session
 
 #: Telemetry of one link that waits for the broker; of more the oldest is dropped and counted.
 MOST_WAITING = 256
-#: Wait before the next attempt to connect: the first, doubled up to the last, s. Ours.
+#: Wait before the next attempt to connect: the first, doubled up to the last, s: a broker that restarts is back in
+#: seconds, one that is gone is not hammered.
 FIRST_WAIT_S, LAST_WAIT_S = 0.5, 5.0
 
 

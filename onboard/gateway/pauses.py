@@ -13,9 +13,10 @@ from onboard.gateway.dialect import Json
 
 #: The mode that each action asks for.
 MODES = {"startPause": ManualMode.HELD, "stopPause": ManualMode.AUTOMATIC}
-#: An order that is not answered is said again after this, us (dbc/fleet.dbc), and given up after that. Ours.
+#: An order that is not answered is said again after this, us (dbc/fleet.dbc), and given up after that: ten words
+#: without an answer are a machine that is off.
 AGAIN_US, PATIENCE_US = 1_000_000, 10_000_000
-#: A machine that has answered and comes to rest is asked again after this, us. Ours.
+#: A machine that has answered and comes to rest is asked again after this, us: to brake takes a few seconds.
 RESTS_YET_US = 5_000_000
 
 

@@ -8,7 +8,8 @@ from onboard.contract.messages import Message, Reference, SyncRequest
 from onboard.core.site import Site
 from onboard.gateway.order import Order, Wish
 
-#: After its start a gateway asks all what they vouch for, and knows the cars so much later, us. Ours.
+#: After its start a gateway asks all what they vouch for, and knows the cars so much later, us: answers to one question
+#: come in less.
 LISTEN_US = 3_000_000
 
 

@@ -22,9 +22,9 @@ STOP_LASTS_US = 30_000_000
 #: Heartbeat periods without a frame under my number after which I go on (docs/contract-2.md).
 QUIET_BEATS = 3
 #: A frame under my number this many heartbeat periods after the first of one hold is a twin that lives, not a log that
-#: somebody plays or a slip of a tool: ten minutes at the default. Ours.
+#: somebody plays or a slip of a tool: ten minutes at the default.
 TWIN_BEATS = 600
-#: Without a frame of anybody for so many heartbeat periods I hear nothing, and silence proves nothing. Ours.
+#: Without a frame of anybody for so many heartbeat periods I hear nothing, and silence proves nothing.
 DEAF_BEATS = 2
 #: Holds for a person in which nothing is taken in: it could not be written down, or somebody else says it as well.
 _APART = (Reason.DUPLICATE_NODE_ID, Reason.JOURNAL_FOREIGN)

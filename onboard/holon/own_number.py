@@ -14,7 +14,7 @@ from onboard.core.authority import TokenBook, TokenKey
 from onboard.core.effects import Effect, Send
 from onboard.core.mirror import Mirror
 
-#: Own awards remembered: a fleet closes some hundreds an hour. Ours.
+#: Own awards remembered: a fleet closes some hundreds an hour.
 MOST_AWARDS = 256
 
 

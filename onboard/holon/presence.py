@@ -16,9 +16,9 @@ from onboard.core.authority import TokenBook
 from onboard.core.mirror import MISSED_HEARTBEATS, Mirror
 from onboard.core.site import Machine, Site
 
-#: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word. Ours.
+#: A machine that did nothing for more heartbeat periods than this has slept: others may have missed its word.
 SLEPT_BEATS = 2
-#: How long a machine that woke listens before it takes part, us: the others say what they plan. Ours.
+#: How long a machine that woke listens before it takes part, us: the others say what they plan.
 SETTLING_US = 2_000_000
 
 

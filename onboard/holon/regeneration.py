@@ -31,11 +31,11 @@ from onboard.core.records import AssignedRecord, EpochRecord, ReadBackRecord, To
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment
 
-#: A freeze that its operator does not say again for so long is over, us: it says it each second. Ours.
+#: A freeze that its operator does not say again for so long is over, us: it says it each second.
 FORGOTTEN_US = 10_000_000
-#: Statements said in one go, and the pause behind them, us: a controller's queue has room for 1,000 frames. Ours.
+#: Statements said in one go, and the pause behind them, us: a controller's queue has room for 1,000 frames.
 BURST, PAUSE_US = 100, 50_000
-#: Who repeats FREEZE for so long has missed something: all is said again, us. Ours.
+#: Who repeats FREEZE for so long has missed something: all is said again, us.
 SAY_AGAIN_US = 4_000_000
 
 

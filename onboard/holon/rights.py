@@ -27,7 +27,8 @@ from onboard.core.behaviour import Fleet
 from onboard.core.effects import Effect, Send
 from onboard.holon.witness import Witness
 
-#: A machine whose view of the order differs from mine is asked to state its own at most this often, us. Ours.
+#: A machine whose view of the order differs from mine is asked to state its own at most this often, us: an answer has
+#: come by then.
 ASK_AGAIN_US = 1_000_000
 
 

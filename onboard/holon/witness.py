@@ -30,12 +30,12 @@ from onboard.core.serial import is_newer
 
 #: A mirror that differs from a peer's for this many heartbeats in a row asks for the missing versions.
 DIGEST_PATIENCE = 2
-#: While machines start, who asks within this time of an answer shares the next one, us: at power-up all ask all. Ours.
+#: While machines start, who asks within this time of an answer shares the next one, us: at power-up all ask all.
 ANSWER_PERIOD_US = 250_000
-#: So many heartbeat periods after the last start seen all have asked; then everybody is answered at once. Ours.
+#: So many heartbeat periods after the last start seen all have asked; then everybody is answered at once.
 STARTING_BEATS = 2
 #: So many heartbeat periods after its start a machine has been compared with by all that live: the first word may be
-#: lost, and the next. Ours.
+#: lost, and the next.
 COMPARING_BEATS = 4
 
 

@@ -16,9 +16,9 @@ from onboard.io.sealed import Reading, Tail, begin, read
 from onboard.ports.journal import Compaction, Entry
 
 FILE_NAME = "journal.log"
-#: A journal is worth writing anew from this size on, bytes: less is read in a moment (1,000 records in 10 ms). Ours.
+#: A journal is worth writing anew from this size on, bytes: less is read in a moment (1,000 records in 10 ms).
 LEAST_BYTES = 256_000
-#: And only when it has grown by this factor since: writing anew then costs less than all appends did. Ours.
+#: And only when it has grown by this factor since: writing anew then costs less than all appends did.
 GROWTH = 2
 _IDENTITY_BYTES = 8
 

@@ -17,9 +17,10 @@ import aiomqtt
 from onboard.io.broker_address import BrokerAddress
 from onboard.ports.broker import BrokerError, Delivery, Publication
 
-#: Without a sign of life a connection is given up after one and a half times this (MQTT 3.1.1, 3.1.2.10), s. Ours.
+#: Without a sign of life a connection is given up after one and a half times this (MQTT 3.1.1, 3.1.2.10), s: a link
+#: that is gone is noticed within half a minute.
 KEEPALIVE_S = 10
-#: What the broker has not answered in this time counts as failed, s. Ours.
+#: What the broker has not answered in this time counts as failed, s: longer than a busy broker takes.
 TIMEOUT_S = 5.0
 #: Orders that wait to be taken up; what comes beyond is counted and lost.
 MOST_WAITING = 256

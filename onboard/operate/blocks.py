@@ -8,7 +8,7 @@ from onboard.operate.order import AGAIN_US, DONE, Order
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 
-#: A steward that lives says all that it keeps within this after it was asked, us: a burst of frames. Ours.
+#: A steward that lives says all that it keeps within this after it was asked, us: a burst of frames.
 ANSWER_US = 2_000_000
 
 

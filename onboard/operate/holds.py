@@ -67,5 +67,5 @@ class Hold(Order):
         return said
 
 
-#: The longest way to a place where a held robot may stand: a ride and a spur of the largest site, us. Ours.
+#: The longest way to a place where a held robot may stand: a ride and a spur of the largest site, us.
 REST_US = 180_000_000

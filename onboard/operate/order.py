@@ -5,7 +5,8 @@ from collections.abc import Iterable
 from onboard.contract.messages import Message
 from onboard.operate.park import Park
 
-#: What is not answered is said again after this, us (dbc/fleet.dbc, ManualOrder). Ours.
+#: What is not answered is said again after this, us (dbc/fleet.dbc, ManualOrder): longer than an answer's way over a
+#: busy bus.
 AGAIN_US = 1_000_000
 
 #: Exit status: done and confirmed; not confirmed; a mistake of the person.

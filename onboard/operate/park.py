@@ -11,7 +11,7 @@ from onboard.gateway.whereabouts import Tracker
 
 #: Heartbeats missed before a machine counts as silent, as the machines themselves count (onboard/core/mirror.py).
 SILENT_BEATS = 3
-#: A ``Halted`` that is not said again for this many heartbeat periods is over: it is said once in each. Ours.
+#: A ``Halted`` that is not said again for this many heartbeat periods is over: it is said once in each.
 HALTED_BEATS = 1.5
 #: Blocked segments that are remembered; more than so many are one too many for a person as well.
 MOST_BLOCKED = 32

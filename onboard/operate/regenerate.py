@@ -34,13 +34,13 @@ from onboard.operate.park import Park
 from onboard.operate.words import state_words
 from onboard.ways.site import TrackKind, way_site
 
-#: How long all may stand frozen while the person reads and decides, us. Ours: a site that waits longer is forgotten.
+#: How long all may stand frozen while the person reads and decides, us: a site that waits longer is forgotten.
 DECIDE_US = 300_000_000
-#: TokenAssigned said in one go, and the pause behind them, us: a quarter of a bus of 500 kbit/s. Ours.
+#: TokenAssigned said in one go, and the pause behind them, us: a quarter of a bus of 500 kbit/s.
 BURST, PAUSE_US = 50, 50_000
-#: Who has not read all back is told all again after this, us; all have so long for it. Ours.
+#: Who has not read all back is told all again after this, us; all have so long for it: two rounds of statements.
 TELL_AGAIN_US, READ_US = 3_000_000, 30_000_000
-#: ABORT is said so often, as nobody answers it. Ours.
+#: ABORT is said so often, as nobody answers it: all three must be lost for it to be missed.
 ABORTS = 3
 _SLOT = TokenKind.SEGMENT
 

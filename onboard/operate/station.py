@@ -14,7 +14,7 @@ from onboard.ports.bus import Bus
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder
 
-#: What was said last has so long to leave before the bus is closed, s. Ours.
+#: What was said last has so long to leave before the bus is closed, s: a burst of frames at 125 kbit/s.
 LINGER_S = 0.2
 
 

@@ -13,7 +13,7 @@ from onboard.core.backoff import PACE_US, QUICK
 from onboard.core.effects import Effect, Send
 from onboard.core.site import Segment
 
-#: Token repeats for which an incomplete set is kept; then it is given back. Ours: two lost frames and the journals.
+#: Token repeats for which an incomplete set is kept; then it is given back: two lost frames and the journals.
 PATIENCE_REPEATS = 10
 #: What a slot that is taken and given back in one round costs: request, word that it is held, grant.
 FRAMES_A_SLOT = 3

@@ -15,7 +15,7 @@ from onboard.core.serial import is_newer
 from onboard.core.token_keys import TokenKey
 from onboard.ways.tokens import car_token
 
-#: Words that wait to be proven, one a car; beyond it the oldest is dropped. Ours: some of each machine's at a restart.
+#: Words that wait to be proven, one a car; beyond it the oldest is dropped: some of each machine's at a restart.
 MAX_UNPROVEN = 64
 #: Bits of ``CarAt.version``, a serial number.
 VERSION_BITS = 16

@@ -14,7 +14,7 @@ from onboard.ways.reservations import FOREVER, Interval, Use
 from onboard.ways.site import WaySite
 
 #: The gate's token goes to the lift before it moves and back to the robot behind: four frames and four journal writes,
-#: counted as part of a ride. Ours.
+#: counted as part of a ride.
 GATE_US = 400_000
 #: Where a lift stands of which nothing is known: its home.
 HOME_INDEX = 1

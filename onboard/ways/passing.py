@@ -6,7 +6,7 @@ from onboard.contract.messages import Itinerary, Leg
 from onboard.core.serial import from_bus_ms
 from onboard.ways.occupancy import leg_begins_us
 
-#: Windows told in whole milliseconds may overlap by their rounding; so much is no conflict, us. Ours.
+#: Windows told in whole milliseconds may overlap by their rounding; so much is no conflict, us.
 TOLERANCE_US = 10_000
 
 

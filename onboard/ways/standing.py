@@ -16,9 +16,9 @@ from onboard.ways.occupancy import final_position, turned_in
 from onboard.ways.site import WaySite
 
 #: A machine that says nothing stands for so long after it should have been elsewhere, us: a door or a drive's retries
-#: take less. Ours.
+#: take less.
 STANDS_AFTER_US = 20_000_000
-#: And for so long where it says that it is late or waits, us: it may wait for a customer who takes his time. Ours.
+#: And for so long where it says that it is late or waits, us: it may wait for a customer who takes his time.
 WAITS_AFTER_US = 600_000_000
 
 

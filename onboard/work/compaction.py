@@ -20,7 +20,7 @@ from onboard.core.records import CORE_RECORDS, TokenGoneRecord, TokenRecord
 from onboard.core.serial import is_newer
 
 #: A car whose token was confirmed away, and after which so many newer ones of its origin came, is forgotten even where
-#: its leaving was never heard (a machine that was off). Ours: its number comes again after 65,535.
+#: its leaving was never heard (a machine that was off): its number comes again after 65,535.
 NUMBERS_KEPT = 1_024
 _NUMBER_BITS = 16
 

@@ -11,7 +11,7 @@ from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import DoorName, DoorPosition
 from onboard.ways.site import way_site
 
-#: Somebody who waits for the right moment looks again after this, us (ours).
+#: Somebody who waits for the right moment looks again after this, us: a person's attention.
 LOOK_US = 200_000
 
 

@@ -10,9 +10,9 @@ from onboard.contract.codes import OrderResult
 from onboard.systems.cell.geometry import Point
 from onboard.systems.cell.site import Cell, Wish
 
-#: Points are drawn so far from edges of areas and obstacles at least, mm. Ours.
+#: Points are drawn so far from edges of areas and obstacles at least, mm: the gripper's width.
 MARGIN_MM = 500
-#: Attempts to find a point beside all obstacles before one is taken as it is: its goal is refused then. Ours.
+#: Attempts to find a point beside all obstacles before one is taken as it is: its goal is refused then.
 ATTEMPTS = 100
 #: About what one order takes, s: measured on the shipped site.
 ORDER_S = 60.0

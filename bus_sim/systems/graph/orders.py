@@ -8,7 +8,7 @@ from bus_sim.systems.stage import Tally
 from onboard.contract.codes import OrderResult
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph, Order
 
-#: So many orders name their robot. Ours.
+#: So many orders name their robot: enough that each seed has both sorts.
 NAMED = 0.2
 #: About what one order takes, s: measured on the shipped site.
 ORDER_S = 50.0

@@ -9,7 +9,7 @@ from bus_sim.systems.stage import Tally
 from onboard.contract.codes import OrderResult
 from onboard.systems.mapd.site import FAR, Mapd, Task
 
-#: So many endpoints are looked at to see how long ways are. Ours.
+#: So many endpoints are looked at to see how long ways are: enough for a mean, and cheap.
 SAMPLE = 12
 
 

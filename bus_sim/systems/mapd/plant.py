@@ -19,7 +19,7 @@ from onboard.systems.mapd.site import Mapd, Task
 
 #: Bodies tell where they are, and unanswered orders are said again, this often, us (dbc/mapd.dbc).
 WORD_US, KEY_US = 2_000_000, 1_000_000
-#: Loading and unloading take so long, us. Ours: in the model they take no time.
+#: Loading and unloading take so long, us; in the model they take no time.
 WORK_US = 1_000
 
 

@@ -11,9 +11,10 @@ from bus_sim.systems.terminal.plant import TerminalPlant
 from onboard.contract.codes import KindCode
 from onboard.systems.terminal.site import Blockage, EntityKind, Mission, StationKind, Terminal
 
-#: Boxes of a mission at most; the first missions come so long after power-up, us. Ours.
+#: Boxes of a mission at most; the first missions come so long after power-up, us: all take part by then.
 MOST_BOXES, ORIGIN_US = 3, 5_000_000
-#: So many missions are urgent, and so many seeds have an obstacle on a lane, for a time between these, us. Ours.
+#: So many missions are urgent, and so many seeds have an obstacle on a lane, for a time between these, us: long enough
+#: that plans must go around.
 URGENT, BLOCKED, FOR_US = 0.2, 0.5, (20_000_000, 120_000_000)
 #: About what one order takes, s: measured on the shipped site.
 ORDER_S = 180.0

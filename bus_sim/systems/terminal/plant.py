@@ -26,13 +26,13 @@ from onboard.systems.terminal.site import Blockage, EntityKind, Mission, Press, 
 
 #: What a person presses, by the words of a site file.
 PRESSES = {"hold": ManualMode.HELD, "step": ManualMode.STEP, "release": ManualMode.AUTOMATIC}
-#: A body passes from one slot into the next in so long, us. Ours.
+#: A body passes from one slot into the next in so long, us: a walking pace over a slot of the shipped site.
 HOP_US = 300_000
 #: Devices and cameras say again how things stand, us (dbc/terminal.dbc).
 SLOW_US = 10_000_000
 #: An operator types a mission again after this while the desk has not answered, us (dbc/terminal.dbc).
 KEY_US = 1_000_000
-#: Real durations are up to so much longer than planned: the paper's robots' speed is of course not constant. Ours.
+#: Real durations are up to so much longer than planned: the paper's robots' speed is of course not constant.
 NOISE = 0.1
 
 

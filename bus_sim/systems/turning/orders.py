@@ -8,7 +8,7 @@ from bus_sim.systems.turning.plant import ORIGIN_US, TurningPlant
 from onboard.contract.codes import OrderResult
 from onboard.systems.turning.site import Turning, Wanted
 
-#: Parts of an order, at least and at most. Ours.
+#: Parts of an order, at least and at most: a batch of a small shop.
 BATCH = (1, 3)
 #: About what one order takes, s: measured on the shipped site.
 ORDER_S = 1_500.0

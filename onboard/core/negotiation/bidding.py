@@ -14,10 +14,10 @@ DelayRule = Callable[[int, int, Criterion, Timing], int]
 _FRAME_BITS = 160
 #: A bid waits at most for a frame on the wire and one of higher priority, then is sent itself: three frames.
 _FRAMES_TO_HEAR = 3
-#: What a controller may take to read a bid, us. Ours.
+#: What a controller may take to read a bid, us: plausible for a small board, not measured on one.
 _READING_US = 500
 
-#: A finishing time may be this much before the floor, ms: floors are worked out when a call is heard. Ours.
+#: A finishing time may be this much before the floor, ms: floors are worked out when a call is heard.
 FLOOR_SLACK_MS = 500
 
 

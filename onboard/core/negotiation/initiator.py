@@ -24,10 +24,10 @@ from onboard.core.site import Timing
 Outcome = list[Effect | NegotiationEvent]
 
 #: Quick repeats of an award bridge lost frames; after these the winner is down, and a reminder at a tenth of the pace
-#: is enough. Ours.
+#: is enough.
 QUICK_AWARDS = 10
 SLOW_DOWN = 10
-#: The longest pace, in award repeats: 4 s at the default of 100 ms. Ours.
+#: The longest pace, in award repeats: 4 s at the default of 100 ms.
 SLOWEST = 40
 
 #: Steps and largest values of a sub-call's two durations on the wire (dbc/fleet.dbc, CallParent), in ms.
@@ -35,7 +35,7 @@ READY_STEP_MS, MAX_READY_MS = 100, 1_638_300
 HOLD_STEP_MS, MAX_HOLD_MS = 250, 255_750
 
 
-#: A winner that lives says so in less than this, us: its plan is one search and some frames. Ours.
+#: A winner that lives says so in less than this, us: its plan is one search and some frames.
 ACCEPT_WITHIN_US = 5_000_000
 
 

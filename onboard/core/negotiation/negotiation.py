@@ -24,7 +24,7 @@ from onboard.core.site import Machine, Site, Timing
 FORGET_US = 60_000_000
 #: Most participations remembered at once. A fleet has tens of calls open, not hundreds.
 MAX_CALLS = 256
-#: No call is open for more of the site's call windows than this: one that ends later was told by a wrong clock. Ours.
+#: No call is open for more of the site's call windows than this: one that ends later was told by a wrong clock.
 MAX_WINDOWS = 60
 
 Outcome = list[Effect | NegotiationEvent]

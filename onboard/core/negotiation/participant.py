@@ -46,7 +46,7 @@ from onboard.core.site import Timing
 Outcome = list[Effect | NegotiationEvent]
 
 #: A belief without an award lapses this many award repeats after the deadline (10 s at the default of 100 ms): by then
-#: an initiator that meant this machine has said so about twenty times. Ours.
+#: an initiator that meant this machine has said so about twenty times.
 LAPSE_REPEATS = 100
 
 

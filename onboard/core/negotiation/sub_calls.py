@@ -22,7 +22,7 @@ Outcome = list[Effect | NegotiationEvent]
 MAX_DEPTH = 3
 #: Most sub-calls of one bid, over all rounds: the part number has 4 bits on the wire.
 MAX_PARTS = 15
-#: An option outlasts what it hangs on by this many award repeats: a lost award is said again before that. Ours.
+#: An option outlasts what it hangs on by this many award repeats: a lost award is said again before that.
 HOLD_REPEATS = 10
 
 #: Opens a sub-call: terms, deadline, end of the option, now (bus us).

@@ -13,16 +13,16 @@ from onboard.contract.messages import LeftOut, Reference
 from onboard.core.negotiation.bidding import cost_difference
 from onboard.core.serial import to_bus_ms
 
-#: How long who failed once is out of the calls for that task, us, doubled with each time. Ours.
+#: How long who failed once is out of the calls for that task, us, doubled with each time: one call goes by without it.
 OUT_OF_TASK_US = 120_000_000
-#: How long who failed twice in a row is out of all calls, us, doubled with each time more. Ours.
+#: How long who failed twice in a row is out of all calls, us, doubled with each time more: others serve meanwhile.
 OUT_OF_ALL_US = 120_000_000
-#: No longer than this, us: a machine that was repaired needs nobody to say so. Ours.
+#: No longer than this, us: a machine that was repaired needs nobody to say so.
 MOST_OUT_US = 3_600_000_000
 #: A task ended this much later than its winner bid counts against the winner where the others keep their dates, ms.
-#: Customers and traffic make half a minute. Ours.
+#: Customers and traffic make half a minute.
 LATE_MS = 60_000
-#: Weight of the newest task in a machine's mean lateness, one in so many. Ours.
+#: Weight of the newest task in a machine's mean lateness, one in so many: one bad task does not decide, four do.
 MEAN_OF = 4
 #: Most nodes that one ``LeftOut`` names (dbc/fleet.dbc), and most tasks in hand that are remembered.
 MOST_NAMED = 6

@@ -17,9 +17,8 @@ from onboard.core.negotiation.events import NegotiationEvent
 from onboard.core.negotiation.negotiation import Negotiation
 
 #: A winner that is an obstacle for so long is lost, us: a restart takes some seconds, and its task is in its journal.
-#: Ours.
 LOST_AFTER_US = 8_000_000
-#: A winner that lives, and of which nothing changes for so long, stands, us: traffic and retries take less. Ours.
+#: A winner that lives, and of which nothing changes for so long, stands, us: traffic and retries take less.
 STANDS_AFTER_US = 120_000_000
 
 

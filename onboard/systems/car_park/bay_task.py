@@ -30,7 +30,6 @@ from onboard.ways.tokens import car_token
 RETRY_US = 30_000_000
 LONGEST_RETRY_US = 60_000_000
 #: After a restart the machines say again what they have in hand; a task that nobody names is called anew so much later.
-#: Ours.
 SETTLING_US = 2_000_000
 #: What an operator's order stands for at the desk.
 DESK_INPUT = {
@@ -39,7 +38,8 @@ DESK_INPUT = {
     OperatorAction.CANCEL: DeskInput.CANCEL,
     OperatorAction.URGENT_TICKET: DeskInput.TICKET,
 }
-#: The custodian's word that the winner is lost is answered so often with the newest award, before it counts. Ours.
+#: The custodian's word that the winner is lost is answered so often with the newest award, before it counts: it may
+#: have missed the first.
 REMINDERS = 3
 
 

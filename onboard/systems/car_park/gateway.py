@@ -17,9 +17,9 @@ from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
 from onboard.ways.site import WaySite, way_site
 
-#: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over. Ours.
+#: A ticket is put in again so often until the call for it is heard, us; a compartment passes a second one over.
 TICKET_AGAIN_US = 30_000_000
-#: A key press is not repeated, for the next car may be another's: heard within this, or refused, us. Ours.
+#: A key press is not repeated, for the next car may be another's: heard within this, or refused, us.
 KEY_PATIENCE_US = 20_000_000
 
 

@@ -25,19 +25,19 @@ from onboard.ways.refuges import open_refuges
 from onboard.ways.reservations import FOREVER, Reservations
 from onboard.ways.sipp import NoRoute, Route, Visit, free_flow_us, plan_route
 
-#: From the deadline to the first motion: award frame, journal writes and the first tokens. Ours, measured in tests.
+#: From the deadline to the first motion: award frame, journal writes and the first tokens (measured in tests).
 AWARD_LATENCY_US = 150_000
-#: Tokens, orders and sensor frames around one handling of a car, beside the motions themselves. Ours, measured.
+#: Tokens, orders and sensor frames around one handling of a car, beside the motions themselves (measured).
 HANDLING_OVERHEAD_US = 400_000
-#: A customer has left the compartment this long after the call: walking out takes 4 to 8 s. Ours, so that the real
+#: A customer has left the compartment this long after the call: walking out takes 4 to 8 s; so that the real
 #: days of the tests finish no later than bid.
 CUSTOMER_US = 9_500_000
-#: How long past its planned end another robot's work still keeps its place promised: it may be late. Ours.
+#: How long past its planned end another robot's work still keeps its place promised: it may be late.
 PROMISE_GRACE_US = 60_000_000
-#: From so many places on, the way to taking the car is searched once for all of them. Ours.
+#: From so many places on, the way to taking the car is searched once for all of them: for fewer, a search for each
+#: costs less.
 FEW_PLACES = 3
 #: Whoever only stands in the way is out of it so long after the award: planning, tokens, and a way to another refuge.
-#: Ours.
 YIELDING_US = 45_000_000
 #: Bound of one route search, in expansions (a wall-time bound would not replay).
 MAX_EXPANSIONS = 4_000

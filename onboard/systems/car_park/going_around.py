@@ -28,15 +28,16 @@ from onboard.ways.occupancy import itinerary_windows
 from onboard.ways.reservations import FOREVER, Window
 from onboard.ways.tokens import car_token
 
-#: A plan that finds no way is tried again after this, us. Ours.
+#: A plan that finds no way is tried again after this, us: others' plans change within seconds.
 RETRY_US = 3_000_000
-#: A run that has not come to a stand is looked at again after this, us. Ours.
+#: A run that has not come to a stand is looked at again after this, us: braking takes so long.
 LOOK_US = 500_000
-#: Tasks are kept so long without a way, us: a machine that is only restarted is back by then. Ours.
+#: Tasks are kept so long without a way, us: a machine that is only restarted is back by then.
 KEEP_US = 12_000_000
-#: Other places that are tried for a car at one moment: each is a search. Ours.
+#: Other places that are tried for a car at one moment: each is a search.
 MOST_PLACES = 4
-#: FORFEITED is said again so often and so many times, until the task is called or awarded anew. Ours.
+#: FORFEITED is said again so often and so many times, until the task is called or awarded anew: a lost word would leave
+#: a customer waiting.
 SAY_AGAIN_US, SAY_AGAIN = 1_000_000, 20
 
 

@@ -35,7 +35,7 @@ from onboard.systems.car_park.stewardship import Stewardship
 from onboard.ways.lifts import MARK_TOLERANCE_MM, gate, platform, under_gate
 from onboard.ways.mirror import WayFleet
 
-#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
+#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps.
 OFF_LIMIT_MM = 20_000
 
 

@@ -16,7 +16,8 @@ from onboard.core.serial import successor
 from onboard.systems.car_park.records import DoorRecord
 from onboard.systems.car_park.unheard import Unheard
 
-#: A desk tells nobody what it shows: its last order is said again with so many states of the bay (ours).
+#: A desk tells nobody what it shows: its last order is said again with so many states of the bay: a second at the
+#: sensors' pace.
 DESK_TIMES = 4
 
 #: By these somebody comes to what is in the bay, or is shut in with it: not while another machine holds the bay.

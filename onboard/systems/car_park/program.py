@@ -20,7 +20,7 @@ from onboard.ways.site import WaySite
 MAX_STEPS = 31
 #: Farthest end of a leg after the stamp: 24 bits of milliseconds (4.6 h).
 MAX_LEG_US = ((1 << 24) - 1) * 1000
-#: A stamp that lies farther ahead of its own machine's clock than this was made by a clock that was wrong, us. Ours:
+#: A stamp that lies farther ahead of its own machine's clock than this was made by a clock that was wrong, us:
 #: awards come at the end of a call, which is seconds away.
 STAMP_AHEAD_US = 60_000_000
 

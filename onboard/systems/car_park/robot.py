@@ -44,9 +44,11 @@ from onboard.ways.lifts import sill
 from onboard.ways.mirror import WayFleet, way_fleet, way_mirror
 from onboard.ways.site import TrackKind
 
-#: A step that ends this much off its planned time makes the rest of the plan move and be told again. Ours.
+#: A step that ends this much off its planned time makes the rest of the plan move and be told again: below it windows
+#: still hold.
 REPLAN_TOLERANCE_US = 500_000
-#: A step that is not over this long after its planned end is told to be late, by as much again. Ours.
+#: A step that is not over this long after its planned end is told to be late, by as much again: others plan on with
+#: what they know until then.
 OVERDUE_US = 2_000_000
 
 

@@ -15,7 +15,8 @@ from onboard.core.site import Segment
 from onboard.ways.lifts import GATE_INDEX, gate, lift_index_of, platform, says_standing
 from onboard.ways.mirror import WayFleet
 
-#: Who holds a gate and has not heard where its lift stands asks for it after so long, and again, us. Ours.
+#: Who holds a gate and has not heard where its lift stands asks for it after so long, and again, us: a lift that moves
+#: says where it is within it.
 ASK_AGAIN_US = 1_000_000
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-#: A drive that has orders and has not moved for so long is stuck, us: brakes and locks take less. Ours.
+#: A drive that has orders and has not moved for so long is stuck, us: brakes and locks take less.
 STALL_US = 8_000_000
 
 

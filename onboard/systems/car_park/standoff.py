@@ -15,7 +15,7 @@ from onboard.systems.car_park.travel import Carriage
 from onboard.ways.mirror import WayFleet
 
 #: Whoever ranks behind looks for another way after so long, and again after twice that; who ranks before, after twice
-#: that, us. Ours: longer than tokens take on a bus in trouble, and than a mirror takes to catch up.
+#: that, us: longer than tokens take on a bus in trouble, and than a mirror takes to catch up.
 PATIENCE_US = 8_000_000
 
 

@@ -25,7 +25,7 @@ from onboard.systems.car_park.travel import Carriage
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.mirror import WayFleet
 
-#: From the first known position after a restart until plans are made: the others say meanwhile what they plan. Ours.
+#: From the first known position after a restart until plans are made: the others say meanwhile what they plan.
 SETTLING_US = 2_000_000
 #: Modes in which the shuttle has come to rest.
 AT_REST = (ShuttleMode.HOME, ShuttleMode.REACHED)

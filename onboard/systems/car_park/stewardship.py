@@ -36,9 +36,9 @@ MAX_CALLS = 64
 #: Cars that have left and are told still.
 MOST_GONE = 4
 #: A winner that has said nothing for so long since its award does not know of it, or does not act on it, us: a little
-#: longer than its initiator says the award again at a quick pace. Ours.
+#: longer than its initiator says the award again at a quick pace.
 UNHEARD_AFTER_US = 6_000_000
-#: FORFEITED is said again this often until the task is awarded anew, us. Ours.
+#: FORFEITED is said again this often until the task is awarded anew, us: a lost word would leave a customer waiting.
 SAY_AGAIN_US = 2_000_000
 
 

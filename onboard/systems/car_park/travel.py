@@ -28,11 +28,12 @@ from onboard.ways.refuges import refuges
 from onboard.ways.site import TrackKind
 
 #: How far ahead of the braking distance segments are asked for, in us of travel at top speed: tokens take a few
-#: journal writes and frames. Ours.
+#: journal writes and frames.
 LOOKAHEAD_US = 3_000_000
-#: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us. Ours.
+#: A holder's view of the order that has differed from mine for this long will not be mended by asking again, us:
+#: several answers have come and gone.
 ORDER_PATIENCE_US = 5_000_000
-#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps. Ours.
+#: A drive that says to be farther from the nearest mark than this is not believed, mm: no track has such gaps.
 OFF_LIMIT_MM = 20_000
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
-#: A state within this time of the first one that contradicts an order may have crossed it on the bus, us. Ours: a
+#: A state within this time of the first one that contradicts an order may have crossed it on the bus, us: a
 #: device bus with everything queued is empty in a tenth of it.
 CROSSED_US = 1_000_000
 

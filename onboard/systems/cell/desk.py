@@ -55,9 +55,10 @@ class DeskFactory(BehaviourFactory):
 class GoalManager(OrderDesk[Order]):
     """One desk of a cell."""
 
-    #: A main contractor is asked how it stands this often, us. Ours.
+    #: A main contractor is asked how it stands this often, us: a lost last word costs this long and no more.
     ask_us: ClassVar[int] = 20_000_000
-    #: A goal that nobody can achieve is refused after so many calls of several attempts each. Ours.
+    #: A goal that nobody can achieve is refused after so many calls of several attempts each: a machine that is
+    #: repaired may answer a later one.
     max_calls: ClassVar[int] = 3
     takers = KindCode.ARM
 

@@ -11,7 +11,7 @@ from onboard.core.site import Segment
 from onboard.systems.cell.site import MAX_COORDINATE_MM, Area, Arm, Cell, Point, Wish
 
 _NOWHERE = Segment(0, 0)
-#: A call for a goal holds calls within calls, each half of what is left: four levels need this long. Ours.
+#: A call for a goal holds calls within calls, each half of what is left: four levels need this long.
 CALL_WINDOW_MS = 3_000
 
 

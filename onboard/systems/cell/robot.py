@@ -33,9 +33,9 @@ from onboard.work.undertaking import TaskEvent, Undertakings
 
 #: Where a robot is, is told this often while it moves, us (dbc/cell.dbc).
 PROGRESS_US = 2_000_000
-#: A sub-goal that found nobody is called for again after this, us. Ours.
+#: A sub-goal that found nobody is called for again after this, us: an arm that was busy may be free.
 CALL_AGAIN_US = 5_000_000
-#: A sub-contractor that has the part is asked this often how it stands, us; so a lost word costs time only. Ours.
+#: A sub-contractor that has the part is asked this often how it stands, us; so a lost word costs time only.
 ASK_AGAIN_US = 20_000_000
 #: An order to the gripper is said again after this while it is not obeyed, us (dbc/cell.dbc).
 GRIP_AGAIN_US = 1_000_000

@@ -23,9 +23,9 @@ from onboard.systems.graph.rules import Heading, Rules, are_head_on, kept_edge, 
 from onboard.systems.graph.site import FactoryGraph
 from onboard.work.plain import NoEstimator
 
-#: A promise that its robot has not redeemed so long after it was made is void, us: the signal comes again. Ours.
+#: A promise that its robot has not redeemed so long after it was made is void, us: the signal comes again.
 PROMISE_US = 3_000_000
-#: A robot that waits and has not been heard so long has another way, us. Ours.
+#: A robot that waits and has not been heard so long has another way, us: several of its signals are missing then.
 WAITING_US = 6_000_000
 
 

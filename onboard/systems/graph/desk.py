@@ -24,10 +24,10 @@ from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderEvent, OrderState, WorkOrder
 from onboard.work.plain import NoEstimator
 
-#: An order by name is said again after this while its robot is not heard, us. Ours.
+#: An order by name is said again after this while its robot is not heard, us: an answer needs one frame.
 LIST_AGAIN_US = 1_000_000
 #: An order for a robot by name is refused, and taken back, where nothing of that robot has changed for so long, us: it
-#: may wait for traffic, or for its start. Ours.
+#: may wait for traffic, or for its start.
 NAMED_STANDS_US = 600_000_000
 #: What an order from outside is told as.
 _PHASES = {

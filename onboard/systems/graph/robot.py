@@ -37,9 +37,11 @@ from onboard.work.device_link import DeviceLink
 from onboard.work.manual import Manual
 from onboard.work.undertaking import TaskEvent, TaskStanding, Undertakings
 
-#: A signal is said again after this while no answer is heard, and after that while the answer is STOP, us. Ours.
+#: A signal is said again after this while no answer is heard, and after that while the answer is STOP, us: who has just
+#: moved past is heard in between.
 SIGNAL_US, SIGNAL_AGAIN_US = 500_000, 2_000_000
-#: A grant whose tokens do not come in this time is given up, and the node is asked anew, us. Ours.
+#: A grant whose tokens do not come in this time is given up, and the node is asked anew, us: tokens come within one
+#: round of frames.
 REDEEM_US = 3_000_000
 #: Where a driving robot is, is told this often, us (dbc/graph.dbc).
 TOLD_US = 2_000_000

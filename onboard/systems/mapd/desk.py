@@ -25,10 +25,11 @@ from onboard.systems.mapd.rights import resource_of
 from onboard.systems.mapd.site import Mapd
 from onboard.work.plain import Plain
 
-#: Robots that are missed are asked this long after the step could have begun, and again after as long, us. Ours.
+#: Robots that are missed are asked this long after the step could have begun, and again after as long, us: a lost frame
+#: costs less than a step.
 ASK_US = 500_000
 ASK_AT_ONCE = 3
-#: What was just said is not said again for another who asks, us. Ours.
+#: What was just said is not said again for another who asks, us: all have heard it.
 SAID_US = 100_000
 _LOW = 1 << 16
 

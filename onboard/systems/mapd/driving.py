@@ -16,7 +16,8 @@ from onboard.systems.mapd.paths import Path
 from onboard.systems.mapd.rights import cell_token, resource_of
 from onboard.systems.mapd.site import Mapd
 
-#: A right that somebody who leaves in this step should pass on is asked for after this, us. Ours.
+#: A right that somebody who leaves in this step should pass on is asked for after this, us: rights that come by
+#: themselves are there by then.
 EXPECTED_US = 150_000
 
 

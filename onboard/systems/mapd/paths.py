@@ -2,7 +2,7 @@
 
 The mirror of a pick-up and delivery site. Rules as of Ma, Li, Kumar and Koenig (AAMAS 2017): never two robots in one
 cell at one step, never two that change places in one step; a robot may follow another into the cell that
-it leaves. Ours: never a ring in which each follows the next.
+it leaves: never a ring in which each follows the next.
 """
 
 from collections.abc import Iterator, Sequence

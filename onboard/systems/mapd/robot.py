@@ -40,13 +40,14 @@ from onboard.systems.mapd.site import Mapd
 from onboard.systems.mapd.turns import Turns
 from onboard.work.plain import Plain
 
-#: Whoever is missed is asked this long after everything else was there, and again after as long, us. Ours.
+#: Whoever is missed is asked this long after everything else was there, and again after as long, us: a lost frame costs
+#: less than a step.
 ASK_US = 500_000
 #: So many are asked at once.
 ASK_AT_ONCE = 3
-#: What was just said is not said again for another who asks, us: all have heard it. Ours.
+#: What was just said is not said again for another who asks, us: all have heard it.
 SAID_US = 100_000
-#: Tokens are said again for whoever asks at most this often, us. Ours.
+#: Tokens are said again for whoever asks at most this often, us: the same loss makes several ask at once.
 TOKENS_SAID_US = 1_000_000
 
 

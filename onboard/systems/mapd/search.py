@@ -10,7 +10,7 @@ from heapq import heappop, heappush
 from onboard.systems.mapd.floor import FAR, Floor, flood
 from onboard.systems.mapd.paths import Path, Paths
 
-#: Most states that one search may expand: bounded work, the same on every machine. Ours.
+#: Most states that one search may expand: bounded work, the same on every machine.
 MOST_EXPANSIONS = 20_000
 
 

@@ -64,12 +64,12 @@ class Mapd(Site):
 
     @property
     def bid_window_us(self) -> int:
-        """How long bids for a step may come, in us: two fifths of it. Ours."""
+        """How long bids for a step may come, in us: two fifths of it; the rest is for awards, rights and the move."""
         return self.step_us * 2 // 5
 
     @property
     def travel_us(self) -> int:
-        """How long a body takes to the next cell, in us: half a step. Ours."""
+        """How long a body takes to the next cell, in us: half a step, so that a late start still ends in time."""
         return self.step_us // 2
 
     @cached_property

@@ -49,13 +49,14 @@ from onboard.ways.tokens import car_token
 from onboard.work.order_life import OrderEvent
 from onboard.work.plain import NoEstimator
 
-#: After a refusal, and while no robot is about to be free, the desk looks again after this, us. Ours.
+#: After a refusal, and while no robot is about to be free, the desk looks again after this, us: plans change within
+#: seconds.
 LOOK_US = 5_000_000
 #: A lane that is blocked is told again so often, us (dbc/terminal.dbc).
 LANE_REPEAT_US = 5_000_000
 #: An order by hand that its vehicle has not answered is said again after this, us (dbc/terminal.dbc).
 MANUAL_AGAIN_US = 1_000_000
-#: A task that was won and is in no plan for so long is called anew, us: its winner gave it up or lost it. Ours.
+#: A task that was won and is in no plan for so long is called anew, us: its winner gave it up or lost it.
 LOST_US = 120_000_000
 
 

@@ -18,7 +18,7 @@ from onboard.work.order_life import OrderEvent, OrderState, WorkOrder
 MOST_OVER = 64
 #: Numbers at the beginning of a task's row in the journal.
 TASK_NUMBERS = 7
-#: Numbers of missions that are remembered; their 8 bits come round after twice as many. Ours.
+#: Numbers of missions that are remembered; their 8 bits come round after twice as many.
 KNOWN = 127
 
 

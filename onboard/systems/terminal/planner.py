@@ -19,16 +19,16 @@ from onboard.systems.terminal.search import Job, remaining
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.traffic import Owned
 
-#: A violated plan that cannot be bettered is looked at again after this, us. Ours.
+#: A violated plan that cannot be bettered is looked at again after this, us: others' plans change within seconds.
 AGAIN_US = 10_000_000
 #: How far the plan has come, and what was won and is not planned yet, is said again so often, us (dbc/terminal.dbc).
 SAY_US = 5_000_000
-#: Refused for so long without anybody before me, us: the steward sees another order. Ours.
+#: Refused for so long without anybody before me, us: the steward sees another order.
 TELL_US = 10_000_000
-#: Refused for so long behind somebody, us: whoever that is may wait for me by a list that only I have otherwise. Ours.
+#: Refused for so long behind somebody, us: whoever that is may wait for me by a list that only I have otherwise.
 TELL_BEHIND_US = 30_000_000
 #: Plans are adopted in turns of bus time, one vehicle so long after the other, us: each sees what the one before has
-#: told, so that no two plans are made at once around the same gaps. Ours.
+#: told, so that no two plans are made at once around the same gaps.
 TURN_US = 50_000
 _NO_STAMP = Stamp(0, 0, 0)
 

@@ -32,7 +32,7 @@ from onboard.systems.terminal.traffic import Owned
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
 
-#: A failed action of the handler is tried again after this, us. Ours.
+#: A failed action of the handler is tried again after this, us: a box that slipped may be gripped at the second try.
 RETRY_US = 5_000_000
 #: What a statement about a box says where that about a car has a wheelbase (dbc/fleet.dbc).
 NO_WHEELBASE_MM = 1500

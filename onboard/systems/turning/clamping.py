@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from onboard.systems.turning.drawing import Drawing
 from onboard.systems.turning.lathe import Chuck, Job, Lathe
 
-#: What stays between the jaws and the last cut, mm. Ours.
+#: What stays between the jaws and the last cut, mm: enough that a tool holder passes.
 JAW_GAP_MM = 5.0
 
 

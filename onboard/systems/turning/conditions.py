@@ -8,7 +8,7 @@ from onboard.systems.turning.lathe import Job, Lathe, LatheState, Material, Tool
 
 #: Share of the motor's power that reaches the cut. Usual for geared lathes.
 EFFICIENCY = 0.8
-#: What roughing leaves for finishing, mm on the radius and on faces. Ours.
+#: What roughing leaves for finishing, mm on the radius and on faces: an ordinary finishing allowance, from no standard.
 ALLOWANCE_MM = 0.4
 
 

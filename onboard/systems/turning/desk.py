@@ -47,9 +47,10 @@ class DeskFactory(BehaviourFactory):
 class JobDesk(OrderDesk[Order]):
     """One desk of a workshop."""
 
-    #: A batch takes long: its lathe is asked how it stands this often, us. Ours.
+    #: A batch takes long: its lathe is asked how it stands this often, us.
     ask_us: ClassVar[int] = 60_000_000
-    #: An order that no lathe can make is refused after so many calls of several attempts each. Ours.
+    #: An order that no lathe can make is refused after so many calls of several attempts each: a machine that is
+    #: repaired may answer a later one.
     max_calls: ClassVar[int] = 2
     takers = KindCode.LATHE
 

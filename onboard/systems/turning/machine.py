@@ -24,7 +24,7 @@ from onboard.systems.turning.site import Turning
 from onboard.work.device_link import DeviceLink
 from onboard.work.undertaking import TaskEvent, Undertakings
 
-#: What the control does not confirm is said again after this, us. Ours.
+#: What the control does not confirm is said again after this, us: one frame and its answer on a device bus.
 AGAIN_US = 3_000_000
 #: LatheProgress is repeated this often, us (dbc/turning.dbc).
 PROGRESS_US = 10_000_000

@@ -12,9 +12,9 @@ from onboard.systems.turning.conditions import ALLOWANCE_MM, Conditions
 from onboard.systems.turning.drawing import At, Drawing, Element
 from onboard.systems.turning.lathe import Job, Lathe, Work
 
-#: How far a tool keeps from the bar in rapid moves, mm. Ours.
+#: How far a tool keeps from the bar in rapid moves, mm: an ordinary clearance, from no standard.
 CLEAR_MM = 2.0
-#: How far a roughing cut is left before going back, mm. Ours.
+#: How far a roughing cut is left before going back, mm: enough that the insert does not rub.
 LIFT_MM = 0.5
 #: Pieces into which a slanted or round cut is divided to work out its time.
 _PIECES = 16

@@ -8,7 +8,7 @@ from onboard.trace.check.event import Event, Finding
 from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 
-#: A machine that is held for longer than this has been forgotten, us. Ours.
+#: A machine that is held for longer than this has been forgotten, us: an hour is longer than anybody stays beside it.
 FORGOTTEN_US = 3_600_000_000
 
 

@@ -17,9 +17,9 @@ from onboard.systems.car_park.robot import Robot
 from onboard.ways.site import way_site
 from onboard.wire.codec import fleet_codec
 
-#: Everybody has read a frame so long after it was heard, us. Ours.
+#: Everybody has read a frame so long after it was heard, us: the time that a controller takes to read it.
 SETTLING_US = 2_000
-#: Open tasks are looked at again at least this often, us. Ours.
+#: Open tasks are looked at again at least this often, us: nothing that waits is overlooked.
 TICK_US = 15_000_000
 #: Customers in these states wait for their compartment's bay.
 WAITING = (State.QUEUEING, State.AT_DESK, State.AWAITING_DOOR)

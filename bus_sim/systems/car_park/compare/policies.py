@@ -14,18 +14,18 @@ from onboard.contract.messages import CallForProposals
 from onboard.systems.car_park.generation import Solution
 from onboard.ways.reservations import FOREVER
 
-#: What a task counts for which nobody waits: somebody may come. In customers; ours (1 decides alike).
+#: What a task counts for which nobody waits: somebody may come. In customers (1 decides alike).
 NOBODY_YET = 0.5
-#: What a second of a robot's time counts beside a customer's. Ours (0.02 and 0.3 decide alike).
+#: What a second of a robot's time counts beside a customer's (0.02 and 0.3 decide alike).
 ROBOT_TIME = 0.1
-#: A plan that leaves a task out is as bad as one that ends it so much later, us. Ours.
+#: A plan that leaves a task out is as bad as one that ends it so much later, us: more than any task takes.
 LEFT_OUT_US = 900_000_000
-#: Bound of one joint choice, in searches of single tasks (a wall-time bound would not replay). Ours.
+#: Bound of one joint choice, in searches of single tasks (a wall-time bound would not replay).
 MAX_SEARCHES = 24
 
 
 #: A robot may be given its next task so long before its last work ends, us: its next way then follows without a stop,
-#: lifts come in time, and others plan around it. Too early leaves less to decide anew. Ours: the best of 15, 30, 60 and
+#: lifts come in time, and others plan around it. Too early leaves less to decide anew: the best of 15, 30, 60 and
 #: 120 s for the joint choice; rules that ask only for free robots send them just before they stand.
 JOINT_AHEAD_US, RULE_AHEAD_US = 120_000_000, 30_000_000
 

@@ -12,7 +12,7 @@ from onboard.core.site import Site
 
 #: Cars of a case, each in and out: six tasks.
 CARS = 3
-#: Intervals of arrivals and of departures, mean and deviation in s, and the shortest stay: close enough to wait. Ours.
+#: Intervals of arrivals and of departures, mean and deviation in s, and the shortest stay: close enough to wait.
 IN_S, OUT_S, STAY_S = (45.0, 20.0), (60.0, 30.0), 60.0
 
 #: What decides on the abstract problem. One compartment tells one task at a time: no joint choice is to be made there.

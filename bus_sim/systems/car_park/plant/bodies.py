@@ -8,7 +8,7 @@ from onboard.core.site import Station
 
 #: A driver needs this long to drive in or out, s: the range of the SimPy study named in the sources, section 2.3.
 DRIVER_S = (10.0, 30.0)
-#: Sizes of ordinary passenger cars, mm and kg (ours, plausible): wheelbase low, high, most frequent.
+#: Sizes of ordinary passenger cars, mm and kg (plausible, from no statistics): wheelbase low, high, most frequent.
 WHEELBASE_MM = (2300, 3100, 2650)
 OVERHANGS_MM = (1400, 1800)
 HEIGHT_MM = (1400, 1900, 1500)

@@ -19,13 +19,14 @@ from bus_sim.systems.car_park.plant.rules import Rule
 from bus_sim.systems.car_park.plant.world import World
 from onboard.contract.messages import Reference
 
-#: From seeing that one may go to going, us (ours).
+#: From seeing that one may go to going, us: a person's reaction.
 REACTION_US = 1_000_000
-#: Getting from the car over the sill with the ticket in hand, s (ours).
+#: Getting from the car over the sill with the ticket in hand, s: a walk of some metres.
 WALK_S = (4.0, 8.0)
-#: The key is pressed, or the ticket inserted, again after this long without an answer, us (ours).
+#: The key is pressed, or the ticket inserted, again after this long without an answer, us: a person's patience with a
+#: key.
 PATIENCE_US = 15_000_000
-#: A ticket that the desk does not know is tried again after this, us, and so many times in all (ours).
+#: A ticket that the desk does not know is tried again after this, us, and so many times in all: then one asks for help.
 UNKNOWN_RETRY_US = 60_000_000
 UNKNOWN_TRIES = 5
 

@@ -5,9 +5,10 @@ from collections.abc import Callable
 from bus_sim.devices.timers import Timer, Timers
 from onboard.contract.codes import DoorAction, DoorPosition
 
-#: The bolt's travel after the door has closed, us (ours).
+#: The bolt's travel after the door has closed, us: plausible for a motor lock.
 BOLT_US = 300_000
-#: A door that found something in its way tries again this long after the way is clear, us (ours).
+#: A door that found something in its way tries again this long after the way is clear, us: time for a person to step
+#: back.
 RETRY_US = 2_000_000
 
 #: What an order does in each position: the position that follows at once, or None where nothing changes.

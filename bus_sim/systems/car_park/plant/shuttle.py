@@ -10,7 +10,7 @@ from onboard.core.site import Station
 from onboard.systems.car_park.site import car_park
 from onboard.ways.site import WaySite
 
-#: The grippers hold a car whose wheelbase differs from the shuttle's by at most this, mm (ours).
+#: The grippers hold a car whose wheelbase differs from the shuttle's by at most this, mm: the grippers' play.
 WHEELBASE_TOLERANCE_MM = 50
 #: ShuttleState is repeated at least this often (dbc/device.dbc).
 REPEAT_US = 10_000_000

@@ -28,9 +28,9 @@ EDGE_MM = 6_000
 #: Orders begin so long after power-up, us: the machines find each other first.
 BEGIN_US = 10_000_000
 #: A move that does not come about in this time is refused by the rules: then the timing cannot be played. Four signals
-#: of a robot that waits, or the longest edge that is made here, fit in. Ours.
+#: of a robot that waits, or the longest edge that is made here, fit in.
 PATIENCE_US = 30_000_000
-#: Nobody has moved for so long with all drives free: nobody ever will. Robots signal every 2 s. Ours.
+#: Nobody has moved for so long with all drives free: nobody ever will. Robots signal every 2 s.
 STILL_US = 60_000_000
 _HOST, _DESK, _FIRST_ROBOT = 1, 9, 21
 

@@ -14,7 +14,7 @@ from onboard.config.problems import Problems
 from onboard.systems.mapd.floor import FAR, FREE, Floor, grid_floor, lasting_rests
 from onboard.systems.mapd.reader import BLOCKED, MAX_RELEASE
 
-#: Endpoints drawn on a map that marks none. Ours.
+#: Endpoints drawn on a map that marks none: more than robots on the shipped maps.
 ENDPOINTS = 20
 _COLUMNS = 5
 

@@ -20,9 +20,10 @@ from onboard.trace.check.picture import Picture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import way_site
 
-#: A customer who pressed the key before a car in the bay gets a word within this, us. Ours.
+#: A customer who pressed the key before a car in the bay gets a word within this, us: calls, attempts and their windows
+#: take less.
 WORD_WITHIN_US = 60_000_000
-#: A customer gets the car, or the place, within this, us. Ours: some thirty cars before one on the shipped sites.
+#: A customer gets the car, or the place, within this, us: some thirty cars before one on the shipped sites.
 SERVED_WITHIN_US = 3_600_000_000
 
 _ANSWERS_TO_KEY = (DeskText.TAKE_TICKET, DeskText.FULL, DeskText.CAR_TOO_LARGE, DeskText.OUT_OF_ORDER)

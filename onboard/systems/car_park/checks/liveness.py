@@ -16,7 +16,7 @@ from onboard.ways.site import Axis
 #: Something happens within this, beyond the longest single motion, while there is an open task, us (issue 4, point 1).
 IDLE_WITHIN_US = 60_000_000
 #: A task is awarded at most so often to one machine, and to all, before its car is taken. Restarts, traffic and a
-#: machine that fails make some; who is left out comes back after minutes. Ours.
+#: machine that fails make some; who is left out comes back after minutes.
 MOST_SAME, MOST_ROUNDS = 3, 8
 
 

@@ -23,7 +23,7 @@ from onboard.trace.check.rule import Handlers, Rule
 from onboard.ways.site import TrackKind, way_site
 
 #: Who was pushed by hand has so long to get the rights to where it is, us: it may have to start first, and to listen
-#: until it is admitted (seen: 30 s). Ours.
+#: until it is admitted (seen: 30 s).
 PUSHED_US = 60_000_000
 
 
