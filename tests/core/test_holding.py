@@ -70,12 +70,12 @@ def test_a_right_under_its_number_or_a_twin_needs_a_person(is_right: bool) -> No
 def test_what_a_person_must_decide_outlives_the_process() -> None:
     held = holding()
     held.for_person(Reason.JOURNAL_SHORT, OTHER)
-    entries = [held.record()]
+    entries = [held.record().entry]
     again = holding()
     again.replay(entries)
     assert again.why == (Reason.JOURNAL_SHORT, OTHER, True)
     again.go(ME)
-    entries.append(again.record())
+    entries.append(again.record().entry)
     last = holding()
     last.replay(entries)
     assert not last.is_held
