@@ -13,12 +13,12 @@ from importlib.resources import as_file, files
 from itertools import pairwise
 
 from bus_sim.options import RunOptions
+from bus_sim.session import play
 from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
 from bus_sim.systems.mapd.importers.mapf import Wanted
 from bus_sim.systems.mapd.plant import UnitPlant
 from bus_sim.systems.mapd.published import TOKEN_PASSING
-from bus_sim.systems.mapd.run import play_day
 from bus_sim.systems.mapd.steps import Day
 from onboard.config.site import parse_site
 from onboard.contract.mapd import StepRound
@@ -62,9 +62,10 @@ def _alone(site: Mapd) -> tuple[float, int, int, str]:
 
 def _on_the_bus(site: Mapd) -> tuple[float, int, int, str]:
     """Besides: frames, their share of the bus's time, the longest step, and whether the day alone was the same."""
-    played = play_day(site, RunOptions(quiet=True))
+    played = play(site, RunOptions(quiet=True))
     plant = played.plant
     assert isinstance(plant, UnitPlant)
+    plant.check_steps()
     assert played.is_good, plant.violations
     release = {task.number: task.release for task in site.tasks}
     service = sum(step - release[number] for number, step in plant.served.items()) / len(plant.served)

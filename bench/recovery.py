@@ -8,11 +8,11 @@ import random
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
-from bus_sim.campaign.points import SCENE, Single, count, points, reference
+from bus_sim.campaign.points import Single, count, points, reference
 from bus_sim.campaign.trial import play
 from bus_sim.faults.injection import AnyFault, Injection
-from bus_sim.faults.scenario import Scenario
 from bus_sim.sites import find_site
 from onboard.core.site import Site
 
@@ -53,10 +53,11 @@ def faults_of(site: Site, runs: int, chance: random.Random) -> dict[str, list[An
 def main() -> int:
     site = find_site(sys.argv[1] if len(sys.argv) > 1 else "small")
     runs = int(sys.argv[2]) if len(sys.argv) > 2 else 20
+    alone = reference(site.name, None)
     began_s, longest, seen, hours = time.process_time(), dict[str, int](), dict[str, int](), 0.0
     for title, faults in faults_of(site, runs, random.Random(1)).items():
         for number, fault in enumerate(faults):
-            report = play(site, Scenario(site.name, number, 1_200.0, SCENE, (fault,)))
+            report = play(site, replace(alone, seed=number, limit_s=1_200.0, faults=(fault,)))
             hours += report.simulated_s / 3600
             for measure, us in report.recovery:
                 longest[measure] = max(longest.get(measure, 0), us)

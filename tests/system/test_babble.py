@@ -10,10 +10,9 @@ from bus_sim.systems.car_park.simulation import Simulation, build
 from bus_sim.virtual_time import run
 from onboard.contract.codes import Reason
 from onboard.core.frame import Frame
-from onboard.wire.codec import fleet_codec
 from onboard.wire.dbc_file import fleet_layouts
 from tests.sites import one_floor
-from tests.wire.samples import random_frames
+from tests.wire.samples import CODES, message_of, random_frames
 
 FLEET = {layout.name for layout in fleet_layouts()}
 OWN_NODES = (1, 11)
@@ -29,7 +28,7 @@ async def _babble(seed: int) -> Simulation:
     chance.shuffle(said)
     for layout, _, values in said:
         node = chance.choice([2, 12, 99, 250, 251, 255])
-        bus.send(fleet_codec()._pack(layout.name, node, values))
+        bus.send(Frame(layout.frame_id | node, CODES[layout.name].pack(message_of(layout.name, node, values))))
         bus.send(Frame(layout.frame_id | node, chance.randbytes(chance.randrange(9))))
         await asyncio.sleep(0.002)
     await asyncio.sleep(20)
