@@ -58,9 +58,9 @@ class ArmState(Message):
 
     #: Sequence of the last order taken up. 0 to 255.
     sequence: int
-    #: x of where it is. -524288 to 524287 mm.
+    #: x of where it is. -262144 to 262143 mm.
     x_mm: int
-    #: y of where it is. -524288 to 524287 mm.
+    #: y of where it is. -262144 to 262143 mm.
     y_mm: int
     #: What the drive does.
     arm_mode: ArmMode
@@ -88,9 +88,9 @@ class OrderFrom(Message):
 
     #: Serial number of the order, which is that of the part too. 0 to 65535.
     order: int
-    #: x of where the part lies. -524288 to 524287 mm.
+    #: x of where the part lies. -262144 to 262143 mm.
     x_mm: int
-    #: y of where the part lies. -524288 to 524287 mm.
+    #: y of where the part lies. -262144 to 262143 mm.
     y_mm: int
 
 
@@ -100,9 +100,9 @@ class OrderTo(Message):
 
     #: Serial number of the order. 0 to 65535.
     order: int
-    #: x of where the part is wanted. -524288 to 524287 mm.
+    #: x of where the part is wanted. -262144 to 262143 mm.
     x_mm: int
-    #: y of where the part is wanted. -524288 to 524287 mm.
+    #: y of where the part is wanted. -262144 to 262143 mm.
     y_mm: int
     #: Time for it, 0 for no limit. 0 to 2550000 ms.
     within_ms: int

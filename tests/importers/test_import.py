@@ -146,7 +146,7 @@ def test_a_mistake_leaves_a_site_file_of_before_as_it_was(tmp_path: Path) -> Non
 def test_where_the_site_cannot_be_written_nothing_is_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "site.toml").mkdir()
     assert main(["import", str(RANDOM), "-o", str(tmp_path / "site.toml")]) == 2
-    assert "cannot be written" in capsys.readouterr().err
+    assert "site.toml: is a folder; name a file in it" in capsys.readouterr().err
     assert [one.name for one in tmp_path.iterdir()] == ["site.toml"]
 
 

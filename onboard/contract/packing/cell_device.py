@@ -86,11 +86,11 @@ def pack_arm_state(message: ArmState) -> bytes:
     if not 0 <= sequence <= 255:
         raise OutOfRangeError("ArmState.sequence", sequence, 0, 255)
     x_mm = message.x_mm
-    if not -524288 <= x_mm <= 524287:
-        raise OutOfRangeError("ArmState.x_mm", x_mm, -524288, 524287)
+    if not -262144 <= x_mm <= 262143:
+        raise OutOfRangeError("ArmState.x_mm", x_mm, -262144, 262143)
     y_mm = message.y_mm
-    if not -524288 <= y_mm <= 524287:
-        raise OutOfRangeError("ArmState.y_mm", y_mm, -524288, 524287)
+    if not -262144 <= y_mm <= 262143:
+        raise OutOfRangeError("ArmState.y_mm", y_mm, -262144, 262143)
     return _Q.pack(sequence + (x_mm & 0xFFFFF) * 0x100 + ((y_mm & 0xFFFFF) + message.arm_mode * 0x100000) * 0x10000000)
 
 
@@ -98,7 +98,11 @@ def unpack_arm_state(sender: int, data: bytes) -> ArmState | None:
     (word_0,) = _Q.unpack_from(data)
     sequence = word_0 & 0xFF
     x_mm = ((word_0 >> 8 & 0xFFFFF) ^ 0x80000) - 0x80000
+    if x_mm < -262144 or x_mm > 262143:
+        return None
     y_mm = ((word_0 >> 28 & 0xFFFFF) ^ 0x80000) - 0x80000
+    if y_mm < -262144 or y_mm > 262143:
+        return None
     arm_mode = word_0 >> 48 & 0x3
     if arm_mode > 1:
         return None
@@ -131,11 +135,11 @@ def pack_order_from(message: OrderFrom) -> bytes:
     if not 0 <= order <= 65535:
         raise OutOfRangeError("OrderFrom.order", order, 0, 65535)
     x_mm = message.x_mm
-    if not -524288 <= x_mm <= 524287:
-        raise OutOfRangeError("OrderFrom.x_mm", x_mm, -524288, 524287)
+    if not -262144 <= x_mm <= 262143:
+        raise OutOfRangeError("OrderFrom.x_mm", x_mm, -262144, 262143)
     y_mm = message.y_mm
-    if not -524288 <= y_mm <= 524287:
-        raise OutOfRangeError("OrderFrom.y_mm", y_mm, -524288, 524287)
+    if not -262144 <= y_mm <= 262143:
+        raise OutOfRangeError("OrderFrom.y_mm", y_mm, -262144, 262143)
     return _Q.pack(order + (x_mm & 0xFFFFF) * 0x10000 + (y_mm & 0xFFFFF) * 0x1000000000)
 
 
@@ -143,7 +147,11 @@ def unpack_order_from(sender: int, data: bytes) -> OrderFrom | None:
     (word_0,) = _Q.unpack_from(data)
     order = word_0 & 0xFFFF
     x_mm = ((word_0 >> 16 & 0xFFFFF) ^ 0x80000) - 0x80000
+    if x_mm < -262144 or x_mm > 262143:
+        return None
     y_mm = ((word_0 >> 36 & 0xFFFFF) ^ 0x80000) - 0x80000
+    if y_mm < -262144 or y_mm > 262143:
+        return None
     return OrderFrom(sender, order, x_mm, y_mm)
 
 
@@ -152,11 +160,11 @@ def pack_order_to(message: OrderTo) -> bytes:
     if not 0 <= order <= 65535:
         raise OutOfRangeError("OrderTo.order", order, 0, 65535)
     x_mm = message.x_mm
-    if not -524288 <= x_mm <= 524287:
-        raise OutOfRangeError("OrderTo.x_mm", x_mm, -524288, 524287)
+    if not -262144 <= x_mm <= 262143:
+        raise OutOfRangeError("OrderTo.x_mm", x_mm, -262144, 262143)
     y_mm = message.y_mm
-    if not -524288 <= y_mm <= 524287:
-        raise OutOfRangeError("OrderTo.y_mm", y_mm, -524288, 524287)
+    if not -262144 <= y_mm <= 262143:
+        raise OutOfRangeError("OrderTo.y_mm", y_mm, -262144, 262143)
     within_ms = message.within_ms
     if not 0 <= within_ms <= 2550000:
         raise OutOfRangeError("OrderTo.within_ms", within_ms, 0, 2550000)
@@ -169,7 +177,11 @@ def unpack_order_to(sender: int, data: bytes) -> OrderTo | None:
     (word_0,) = _Q.unpack_from(data)
     order = word_0 & 0xFFFF
     x_mm = ((word_0 >> 16 & 0xFFFFF) ^ 0x80000) - 0x80000
+    if x_mm < -262144 or x_mm > 262143:
+        return None
     y_mm = ((word_0 >> 36 & 0xFFFFF) ^ 0x80000) - 0x80000
+    if y_mm < -262144 or y_mm > 262143:
+        return None
     within_ms = (word_0 >> 56) * 10000
     return OrderTo(sender, order, x_mm, y_mm, within_ms)
 

@@ -13,6 +13,7 @@ from onboard.contract.messages import Message
 from onboard.controller.shell import Controller
 from onboard.core.behaviour import Behaviour
 from onboard.core.effects import Actuate, Effect, Send, Tell
+from onboard.core.motion_authority import ALONE, Permit
 from onboard.core.site import Segment
 
 #: What is said instead of one message; an empty list says nothing.
@@ -37,8 +38,18 @@ def at_start(simulation: Simulation, kind: KindCode | None, plant: Callable[[Con
 
 
 def in_behaviour(simulation: Simulation, kind: KindCode, plant: Callable[[Any], None]) -> None:
-    """Do something to the behaviour of every machine of a kind."""
-    at_start(simulation, kind, lambda controller: plant(_behaviour(controller)))
+    """Do something to the behaviour of every machine of a kind, which does not look at its own orders either."""
+
+    def broken(controller: Controller) -> None:
+        plant(_behaviour(controller))
+        motion = controller.holon.fleet.motion
+
+        def looks_away(*_: object) -> None:
+            motion.event += 1
+
+        replace(motion, "fault", lambda _: looks_away)
+
+    at_start(simulation, kind, broken)
 
 
 def _behaviour(controller: Controller) -> Behaviour:
@@ -83,6 +94,11 @@ def hearing(simulation: Simulation, kind: KindCode | None, heard: Callable[[Cont
     at_start(simulation, kind, plant)
 
 
-def reaches_goal(carriage: Any) -> Callable[[list[int]], tuple[Segment, Reason]]:
+def reaches_goal(carriage: Any) -> Callable[[list[int]], tuple[Segment, Permit, Reason]]:
     """A carriage's reach where rights count for nothing: to the end of the way on its axis."""
-    return lambda ahead: (Segment(carriage.track, ahead[-1]), Reason.NONE)
+
+    def reach(ahead: list[int]) -> tuple[Segment, Permit, Reason]:
+        motion = carriage.fleet.motion
+        return Segment(carriage.track, ahead[-1]), Permit(motion, motion.event, Reason.NONE, ALONE), Reason.NONE
+
+    return reach
