@@ -13,7 +13,7 @@ from onboard.contract.messages import Message
 from onboard.controller.shell import Controller
 from onboard.core.behaviour import Behaviour
 from onboard.core.effects import Actuate, Effect, Send, Tell
-from onboard.core.motion_authority import ALONE, Permit
+from onboard.core.motion_authority import ALONE, Permit, authorised
 from onboard.core.site import Segment
 
 #: What is said instead of one message; an empty list says nothing.
@@ -98,7 +98,7 @@ def reaches_goal(carriage: Any) -> Callable[[list[int]], tuple[Segment, Permit, 
     """A carriage's reach where rights count for nothing: to the end of the way on its axis."""
 
     def reach(ahead: list[int]) -> tuple[Segment, Permit, Reason]:
-        motion = carriage.fleet.motion
-        return Segment(carriage.track, ahead[-1]), Permit(motion, motion.event, Reason.NONE, ALONE), Reason.NONE
+        permit = dataclasses.replace(authorised(carriage.fleet.motion, ALONE), reason=Reason.NONE)
+        return Segment(carriage.track, ahead[-1]), permit, Reason.NONE
 
     return reach
