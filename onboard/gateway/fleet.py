@@ -159,7 +159,7 @@ class FleetTopics:
         state = view.history.lives.states.get(node)
         told: Json = {"kind": machine.kind.name.lower(), "state": state.name.lower() if state is not None else "silent"}
         if machine.kind is KindCode.LIFT:
-            segment, _ = view.positions[node]
+            segment = view.history.places.by_node[node].segment
             shaft = way_site(self.site).tracks.get(segment.track)
             floors = shaft.joins if shaft is not None else ()
             if 1 <= segment.index <= len(floors):

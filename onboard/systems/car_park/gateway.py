@@ -52,7 +52,7 @@ class ParkWishes(NoWishes):
             if order.was_said:
                 raise RefusedError("NOT_TAKEN", "the compartment has not called for it: no car in it, or not ready")
             return Said((OperatorOrder(sender, wish.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US)
-        if wish.car not in self._view.cars:
+        if wish.car not in self._view.history.loads.stations:
             raise RefusedError("UNKNOWN_TICKET", "no such car is in the park", "$.car")
         action = OperatorAction.URGENT_TICKET if wish.urgent else OperatorAction.INSERT_TICKET
         return Said((OperatorOrder(sender, wish.node, action, wish.car),), TICKET_AGAIN_US)
@@ -81,7 +81,7 @@ class ParkWishes(NoWishes):
         return self._desks[name]
 
     def _standing(self, place: str) -> Reference:
-        for number, car in self._view.places_taken().items():
+        for number, car in self._view.history.loads.standing().items():
             if self._place(number) == place:
                 return car
         raise RefusedError("UNKNOWN_TICKET", "no car is known to stand there", "$.from")

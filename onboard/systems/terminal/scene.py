@@ -181,7 +181,7 @@ class TerminalScene:
         body = self._bodies.get(node)
         if body is None:
             return {"where": "", "car": None}
-        aboard = self.view.aboard.get(node)
+        aboard = self.view.history.loads.aboard.get(node)
         step = body.steps.get(body.current)
         doing = step.action.name.lower().replace("_", " ") if step is not None and step.action is not _DRIVING else ""
         told: list[list[object]] = []
