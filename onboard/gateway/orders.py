@@ -21,6 +21,8 @@ from onboard.gateway.order import RANK, Order, Wish, order_of, same_content, wit
 from onboard.gateway.records import Life, WishRecord
 from onboard.gateway.schema import TRANSPORT
 from onboard.gateway.wishes import LISTEN_US, RefusedError, Wishes, is_robot
+from onboard.history.history import Fact
+from onboard.history.tasks import TaskTold
 from onboard.ports.journal import Entry
 
 #: Orders that are over are remembered, the newest so many, so that their names are known when they come again.
@@ -191,17 +193,17 @@ class Orders:
 
     # --- the bus and the clock -----------------------------------------------------------------------------------
 
-    def feed(self, message: Message) -> Outcome:
-        """Take up one message of the fleet bus."""
+    def feed(self, fact: Fact | None) -> Outcome:
+        """Take up what one message of the fleet bus has told."""
         outcome = Outcome()
         for order in self.open:
-            task = self._wishes.task_of(order, message) if order.life in (Life.ACCEPTED, Life.CALLED) else None
+            task = self._wishes.task_of(order, fact) if order.life in (Life.ACCEPTED, Life.CALLED) else None
             if task is not None and (task != order.task or order.life is Life.ACCEPTED):
                 order.task, order.life, order.due_us = task, Life.CALLED, None
                 outcome.changed.append(order)
-            elif isinstance(message, TaskReport) and message.task == self._task(order):
-                self._on_report(order, message, outcome)
-            elif self._wishes.is_done(order, message):
+            elif isinstance(fact, TaskTold) and fact.report.task == self._task(order):
+                self._on_report(order, fact.report, outcome)
+            elif self._wishes.is_done(order, fact):
                 outcome.changed.append(self._end(order, Life.DONE, "", ""))
         return outcome
 

@@ -160,6 +160,5 @@ class History:
         self.plans.on_progress(progress)
         fact = self.places.on_progress(progress, time_us)
         self.halts.on_place(fact)
-        if fact.is_motion:
-            self.lives.on_motion(progress.sender)
+        self.lives.on_place(fact)
         return fact

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from onboard.contract.codes import MachineState, Reason
 from onboard.contract.messages import Diagnostic, Heartbeat, TokenRefusal, Waiting
+from onboard.history.places import PlaceTold
 
 #: Heartbeats missed after which a machine counts as silent, as the machines themselves count (onboard/core/mirror.py).
 SILENT_BEATS = 3
@@ -67,14 +68,18 @@ class Lives:
         fact = Beat(beat, self.beats.get(node), self.heard_us.get(node, 0), is_news, ends_stop)
         if fact.is_restart:
             self.fresh.add(node)
-            self._end_wait(node)
+            self.waits.pop(node, None)
+            self.refusals.pop(node, None)
         self.beats_us[node], self.beats[node], self.states[node] = time_us, beat, beat.state
         return fact
 
-    def on_motion(self, node: int) -> None:
-        """A machine has moved: it waits for nothing."""
-        self.fresh.discard(node)
-        self._end_wait(node)
+    def on_place(self, told: PlaceTold) -> None:
+        """Who moves waits for nothing. Who has just come to stand somewhere else may have said before why it will."""
+        if told.is_motion:
+            self.fresh.discard(told.node)
+            self.refusals.pop(told.node, None)
+        if told.place.speed_mm_s:
+            self.waits.pop(told.node, None)
 
     def on_waiting(self, word: Waiting, time_us: int) -> WaitTold:
         """Take up a wait."""
@@ -88,7 +93,3 @@ class Lives:
     def on_diagnostic(self, word: Diagnostic) -> None:
         """Take up what somebody says that it has dropped."""
         self.dropped.setdefault(word.sender, {})[word.reason] = word.count
-
-    def _end_wait(self, node: int) -> None:
-        self.waits.pop(node, None)
-        self.refusals.pop(node, None)

@@ -8,11 +8,14 @@ from typing import Any
 
 from onboard.contract.codes import Operation, OperatorAction
 from onboard.contract.constants import ANY_STATION, OUTSIDE
-from onboard.contract.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
+from onboard.contract.messages import OperatorOrder, Reference
 from onboard.gateway.dialect import Json
 from onboard.gateway.edge import Body, Edge
 from onboard.gateway.order import Order, Wish
 from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.history.calls import CallOpened, CallRepeated
+from onboard.history.history import Fact
+from onboard.history.loads import LoadTold
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
 from onboard.ways.site import WaySite, way_site
@@ -57,23 +60,27 @@ class ParkWishes(NoWishes):
         action = OperatorAction.URGENT_TICKET if wish.urgent else OperatorAction.INSERT_TICKET
         return Said((OperatorOrder(sender, wish.node, action, wish.car),), TICKET_AGAIN_US)
 
-    def task_of(self, order: Order, message: Message) -> Reference | None:
+    def task_of(self, order: Order, fact: Fact | None) -> Reference | None:
         """The compartment's call for the car, or its next call to park."""
-        if not isinstance(message, CallForProposals) or message.sender != order.wish.node or message.depth:
+        if not isinstance(fact, CallOpened | CallRepeated):
+            return None
+        call = fact.call.terms
+        if call.sender != order.wish.node or call.depth:
             return None
         if order.wish.car is None:
-            return message.task if message.operation is Operation.PARK and order.was_said else None
-        is_it = message.operation is Operation.RETRIEVE and message.car == order.wish.car
-        return message.task if is_it else None
+            return call.task if call.operation is Operation.PARK and order.was_said else None
+        is_it = call.operation is Operation.RETRIEVE and call.car == order.wish.car
+        return call.task if is_it else None
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: Order, fact: Fact | None) -> bool:
         """The car has left; or it stands in a place, and its parking was the task, which has the car's own name."""
-        if not isinstance(message, CarAt) or order.task is None:
+        if not isinstance(fact, LoadTold) or order.task is None:
             return False
+        word = fact.word
         if order.wish.car is not None:
-            return message.car == order.wish.car and message.station == OUTSIDE
+            return word.car == order.wish.car and word.station == OUTSIDE
         bays = {station.number for station in way_site(self._site).compartments.values()}
-        return message.car == order.task and message.station not in (*bays, ANY_STATION, OUTSIDE)
+        return word.car == order.task and word.station not in (*bays, ANY_STATION, OUTSIDE)
 
     def _desk(self, name: str, path: str) -> int:
         if name not in self._desks:

@@ -10,6 +10,7 @@ from onboard.gateway.edge import Body, Edge
 from onboard.gateway.order import Order, Wish
 from onboard.gateway.whereabouts import Tracker, Whereabouts
 from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.history.history import Fact, History
 from onboard.systems.graph.fields import NO_NODE, five
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
 from onboard.trace.view import SiteView
@@ -88,7 +89,7 @@ class GraphTracker:
     def __init__(self, site: FactoryGraph) -> None:
         self._at = {node: Whereabouts(str(machine.home.track)) for node, machine in site.robots.items()}
 
-    def feed(self, message: Message) -> bool:
+    def take(self, message: Message, fact: Fact | None) -> bool:
         """Robots say where they are and where they go."""
         if not isinstance(message, RobotAt) or message.sender not in self._at:
             return False
@@ -121,7 +122,7 @@ class GraphEdge(Edge):
         """Orders from outside become lists of visits."""
         return GraphWishes(self._graph)
 
-    def tracker(self) -> Tracker:
+    def tracker(self, history: History) -> Tracker:
         """By what robots say of their place."""
         return GraphTracker(self._graph)
 

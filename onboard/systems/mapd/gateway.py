@@ -6,6 +6,7 @@ from onboard.contract.mapd import StepState
 from onboard.contract.messages import Message
 from onboard.gateway.edge import Edge
 from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.history.history import Fact, History
 from onboard.systems.mapd.site import Mapd
 
 
@@ -16,7 +17,7 @@ class CellTracker:
         self._names = site.floor.names
         self._at = {node: Whereabouts(self._names[cell]) for node, cell in site.homes.items()}
 
-    def feed(self, message: Message) -> bool:
+    def take(self, message: Message, fact: Fact | None) -> bool:
         """Robots say in which cell they are at each step."""
         if not isinstance(message, StepState) or message.sender not in self._at or message.cell >= len(self._names):
             return False
@@ -36,7 +37,7 @@ class MapdEdge(Edge):
         super().__init__(site)
         self._floor = site
 
-    def tracker(self) -> Tracker:
+    def tracker(self, history: History) -> Tracker:
         """By the cell of each step."""
         return CellTracker(self._floor)
 

@@ -4,13 +4,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from onboard.contract.messages import CarAt, Message
+from onboard.contract.messages import Message
 from onboard.contract.terminal import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
 from onboard.gateway.edge import Edge
 from onboard.gateway.order import Order, Wish
 from onboard.gateway.records import Life
 from onboard.gateway.whereabouts import Tracker, Whereabouts
 from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes
+from onboard.history.history import Fact, History
+from onboard.history.loads import LoadTold
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
 
@@ -50,12 +52,12 @@ class TerminalWishes(NoWishes):
         box, station = wish.stops
         return Said((BoxOrder(sender, wish.node, wish.number, box, station, within_s, wish.urgent),), ORDER_AGAIN_US)
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: Order, fact: Fact | None) -> bool:
         """The box stands there: the vehicle's own report may have been lost."""
-        if not isinstance(message, CarAt) or order.life in (Life.ACCEPTED, Life.CALLED):
+        if not isinstance(fact, LoadTold) or order.life in (Life.ACCEPTED, Life.CALLED):
             return False
         box, station = order.wish.stops
-        return (message.car.number, message.station) == (box, station)
+        return (fact.word.car.number, fact.word.station) == (box, station)
 
 
 @dataclass(slots=True)
@@ -76,7 +78,7 @@ class EntityTracker:
         self._at = {node: Whereabouts(self._name(site.machines[node].home.track)) for node in site.vehicles}
         self._plans: dict[int, _Plan] = {}
 
-    def feed(self, message: Message) -> bool:
+    def take(self, message: Message, fact: Fact | None) -> bool:
         """Plans and the steps done of them."""
         if message.sender not in self._at:
             return False
@@ -128,7 +130,7 @@ class TerminalEdge(Edge):
         """Orders from outside become missions for one box."""
         return TerminalWishes(self._terminal)
 
-    def tracker(self) -> Tracker:
+    def tracker(self, history: History) -> Tracker:
         """By the plans that vehicles tell."""
         return EntityTracker(self._terminal)
 
