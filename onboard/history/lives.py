@@ -68,18 +68,15 @@ class Lives:
         fact = Beat(beat, self.beats.get(node), self.heard_us.get(node, 0), is_news, ends_stop)
         if fact.is_restart:
             self.fresh.add(node)
-            self.waits.pop(node, None)
-            self.refusals.pop(node, None)
+            self._end_wait(node)
         self.beats_us[node], self.beats[node], self.states[node] = time_us, beat, beat.state
         return fact
 
     def on_place(self, told: PlaceTold) -> None:
-        """Who moves waits for nothing. Who has just come to stand somewhere else may have said before why it will."""
+        """Who moves, or has come into another segment, waits for nothing: who turns tells no speed."""
         if told.is_motion:
             self.fresh.discard(told.node)
-            self.refusals.pop(told.node, None)
-        if told.place.speed_mm_s:
-            self.waits.pop(told.node, None)
+            self._end_wait(told.node)
 
     def on_waiting(self, word: Waiting, time_us: int) -> WaitTold:
         """Take up a wait."""
@@ -93,3 +90,7 @@ class Lives:
     def on_diagnostic(self, word: Diagnostic) -> None:
         """Take up what somebody says that it has dropped."""
         self.dropped.setdefault(word.sender, {})[word.reason] = word.count
+
+    def _end_wait(self, node: int) -> None:
+        self.waits.pop(node, None)
+        self.refusals.pop(node, None)

@@ -95,7 +95,7 @@ def _parts_of(system: str) -> Iterator[tuple[str, Layer]]:
     )
     words = Layer((*CORE_TYPES, own, "onboard.systems.words"), only_stdlib=PURE_STDLIB, pure=True)
     edge = Layer(
-        (*CORE_TYPES, own, "onboard.gateway", "onboard.trace.view"),
+        (*CORE_TYPES, own, "onboard.gateway", "onboard.history", "onboard.trace.view"),
         not_stdlib=frozenset({"random", "socket", "threading", "time"}),
     )
     parts = {
@@ -182,7 +182,7 @@ LAYERS: dict[str, Layer] = {
             "onboard.wire",
         )
     ),
-    # What a person says is decided from the decoded bus alone; the gateway's words for a held machine are its words.
+    # What a person says is decided from the history of the bus alone; the gateway's words for a held machine are its words.
     "onboard.operate": Layer(
         (
             *CORE_TYPES,
@@ -194,6 +194,7 @@ LAYERS: dict[str, Layer] = {
             "onboard.ways.tokens",
             "onboard.gateway.pauses",
             "onboard.gateway.whereabouts",
+            "onboard.history",
             "onboard.ports",
             "onboard.wire",
         ),
