@@ -37,6 +37,7 @@ from onboard.history.orders import SiteOrders, SlotTold, StopTold
 from onboard.history.places import Places, PlaceTold
 from onboard.history.plans import Plans, PlanTold
 from onboard.history.rights import Rights, RightTold
+from onboard.history.system import SystemFact, system_history
 from onboard.history.tasks import Tasks, TaskTold
 
 #: Calls and tasks that are kept, so that a picture may stay open for ever: those that are over go first, the oldest of
@@ -61,6 +62,7 @@ Fact = (
     | SlotTold
     | StopTold
     | RightTold
+    | SystemFact
 )
 
 
@@ -83,10 +85,14 @@ class History:
         self.orders = SiteOrders(machines)
         self.calls = Calls(CALL_LIMIT if is_bounded else None, self.clock)
         self.tasks = Tasks(TASK_LIMIT if is_bounded else None)
+        self.system = system_history(site, self.tasks)
 
     def feed(self, message: Message, time_us: int) -> Fact | None:
         """Take up one message, at a time of the log in us; None where it tells nothing that is known here."""
-        fact = self._deal(message, time_us) or self._of_sender(message, time_us) or self._of_site(message, time_us)
+        fact: Fact | None = self._deal(message, time_us) or self._of_sender(message, time_us)
+        fact = fact or self._of_site(message, time_us)
+        if fact is None and self.system is not None:
+            fact = self.system.feed(message, time_us)
         self.lives.heard_us[message.sender] = time_us
         return fact
 

@@ -67,7 +67,7 @@ class LivePicture:
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """One message of the fleet bus that the history was fed with, and what it made of it."""
         self.view.take(message, fact, time_us)
-        self.scene.feed(message, time_us)
+        self.scene.take(message, fact, time_us)
         self.indicators.take(message, fact, time_us)
         self._sample(time_us)
 

@@ -5,6 +5,7 @@ from typing import Any
 from onboard.contract.codes import KindCode, LegAction, TokenKind
 from onboard.contract.messages import BayState, DoorState, Message, ShuttleState
 from onboard.core.site import Segment
+from onboard.history.history import Fact
 from onboard.trace.scene.scene import Json
 from onboard.trace.view import SiteView
 from onboard.ways.site import TrackKind, WaySite
@@ -23,7 +24,7 @@ class CarParkScene:
         self._bays: dict[int, dict[str, Any]] = {}
         self._shuttles: dict[int, dict[str, Any]] = {}
 
-    def feed(self, message: Message, time_us: int) -> None:
+    def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """The history tells all of it."""
 
     def feed_device(self, node: int, message: Message, time_us: int) -> None:
