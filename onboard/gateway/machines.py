@@ -8,7 +8,7 @@ from onboard.contract.constants import MOBILE_KINDS
 from onboard.contract.messages import Blocked, Halted, Message, Reference, TaskReport, Waiting
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
-from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.history.calls import CallAnswered
 from onboard.history.halts import HaltTold
 from onboard.history.hands import HandTold
@@ -43,7 +43,7 @@ class TaskInHand:
 
 
 @dataclass(slots=True)
-class Body:
+class MobileMachine:
     """One mobile machine as its history tells it, and its newest task."""
 
     machine: Machine
@@ -88,7 +88,7 @@ class Machines:
 
     site: Site
     history: History
-    bodies: dict[int, Body] = field(init=False)
+    bodies: dict[int, MobileMachine] = field(init=False)
     changed: set[int] = field(default_factory=set)
     #: Machines that said where they are since this was last emptied.
     moved: set[int] = field(default_factory=set)
@@ -96,7 +96,7 @@ class Machines:
 
     def __post_init__(self) -> None:
         mobile = sorted(node for node, one in self.site.machines.items() if one.kind in TRAVELLERS)
-        self.bodies = {node: Body(self.site.machines[node], self.history) for node in mobile}
+        self.bodies = {node: MobileMachine(self.site.machines[node], self.history) for node in mobile}
         self._tracker = edge_of(self.site).tracker(self.history)
 
     @property
@@ -109,7 +109,7 @@ class Machines:
         """Whether an emergency stop holds all."""
         return self.history.orders.stop is not None
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """Where a mobile machine is."""
         return self._tracker.where(node_id)
 
@@ -155,7 +155,7 @@ class Machines:
         """When a machine that is not heard again counts as silent, us."""
         return self.history.lives.silent_us(node_id)
 
-    def _on_word(self, body: Body, fact: Fact | None) -> None:
+    def _on_word(self, body: MobileMachine, fact: Fact | None) -> None:
         """What a mobile machine says of itself."""
         match fact:
             case Beat(is_news=True) | WaitTold() | HandTold():
@@ -165,7 +165,7 @@ class Machines:
             case PlanTold() if body.task is not None:
                 body.task.updates += 1
 
-    def _on_report(self, body: Body, report: TaskReport) -> None:
+    def _on_report(self, body: MobileMachine, report: TaskReport) -> None:
         task = body.task
         if task is None or task.task != report.task:
             if report.phase in _OVER:

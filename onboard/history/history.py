@@ -28,17 +28,17 @@ from onboard.contract.messages import (
 )
 from onboard.core.site import Site
 from onboard.history.calls import BidMade, CallAnswered, CallFact, CallOpened, CallRepeated, Calls
-from onboard.history.clock import BusClock
+from onboard.history.clock import LoggedBusTime
 from onboard.history.halts import Halts, HaltTold
 from onboard.history.hands import Hands, HandTold
-from onboard.history.lives import Beat, Lives, WaitTold
+from onboard.history.lives import Beat, MachineLives, WaitTold
 from onboard.history.loads import Loads, LoadTold
 from onboard.history.orders import SiteOrders, SlotTold, StopTold
 from onboard.history.places import Places, PlaceTold
 from onboard.history.plans import Plans, PlanTold
-from onboard.history.rights import Rights, RightTold
+from onboard.history.rights import RightsHistory, RightTold
 from onboard.history.system import SystemFact, system_history
-from onboard.history.tasks import Tasks, TaskTold
+from onboard.history.tasks import TaskFold, TaskTold
 
 #: Calls and tasks that are kept, so that a picture may stay open for ever: those that are over go first, the oldest of
 #: them. A site of 24 machines has fewer than 20 open at a time, and what is asked about was lately.
@@ -74,17 +74,17 @@ class History:
 
     def __init__(self, site: Site | None, *, is_bounded: bool = True) -> None:
         machines = list(site.machines.values()) if site is not None else []
-        self.clock = BusClock()
-        self.lives = Lives(site.timing.heartbeat_us if site is not None else UNKNOWN_BEAT_US)
+        self.clock = LoggedBusTime()
+        self.lives = MachineLives(site.timing.heartbeat_us if site is not None else UNKNOWN_BEAT_US)
         self.places = Places(machines)
         self.plans = Plans()
         self.loads = Loads()
-        self.rights = Rights()
+        self.rights = RightsHistory()
         self.hands = Hands()
         self.halts = Halts()
         self.orders = SiteOrders(machines)
         self.calls = Calls(CALL_LIMIT if is_bounded else None, self.clock)
-        self.tasks = Tasks(TASK_LIMIT if is_bounded else None)
+        self.tasks = TaskFold(TASK_LIMIT if is_bounded else None)
         self.system = system_history(site, self.tasks)
 
     def feed(self, message: Message, time_us: int) -> Fact | None:

@@ -35,7 +35,7 @@ class WaitTold:
     word: Waiting
 
 
-class Lives:
+class MachineLives:
     """A fold over what machines say of themselves; times in us of the log, all by node-ID."""
 
     def __init__(self, heartbeat_us: int) -> None:

@@ -20,7 +20,7 @@ class RightTold:
     giver: int
 
 
-class Rights:
+class RightsHistory:
     """A fold over grants and statements: (version, node-ID of the holder) of each right to a segment or station."""
 
     def __init__(self) -> None:

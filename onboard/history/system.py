@@ -5,7 +5,7 @@ A system's own is the class ``HISTORY`` of its folder's ``history.py``; whatever
 
 from onboard.contract.messages import Message
 from onboard.core.site import Site
-from onboard.history.tasks import Tasks
+from onboard.history.tasks import TaskFold
 from onboard.systems.registry import part
 
 
@@ -18,7 +18,7 @@ class SystemFact:
 class SystemHistory:
     """A system without messages of its own."""
 
-    def __init__(self, tasks: Tasks) -> None:
+    def __init__(self, tasks: TaskFold) -> None:
         #: Of the whole history: some systems order by words of their own, without a call.
         self.tasks = tasks
 
@@ -27,7 +27,7 @@ class SystemHistory:
         return None
 
 
-def system_history(site: Site | None, tasks: Tasks) -> SystemHistory | None:
+def system_history(site: Site | None, tasks: TaskFold) -> SystemHistory | None:
     """The fold of a site's system; None where there is no site file, or the system has no fold of its own."""
     module = part(site.system, "history") if site is not None else None
     if module is None:

@@ -14,7 +14,7 @@ CALLS_OVER = (CallResult.REFUSED, CallResult.WITHDRAWN, CallResult.REJECTED)
 
 
 @dataclass
-class Task:
+class TaskHistory:
     """One task: the last phase told, when each phase was first told (us of the log), and its calls."""
 
     operation: Operation
@@ -47,24 +47,24 @@ class TaskTold:
     Of a task that nobody has heard of ``task`` and ``before`` are None, and nothing is its first.
     """
 
-    task: Task | None
+    task: TaskHistory | None
     report: TaskReport
     before: TaskPhase | None
     is_first: bool
 
 
-class Tasks:
+class TaskFold:
     """A fold over what calls and reports tell; ``most`` tasks are kept, None for all."""
 
     def __init__(self, most: int | None) -> None:
-        self.by_name: dict[Reference, Task] = {}
+        self.by_name: dict[Reference, TaskHistory] = {}
         self._most = most
 
     def open(self, reference: Reference, operation: Operation, time_us: int) -> bool:
         """A task is told for the first time, by a call or otherwise; False where it was known."""
         if reference in self.by_name:
             return False
-        self.by_name[reference] = Task(operation, phase_us={TaskPhase.OPEN: time_us})
+        self.by_name[reference] = TaskHistory(operation, phase_us={TaskPhase.OPEN: time_us})
         if self._most is not None:
             drop_oldest(self.by_name, self._most, lambda task: not task.is_waiting)
         return True

@@ -7,7 +7,7 @@ from onboard.contract.constants import MAX_NODE_ID, NOBODY
 from onboard.contract.messages import Blocked, Halted, Heartbeat, Message
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
-from onboard.gateway.whereabouts import Tracker
+from onboard.gateway.positions import Tracker
 from onboard.history.history import History
 
 #: A ``Halted`` that is not said again for this many heartbeat periods is over: it is said once in each.

@@ -9,13 +9,13 @@ from collections import Counter, deque
 from onboard.contract.codes import CallResult, ManualMode, Operation, TaskPhase
 from onboard.contract.messages import Message, Reference
 from onboard.core.site import Site
-from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
+from onboard.history.calls import BidMade, CallAnswered, CallHistory, CallOpened
 from onboard.history.halts import HaltTold
 from onboard.history.hands import HandTold
 from onboard.history.history import Fact, History
 from onboard.history.lives import WaitTold
 from onboard.history.orders import SlotTold
-from onboard.history.tasks import Task, TaskTold
+from onboard.history.tasks import TaskHistory, TaskTold
 from onboard.systems.words import words_of
 
 #: Events in words that are kept.
@@ -56,12 +56,12 @@ class SiteView:
         return self.words.machine(node)
 
     @property
-    def calls(self) -> dict[tuple[int, int], Call]:
+    def calls(self) -> dict[tuple[int, int], CallHistory]:
         """Calls by their caller and number."""
         return self.history.calls.by_key
 
     @property
-    def tasks(self) -> dict[Reference, Task]:
+    def tasks(self) -> dict[Reference, TaskHistory]:
         """Tasks by their names."""
         return self.history.tasks.by_name
 
@@ -101,8 +101,8 @@ class SiteView:
             case TaskTold() if fact.is_first:
                 self._on_phase(fact, time_us)
 
-    def _on_halt(self, told: HaltTold, time_us: int) -> None:
-        halted, before = told.word, told.before[1] if told.before is not None else None
+    def _on_halt(self, statement: HaltTold, time_us: int) -> None:
+        halted, before = statement.word, statement.before[1] if statement.before is not None else None
         what = halted.reason, halted.cause, halted.needs_person
         if before is not None and what == (before.reason, before.cause, before.needs_person):
             return
@@ -110,16 +110,16 @@ class SiteView:
         person = "; a person must decide" if halted.needs_person else ""
         self.say(time_us, f"{self.name(halted.machine)} does not act: {why}{person}")
 
-    def _wait(self, told: WaitTold) -> str:
-        word = told.word
+    def _wait(self, statement: WaitTold) -> str:
+        word = statement.word
         where, why = self.words.slot(word.track, word.index), self.words.reason(word.reason)
         blocker = f" of {self.name(word.blocker)}" if word.blocker else ""
         return f"{self.name(word.sender)} waits for {where}{blocker}: {why}"
 
-    def _slot(self, told: SlotTold) -> str:
-        word = told.word
+    def _slot(self, statement: SlotTold) -> str:
+        word = statement.word
         where, why = self.words.slot(word.track, word.index), self.words.reason(word.reason)
-        return f"{where} is {'blocked' if told.is_blocked else 'clear again'}: {why}"
+        return f"{where} is {'blocked' if statement.is_blocked else 'clear again'}: {why}"
 
     def say(self, time_us: int, text: str) -> None:
         """One more event in words."""
@@ -132,7 +132,7 @@ class SiteView:
             task.phase = TaskPhase.DONE
             self._count_done(task, time_us)
 
-    def _on_end(self, call: Call, end: CallAnswered, time_us: int) -> None:
+    def _on_end(self, call: CallHistory, end: CallAnswered, time_us: int) -> None:
         award = end.award
         self.calls_closed[award.result] += 1
         terms, thing = call.terms, self.words.thing(call.terms.car)
@@ -143,8 +143,8 @@ class SiteView:
         else:
             self.say(time_us, f"{self.name(award.winner)} wins {thing}")
 
-    def _on_phase(self, told: TaskTold, time_us: int) -> None:
-        task, report = told.task, told.report
+    def _on_phase(self, statement: TaskTold, time_us: int) -> None:
+        task, report = statement.task, statement.report
         assert task is not None, "who is first tells of a task that is known"
         if report.phase is TaskPhase.DONE:
             self._count_done(task, time_us)
@@ -154,6 +154,6 @@ class SiteView:
         if words:
             self.say(time_us, f"{self.name(report.sender)} {words}")
 
-    def _count_done(self, task: Task, time_us: int) -> None:
+    def _count_done(self, task: TaskHistory, time_us: int) -> None:
         self.done += 1
         self.done_us += time_us - task.phase_us.get(TaskPhase.OPEN, time_us)

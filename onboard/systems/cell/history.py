@@ -8,7 +8,7 @@ from onboard.contract.cell import ArmProgress, GoalEnd, GoalStart, MoveFrom, Mov
 from onboard.contract.messages import Message, Reference
 from onboard.history.history import History
 from onboard.history.system import SystemFact, SystemHistory
-from onboard.history.tasks import Tasks
+from onboard.history.tasks import TaskFold
 from onboard.systems.cell.site import Cell
 
 #: Goals and parts that are remembered: the newest.
@@ -49,7 +49,7 @@ class MoveTold(SystemFact):
 class CellHistory(SystemHistory):
     """A fold over words of arms and managers."""
 
-    def __init__(self, site: Cell, tasks: Tasks) -> None:
+    def __init__(self, site: Cell, tasks: TaskFold) -> None:
         super().__init__(tasks)
         #: Where goals begin and end, by manager and number.
         self.starts: OrderedDict[tuple[int, int], _Spot] = OrderedDict()

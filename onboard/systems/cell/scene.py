@@ -18,7 +18,7 @@ _MOVING = (ArmPhase.TO_PART, ArmPhase.CARRYING)
 
 
 @dataclass
-class _Robot:
+class _SeenArm:
     """One robot's last two words on where it is, in mm and us."""
 
     at: Spot
@@ -40,7 +40,7 @@ class CellScene:
         span_mm = max(one.x1_mm for one in areas) - self._x0
         self._scale = (WIDTH - 2 * MARGIN) / max(1, span_mm)
         self._height = 2 * MARGIN + (self._y1 - min(one.y0_mm for one in areas)) * self._scale
-        self._robots = {node: _Robot((float(arm.home.x_mm), float(arm.home.y_mm))) for node, arm in site.arms.items()}
+        self._robots = {node: _SeenArm((float(arm.home.x_mm), float(arm.home.y_mm))) for node, arm in site.arms.items()}
         self._seen = cell_history(view.history)
         #: What each robot has undertaken: from where, and to where it brings the part, by goal.
         self._moves: dict[int, dict[tuple[int, int], tuple[Spot, Spot | None]]] = {}

@@ -7,7 +7,7 @@ from onboard.contract.graph import EdgeNotice, RobotAt, VisitList
 from onboard.contract.messages import Message, Reference
 from onboard.history.history import History
 from onboard.history.system import SystemFact, SystemHistory
-from onboard.history.tasks import Tasks
+from onboard.history.tasks import TaskFold
 from onboard.systems.graph.site import FactoryGraph
 
 
@@ -29,7 +29,7 @@ class VisitsTold(SystemFact):
 class GraphHistory(SystemHistory):
     """A fold over words of robots and of the agents of nodes."""
 
-    def __init__(self, site: FactoryGraph, tasks: Tasks) -> None:
+    def __init__(self, site: FactoryGraph, tasks: TaskFold) -> None:
         super().__init__(tasks)
         self._site = site
         #: The last word of each robot, none before its first.

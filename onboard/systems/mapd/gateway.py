@@ -1,8 +1,8 @@
 """A pick-up and delivery site at the gateway: robots by the cells that they tell; orders come in at its desk only."""
 
 from onboard.contract.messages import Message
-from onboard.gateway.edge import Edge
-from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.gateway.edge import SystemEdge
+from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.history.history import Fact, History
 from onboard.systems.mapd.history import StepTold, mapd_history
 from onboard.systems.mapd.site import Mapd
@@ -19,12 +19,12 @@ class CellTracker:
         """Robots say in which cell they are at each step."""
         return isinstance(fact, StepTold)
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """The cell where the robot said that it is."""
-        return Whereabouts(self._names[self._seen.cells[node_id]], passed=self._seen.passed[node_id])
+        return MachinePosition(self._names[self._seen.cells[node_id]], passed=self._seen.passed[node_id])
 
 
-class MapdEdge(Edge):
+class MapdEdge(SystemEdge):
     """What the gateway tells of a floor of cells; it takes no orders."""
 
     def __init__(self, site: Mapd) -> None:

@@ -6,7 +6,7 @@ from onboard.contract.mapd import PathHead, PathMoves, StepState, StepTurn
 from onboard.contract.messages import Message
 from onboard.history.history import History
 from onboard.history.system import SystemFact, SystemHistory
-from onboard.history.tasks import Tasks
+from onboard.history.tasks import TaskFold
 from onboard.systems.mapd.site import Mapd
 
 
@@ -35,7 +35,7 @@ class TurnTold(SystemFact):
 class MapdHistory(SystemHistory):
     """A fold over steps, turns and paths."""
 
-    def __init__(self, site: Mapd, tasks: Tasks) -> None:
+    def __init__(self, site: Mapd, tasks: TaskFold) -> None:
         super().__init__(tasks)
         self._site = site
         self.cells = dict(site.homes)

@@ -7,7 +7,7 @@ from onboard.history.history import Fact
 from onboard.history.rights import RightTold
 from onboard.systems.terminal.history import LaneTold, StepTold, terminal_history
 from onboard.systems.terminal.site import EntityKind, Terminal
-from onboard.trace.chart.over_time import Bar, Line, Panel, Rows
+from onboard.trace.chart.over_time import Bar, Panel, PanelLine, Rows
 
 #: A lane has as many rows as slots, but at most so many.
 _MOST_ROWS = 4
@@ -61,7 +61,7 @@ class TerminalDiagram(Rows):
         begin = end = self._beside(node, told.left)
         if is_lane:
             begin, end = first - 0.5, first + count - 0.5
-        self._panel.lines.append(Line(node, [(since_us, begin), (until_us, end)]))
+        self._panel.lines.append(PanelLine(node, [(since_us, begin), (until_us, end)]))
 
     def _beside(self, node: int, entity: int) -> float:
         """Vehicles in one place stand side by side."""
@@ -100,7 +100,7 @@ class TerminalDiagram(Rows):
             self._block(lane, time_us)
         for node, vehicle in self._vehicles.items():
             row = self._beside(node, vehicle.entity)
-            self._panel.lines.append(Line(node, [(self._since_us.get(node, self.first_us), row), (time_us, row)]))
+            self._panel.lines.append(PanelLine(node, [(self._since_us.get(node, self.first_us), row), (time_us, row)]))
 
 
 DIAGRAM = TerminalDiagram

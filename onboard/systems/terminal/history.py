@@ -7,7 +7,7 @@ from onboard.contract.messages import Message
 from onboard.contract.terminal import LaneState, PlanHead, PlanStep, StepReport, StepResult
 from onboard.history.history import History
 from onboard.history.system import SystemFact, SystemHistory
-from onboard.history.tasks import Tasks
+from onboard.history.tasks import TaskFold
 from onboard.systems.terminal.site import Terminal
 
 
@@ -73,7 +73,7 @@ class LaneTold(SystemFact):
 class TerminalHistory(SystemHistory):
     """A fold over plans, reports and lanes."""
 
-    def __init__(self, site: Terminal, tasks: Tasks) -> None:
+    def __init__(self, site: Terminal, tasks: TaskFold) -> None:
         super().__init__(tasks)
         self._site = site
         self.vehicles = {node: VehicleSeen(site.machines[node].home.track) for node in site.vehicles}

@@ -23,7 +23,7 @@ _DRIVING = Action.GOTO
 
 
 @dataclass
-class _Body:
+class _SeenVehicle:
     """How one vehicle is drawn: the entity where it is shown, since when, and how it moves meanwhile."""
 
     entity: int
@@ -42,7 +42,7 @@ class TerminalScene:
         self.words = view.words
         self._clock = view.history.clock
         self._rights = view.history.rights
-        self._bodies = {node: _Body(site.machines[node].home.track) for node in site.vehicles}
+        self._bodies = {node: _SeenVehicle(site.machines[node].home.track) for node in site.vehicles}
         self._seen = terminal_history(view.history)
         self._boxes = {number: box.station for number, box in enumerate(site.boxes, start=1)}
         chart = chart_of(site)
@@ -133,7 +133,7 @@ class TerminalScene:
             else:
                 body.path = still(self._standing(node, step.entity), time_us)
 
-    def _in_slot(self, node: int, body: _Body, time_us: int, *, at_end: bool) -> None:
+    def _in_slot(self, node: int, body: _SeenVehicle, time_us: int, *, at_end: bool) -> None:
         """What the vehicle's own drive says: into this slot, evenly, or at its end."""
         entity = self.site.entities[body.entity]
         line = self._lines.get(body.entity)

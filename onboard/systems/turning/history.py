@@ -7,7 +7,7 @@ from onboard.contract.messages import Message, Reference
 from onboard.contract.turning import BillBar, LathePhase, LatheProgress
 from onboard.history.history import History
 from onboard.history.system import SystemFact, SystemHistory
-from onboard.history.tasks import Tasks
+from onboard.history.tasks import TaskFold
 from onboard.systems.turning.site import Turning
 
 #: Prices that are remembered: the newest.
@@ -26,7 +26,7 @@ class ProgressTold(SystemFact):
 class TurningHistory(SystemHistory):
     """A fold over progress and bills."""
 
-    def __init__(self, site: Turning, tasks: Tasks) -> None:
+    def __init__(self, site: Turning, tasks: TaskFold) -> None:
         super().__init__(tasks)
         #: By lathe and order, those that are not finished.
         self.progress: dict[int, OrderedDict[Reference, LatheProgress]] = {node: OrderedDict() for node in site.lathes}

@@ -34,7 +34,7 @@ class Cause(NamedTuple):
 
 
 @dataclass
-class Part:
+class WaitingPart:
     """One stretch of time, us of the log."""
 
     cause: Cause
@@ -55,7 +55,7 @@ class TaskStory:
     operation: Operation
     caller: int
     begin_us: int
-    parts: list[Part] = field(default_factory=list)
+    parts: list[WaitingPart] = field(default_factory=list)
     phases: dict[TaskPhase, int] = field(default_factory=dict)
     owner: int = 0
     calls: int = 1
@@ -70,7 +70,7 @@ class TaskStory:
         return (self.parts[-1].end_us if self.parts else self.begin_us) - self.begin_us
 
 
-class Why:
+class WaitingStory:
     """A view of a history of its own: feed every message in the order of the log, then ``finish``."""
 
     def __init__(self, site: Site, words: Words | None = None) -> None:
@@ -299,10 +299,10 @@ def _put_down(story: TaskStory, begin_us: int, end_us: int, cause: Cause) -> Non
     if story.parts and story.parts[-1].cause == cause:
         story.parts[-1].end_us = end_us
     elif end_us > begin_us:
-        story.parts.append(Part(cause, begin_us, end_us))
+        story.parts.append(WaitingPart(cause, begin_us, end_us))
 
 
-def told(story: TaskStory, words: Words, start_us: int) -> list[str]:
+def task_lines(story: TaskStory, words: Words, start_us: int) -> list[str]:
     """The story of one task: its parts in order, then how much each machine and cause took."""
     what = words.system.operation(story.operation)
     state = (

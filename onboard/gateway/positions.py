@@ -19,7 +19,7 @@ from onboard.ways.site import TrackKind, way_site
 
 
 @dataclass(frozen=True, slots=True)
-class Whereabouts:
+class MachinePosition:
     """One machine. ``ahead`` are the nodes still to come, in turn; ``passed`` counts nodes left behind.
 
     ``x_m`` and ``theta`` (rad) are on map ``map_id``, None where the site has no coordinates. ``away_m`` is the way
@@ -41,9 +41,9 @@ class Tracker(Protocol):
     """A view of a history: where machines are."""
 
     def take(self, message: Message, fact: Fact | None) -> bool:
-        """Take up one message, and what it told; whether the sender's whereabouts may have changed."""
+        """Take up one message, and what it told; whether the sender's position may have changed."""
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """What is known of a mobile machine of the site."""
 
 
@@ -58,7 +58,7 @@ class TrackTracker:
         """True where a machine's place or way is told."""
         return isinstance(fact, PlaceTold) or (isinstance(fact, PlanTold) and fact.is_firm)
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """The segment where the machine is, and those of its plan that lie ahead."""
         place = self._history.places.by_node[node_id]
         segment, node = place.segment, str(place.segment)
@@ -69,8 +69,8 @@ class TrackTracker:
                 ahead.append(then)
         track = self._ways.tracks.get(segment.track)
         if track is None:
-            return Whereabouts(node, tuple(ahead), place.passed, place.speed_mm_s != 0)
-        return Whereabouts(
+            return MachinePosition(node, tuple(ahead), place.passed, place.speed_mm_s != 0)
+        return MachinePosition(
             node,
             tuple(ahead),
             place.passed,

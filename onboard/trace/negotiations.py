@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from onboard.contract.codes import CallResult, LegAction, Operation, TaskPhase
 from onboard.contract.messages import CallForProposals, Leg, Message
 from onboard.core.serial import ms_after
-from onboard.history.calls import BidMade, Call, CallAnswered, CallOpened
+from onboard.history.calls import BidMade, CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact, History
 from onboard.history.lives import WaitTold
 from onboard.history.plans import PlanTold
@@ -25,7 +25,7 @@ ANSWER = "another's plan"
 
 
 @dataclass
-class Counts:
+class NegotiationCounts:
     """Everything counted since the last ``begin``; times in us of the log, slack in ms."""
 
     messages: Counter[str] = field(default_factory=Counter)
@@ -45,11 +45,11 @@ class Counts:
     unasked_moves: int = 0
 
 
-class Dealings:
+class NegotiationFold:
     """A view of a history: give it every message of the fleet bus in the order of the log, and what was told by it."""
 
     def __init__(self, history: History) -> None:
-        self.counts = Counts()
+        self.counts = NegotiationCounts()
         self._tasks = history.tasks
         self._plans = history.plans
         #: What each has waited for since it told its plan.
@@ -61,7 +61,7 @@ class Dealings:
 
     def begin(self) -> None:
         """Count from now on; open calls and tasks are kept."""
-        self.counts = Counts()
+        self.counts = NegotiationCounts()
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message."""
@@ -89,19 +89,19 @@ class Dealings:
         counts.opened_again += call.attempt > 1
         counts.give_way_calls += call.operation is Operation.GIVE_WAY
 
-    def _on_end(self, call: Call, end: CallAnswered) -> None:
+    def _on_end(self, call: CallHistory, end: CallAnswered) -> None:
         award = end.award
         self.counts.refused += award.result is CallResult.REFUSED
         if award.result is CallResult.AWARDED and not call.terms.depth and call.terms.operation in TASKS:
             self._fresh.add((award.winner, award.sender, award.call & 0xFF))
 
-    def _on_done(self, told: TaskTold, time_us: int) -> None:
-        task = told.task
+    def _on_done(self, statement: TaskTold, time_us: int) -> None:
+        task = statement.task
         if task is None or task.operation not in TASKS:
             return
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)
-        if task.promised_ms is not None and task.owner == told.report.sender:
+        if task.promised_ms is not None and task.owner == statement.report.sender:
             self.counts.slack_ms.append(-ms_after((time_us - (self._clock.offset_us or 0)) // 1000, task.promised_ms))
 
     # --- plans -------------------------------------------------------------------------------------------------
