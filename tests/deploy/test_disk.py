@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from deploy.image.disk import FAT32_LBA, LINUX, SIGNATURE, Part, boot_record, starts, write_disk
+from deploy.image.disk import FAT32_LBA, LINUX, Part, boot_record, starts, write_disk
+from deploy.update.board import SIGNATURE
 from deploy.wheels import DeployError
 
 
