@@ -17,7 +17,7 @@ from onboard.trace.view import SiteView
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class PhysicalLimits:
     """Speed m/s, acceleration m/s^2, length m, most load kg; 0 where the site file is silent."""
 
     speed: float = 0.0
@@ -26,7 +26,7 @@ class Body:
     load: float = 0.0
 
 
-class Edge:
+class SystemEdge:
     """A system of which the gateway knows nothing more than its messages; a system replaces what it has."""
 
     #: Whether a machine takes orders by its name (VDA 5050's ``order``).
@@ -47,19 +47,19 @@ class Edge:
         """A station as topics name it; None for one that the site does not have."""
         return words_of(self.site).place(number)
 
-    def body(self) -> Body:
+    def body(self) -> PhysicalLimits:
         """What a mobile machine is, as far as the site file tells."""
-        return Body()
+        return PhysicalLimits()
 
     def loads(self) -> Json:
         """What it carries, as a factsheet's ``loadSpecification``."""
         return {}
 
 
-def edge_of(site: Site) -> Edge:
+def edge_of(site: Site) -> SystemEdge:
     """The edge of a site's system."""
     module = part(site.system, "gateway")
     if module is None:
-        return Edge(site)
-    edge: Edge = module.EDGE(site)
+        return SystemEdge(site)
+    edge: SystemEdge = module.EDGE(site)
     return edge

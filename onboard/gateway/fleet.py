@@ -16,7 +16,7 @@ from onboard.gateway.edge import edge_of
 from onboard.gateway.machines import TRAVELLERS
 from onboard.gateway.settings import GatewaySettings
 from onboard.gateway.state import reference_text
-from onboard.history.calls import Call, CallAnswered, CallOpened
+from onboard.history.calls import CallAnswered, CallHistory, CallOpened
 from onboard.history.history import Fact
 from onboard.history.tasks import TaskTold
 from onboard.trace.words import Words
@@ -122,12 +122,12 @@ class FleetTopics:
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _on_call(self, call: Call, now_us: int) -> Iterator[Told]:
+    def _on_call(self, call: CallHistory, now_us: int) -> Iterator[Told]:
         yield "call", self._stamped({"at_us": now_us, **self._call(call)})
         if call.terms.operation in WHOLE:
             yield "task", self.task(call.terms.task, now_us)
 
-    def _on_end(self, call: Call, end: CallAnswered, now_us: int) -> Iterator[Told]:
+    def _on_end(self, call: CallHistory, end: CallAnswered, now_us: int) -> Iterator[Told]:
         reason = end.award.reason
         told = self._call(call) | {"reason": reason.name, "code": int(reason)}
         yield "call", self._stamped({"at_us": now_us, **told})
@@ -140,7 +140,7 @@ class FleetTopics:
             extra = {"phase": LIFE[report.phase], "by": self.picture.view.name(report.sender)}
             yield "task", self.task(report.task, now_us) | extra | _coded(report.reason)
 
-    def _call(self, record: Call) -> Json:
+    def _call(self, record: CallHistory) -> Json:
         call = record.terms
         return self.picture.call(record) | {
             "task": reference_text(call.task),

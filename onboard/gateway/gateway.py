@@ -12,7 +12,7 @@ from functools import partial
 from onboard.contract.messages import Message
 from onboard.core.frame import Frame
 from onboard.core.site import Site
-from onboard.gateway.desk import OrderDesk
+from onboard.gateway.desk import GatewayDesk
 from onboard.gateway.link import Link, LinkWords
 from onboard.gateway.publisher import FLEET, Outgoing, Publisher
 from onboard.gateway.reports import Reports
@@ -64,10 +64,10 @@ class Gateway:
         self._stopping = False
         self._to_keep: deque[tuple[str, Publication]] = deque()
         self._set_clock()
-        self.desk: OrderDesk | None = None
+        self.desk: GatewayDesk | None = None
         if send is not None and reports is not None and settings.node_id is not None:
             transmit = partial(_transmit, codec, send)
-            self.desk = OrderDesk(site, self.publisher, reports, transmit, self._post, self._now_us())
+            self.desk = GatewayDesk(site, self.publisher, reports, transmit, self._post, self._now_us())
         self.links = {name: self._link(broker, client, name) for name in self.publisher.links}
 
     # --- in ------------------------------------------------------------------------------------------------------

@@ -4,15 +4,15 @@ import zlib
 from dataclasses import dataclass, replace
 
 from onboard.contract.messages import Reference
-from onboard.gateway.records import Life, WishRecord
+from onboard.gateway.records import OrderPhase, WishRecord
 from onboard.ports.journal import Entry
 
 #: In the order in which they come; an order never goes back but to CALLED, when it is called again.
-RANK = {life: rank for rank, life in enumerate(Life)}
+RANK = {life: rank for rank, life in enumerate(OrderPhase)}
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class OrderRequest:
     """What an order asks of the bus: a compartment to fetch ``car`` or to park, or a robot to visit ``stops``.
 
     ``base`` is the last node that a VDA 5050 order releases and its sequence number, where an update goes on;
@@ -32,18 +32,18 @@ class Wish:
 
 
 @dataclass(slots=True)
-class Order:
+class GatewayOrder:
     """One order. ``name`` is the giver's; ``content`` tells a second order under the same name from a repetition.
 
     Times in us of the loop; ``before_us`` in wall time since 1970. ``due_us``: when it is to be said (again).
     """
 
     name: str
-    wish: Wish
+    wish: OrderRequest
     content: int
     before_us: int | None = None
     update: int = 0
-    life: Life = Life.ACCEPTED
+    life: OrderPhase = OrderPhase.ACCEPTED
     reason: str = ""
     why: str = ""
     task: Reference | None = None
@@ -83,9 +83,9 @@ class Order:
         ).entry
 
 
-def order_of(record: WishRecord) -> Order:
+def order_of(record: WishRecord) -> GatewayOrder:
     """The order that a journal record of it stands for."""
-    wish = Wish(
+    wish = OrderRequest(
         record.what,
         record.node,
         record.car,
@@ -95,7 +95,7 @@ def order_of(record: WishRecord) -> Order:
         (record.base, record.sequence),
         record.open,
     )
-    return Order(
+    return GatewayOrder(
         record.name,
         wish,
         record.content,
@@ -117,7 +117,7 @@ def same_content(*parts: object) -> int:
     return zlib.crc32(repr(parts).encode())
 
 
-def with_number(wish: Wish, number: int) -> Wish:
+def with_number(wish: OrderRequest, number: int) -> OrderRequest:
     """The same wish under a number on the bus."""
     return replace(wish, number=number)
 

@@ -17,8 +17,8 @@ from onboard.core.journal_records import records_in
 from onboard.core.serial import is_newer, successor
 from onboard.core.site import Site
 from onboard.gateway.inbox import Incoming
-from onboard.gateway.order import RANK, Order, Wish, order_of, same_content, with_number
-from onboard.gateway.records import Life, WishRecord
+from onboard.gateway.order import RANK, GatewayOrder, OrderRequest, order_of, same_content, with_number
+from onboard.gateway.records import OrderPhase, WishRecord
 from onboard.gateway.schema import TRANSPORT
 from onboard.gateway.wishes import LISTEN_US, RefusedError, Wishes, is_robot
 from onboard.ports.journal import Entry
@@ -30,37 +30,37 @@ MOST_OPEN = 200
 #: Lists of stops of one order that wait for the one in hand; one update more is refused.
 MOST_AHEAD = 16
 _PHASES = {
-    TaskPhase.OPEN: Life.CALLED,
-    TaskPhase.AWARDED: Life.AWARDED,
-    TaskPhase.STARTED: Life.MOVING,
-    TaskPhase.LOADED: Life.MOVING,
-    TaskPhase.DONE: Life.DONE,
-    TaskPhase.REFUSED: Life.REFUSED,
-    TaskPhase.FORFEITED: Life.CALLED,
+    TaskPhase.OPEN: OrderPhase.CALLED,
+    TaskPhase.AWARDED: OrderPhase.AWARDED,
+    TaskPhase.STARTED: OrderPhase.MOVING,
+    TaskPhase.LOADED: OrderPhase.MOVING,
+    TaskPhase.DONE: OrderPhase.DONE,
+    TaskPhase.REFUSED: OrderPhase.REFUSED,
+    TaskPhase.FORFEITED: OrderPhase.CALLED,
 }
 
 
 @dataclass
-class Outcome:
+class OrderEffects:
     """What follows from a step: ``changed`` orders are durable before ``say`` goes to the bus and anything is told.
 
     ``told`` are orders to be told of that did not change; ``refused`` what was not taken.
     """
 
-    changed: list[Order] = field(default_factory=list)
+    changed: list[GatewayOrder] = field(default_factory=list)
     say: list[Message] = field(default_factory=list)
-    told: list[Order] = field(default_factory=list)
+    told: list[GatewayOrder] = field(default_factory=list)
     refused: list[Incoming] = field(default_factory=list)
 
 
-class Orders:
+class OrderBook:
     """All orders of a site that came in through one gateway, by name, oldest first."""
 
     def __init__(
         self, site: Site, wishes: Wishes, node_id: int, entries: Iterable[Entry], *, now_us: int = 0, seed: int = 0
     ) -> None:
         """``seed`` (16 bits) begins the numbers of visit lists where the journal is empty: another than last time."""
-        self.book: OrderedDict[str, Order] = OrderedDict()
+        self.book: OrderedDict[str, GatewayOrder] = OrderedDict()
         self._site, self._wishes, self._node_id = site, wishes, node_id
         self._number = seed & 0xFFFF
         self._asked = False
@@ -76,11 +76,11 @@ class Orders:
             self._number = number if not place or is_newer(number, self._number, 16) else self._number
         for order in self.open:
             # A key is not pressed again: what it led to is heard, or was.
-            heard = order.wish.what == "park" and order.life is not Life.ACCEPTED
+            heard = order.wish.what == "park" and order.life is not OrderPhase.ACCEPTED
             order.due_us = None if heard or _waits(order) else self._ready_us
 
     @property
-    def open(self) -> list[Order]:
+    def open(self) -> list[GatewayOrder]:
         """Orders that are not over."""
         return [order for order in self.book.values() if not order.life.is_over]
 
@@ -88,16 +88,16 @@ class Orders:
         """What counts of all, for the journal."""
         return (order.entry() for order in self.book.values())
 
-    def of_robot(self, node: int) -> Order | None:
+    def of_robot(self, node: int) -> GatewayOrder | None:
         """The order that a robot has by name, the newest; None where it never had one."""
         newest = reversed(self.book.values())
         return next((one for one in newest if one.wish.what == "visit" and one.wish.node == node), None)
 
     # --- in ------------------------------------------------------------------------------------------------------
 
-    def take(self, incoming: Incoming, wall_us: int, now_us: int) -> Outcome:
+    def take(self, incoming: Incoming, wall_us: int, now_us: int) -> OrderEffects:
         """A transport, or a VDA 5050 order, that is well formed."""
-        outcome = Outcome()
+        outcome = OrderEffects()
         try:
             self._take(incoming, wall_us, now_us, outcome)
         except RefusedError as refused:
@@ -106,7 +106,7 @@ class Orders:
             )
         return outcome
 
-    def _take(self, incoming: Incoming, wall_us: int, now_us: int, outcome: Outcome) -> None:
+    def _take(self, incoming: Incoming, wall_us: int, now_us: int, outcome: OrderEffects) -> None:
         told = incoming.told
         name, update = name_of(incoming), int(told.get("orderUpdateId", 0))
         content = same_content(incoming.kind, _essence(told))
@@ -126,13 +126,13 @@ class Orders:
         before_us = _moment_us(told.get("before"))
         if before_us is not None and before_us <= wall_us:
             raise RefusedError("TOO_LATE", "is past", "$.before")
-        order = Order(name, self._wish(incoming), content, before_us, update)
+        order = GatewayOrder(name, self._wish(incoming), content, before_us, update)
         order.due_us = max(now_us, self._ready_us)
         self.book[name] = order
         outcome.changed.append(order)
         self._forget()
 
-    def _update(self, order: Order, told: dict[str, Any], content: int, outcome: Outcome) -> None:
+    def _update(self, order: GatewayOrder, told: dict[str, Any], content: int, outcome: OrderEffects) -> None:
         """More of an order by name: what its update releases is done behind what was released (section 6.6.4)."""
         if told["orderUpdateId"] < order.update:
             raise RefusedError("OLD_UPDATE", f"update {order.update} was taken before", "$.orderUpdateId")
@@ -148,19 +148,19 @@ class Orders:
             self._next(order)
         outcome.changed.append(order)
 
-    def _next(self, order: Order) -> None:
+    def _next(self, order: GatewayOrder) -> None:
         """The robot has done what it was given: it gets the next list, waits for an update, or the order is done."""
         if order.ahead and not order.is_cancelled:
             self._number = successor(self._number, 16)
             order.wish = replace(order.wish, stops=order.ahead[0], number=self._number)
             order.ahead = order.ahead[1:]
-            order.life, order.was_said, order.due_us = Life.CALLED, False, 0
+            order.life, order.was_said, order.due_us = OrderPhase.CALLED, False, 0
         elif order.wish.is_open and not order.is_cancelled:
             order.wish, order.due_us = replace(order.wish, stops=()), None
         else:
-            self._end(order, Life.DONE, "", "")
+            self._end(order, OrderPhase.DONE, "", "")
 
-    def _wish(self, incoming: Incoming) -> Wish:
+    def _wish(self, incoming: Incoming) -> OrderRequest:
         if incoming.kind == TRANSPORT:
             return self._numbered(self._wishes.transport(incoming.told))
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), 0)
@@ -172,62 +172,64 @@ class Orders:
             raise RefusedError("BUSY", f"{incoming.serial} has order {busy.name}", "$.orderId")
         return self._numbered(wish)
 
-    def _numbered(self, wish: Wish) -> Wish:
+    def _numbered(self, wish: OrderRequest) -> OrderRequest:
         """A name on the bus, for what is told under one of this gateway's."""
         if wish.what not in ("visit", "send"):
             return wish
         self._number = successor(self._number, 16)
         return with_number(wish, self._number)
 
-    def cancel(self, node: int) -> Outcome | None:
+    def cancel(self, node: int) -> OrderEffects | None:
         """End a robot's order by name; None where it has none. A robot that has it is told until it says so."""
         order = self.of_robot(node)
         if order is None or order.life.is_over:
             return None
         if order.was_said and not _waits(order):
             order.is_cancelled, order.due_us = True, 0
-            return Outcome(changed=[order])
-        return Outcome(changed=[self._end(order, Life.REFUSED, "CANCELLED", "before it was given")])
+            return OrderEffects(changed=[order])
+        return OrderEffects(changed=[self._end(order, OrderPhase.REFUSED, "CANCELLED", "before it was given")])
 
     # --- the bus and the clock -----------------------------------------------------------------------------------
 
-    def feed(self, message: Message) -> Outcome:
+    def feed(self, message: Message) -> OrderEffects:
         """Take up one message of the fleet bus."""
-        outcome = Outcome()
+        outcome = OrderEffects()
         for order in self.open:
-            task = self._wishes.task_of(order, message) if order.life in (Life.ACCEPTED, Life.CALLED) else None
-            if task is not None and (task != order.task or order.life is Life.ACCEPTED):
-                order.task, order.life, order.due_us = task, Life.CALLED, None
+            task = (
+                self._wishes.task_of(order, message) if order.life in (OrderPhase.ACCEPTED, OrderPhase.CALLED) else None
+            )
+            if task is not None and (task != order.task or order.life is OrderPhase.ACCEPTED):
+                order.task, order.life, order.due_us = task, OrderPhase.CALLED, None
                 outcome.changed.append(order)
             elif isinstance(message, TaskReport) and message.task == self._task(order):
                 self._on_report(order, message, outcome)
             elif self._wishes.is_done(order, message):
-                outcome.changed.append(self._end(order, Life.DONE, "", ""))
+                outcome.changed.append(self._end(order, OrderPhase.DONE, "", ""))
         return outcome
 
-    def _on_report(self, order: Order, report: TaskReport, outcome: Outcome) -> None:
+    def _on_report(self, order: GatewayOrder, report: TaskReport, outcome: OrderEffects) -> None:
         life = _PHASES.get(report.phase)
         by_robot = is_robot(self._site, report.sender)
         by_desk = report.sender == order.wish.node and order.wish.what == "send"
-        if life is None or (not by_robot and not by_desk and life is not Life.REFUSED):
+        if life is None or (not by_robot and not by_desk and life is not OrderPhase.REFUSED):
             return
-        if life is Life.DONE and order.wish.what == "visit":
+        if life is OrderPhase.DONE and order.wish.what == "visit":
             order.owner = report.sender
             if not _waits(order):
                 self._next(order)
                 outcome.changed.append(order)
         elif life.is_over:
-            reason = report.reason.name if life is Life.REFUSED else ""
+            reason = report.reason.name if life is OrderPhase.REFUSED else ""
             order.owner = report.sender if by_robot else order.owner
             outcome.changed.append(self._end(order, life, reason, ""))
         elif report.phase is TaskPhase.FORFEITED or RANK[life] > RANK[order.life]:
             order.task, order.life, order.due_us = report.task, life, 0 if order.is_cancelled else None
-            order.owner = report.sender if by_robot and life is not Life.CALLED else 0
+            order.owner = report.sender if by_robot and life is not OrderPhase.CALLED else 0
             outcome.changed.append(order)
 
-    def wake(self, now_us: int, wall_us: int) -> Outcome:
+    def wake(self, now_us: int, wall_us: int) -> OrderEffects:
         """Say what is due; ``wall_us`` is the same moment since 1970."""
-        outcome = Outcome()
+        outcome = OrderEffects()
         if not self._asked:
             self._asked = True
             outcome.say += self._wishes.ask_all(self._node_id)
@@ -240,13 +242,13 @@ class Orders:
         """When something is due; None for never."""
         return min((order.due_us for order in self.open if order.due_us is not None), default=None)
 
-    def _say(self, order: Order, now_us: int, wall_us: int, outcome: Outcome) -> None:
+    def _say(self, order: GatewayOrder, now_us: int, wall_us: int, outcome: OrderEffects) -> None:
         try:
             said = self._wishes.say(order, self._node_id, wall_us)
         except RefusedError as refused:
             gone = order.was_said and refused.reason == "UNKNOWN_TICKET"
             # Asked for before, and not in the park any more: somebody has it.
-            life = Life.DONE if gone else Life.REFUSED
+            life = OrderPhase.DONE if gone else OrderPhase.REFUSED
             outcome.changed.append(self._end(order, life, "" if gone else refused.reason, "" if gone else refused.why))
             return
         if not order.was_said:
@@ -257,11 +259,11 @@ class Orders:
 
     # --- inner works -------------------------------------------------------------------------------------------
 
-    def _task(self, order: Order) -> Reference | None:
+    def _task(self, order: GatewayOrder) -> Reference | None:
         """The task on the bus: heard, or named by the order itself."""
         return Reference(self._node_id, order.wish.number) if order.wish.number else order.task
 
-    def _end(self, order: Order, life: Life, reason: str, why: str) -> Order:
+    def _end(self, order: GatewayOrder, life: OrderPhase, reason: str, why: str) -> GatewayOrder:
         order.life, order.reason, order.why, order.due_us = life, reason, why, None
         return order
 
@@ -271,7 +273,7 @@ class Orders:
             del self.book[name]
 
 
-def _waits(order: Order) -> bool:
+def _waits(order: GatewayOrder) -> bool:
     """Whether a robot has done all that was released of its order, and waits for more."""
     return order.wish.what == "visit" and not order.wish.stops
 

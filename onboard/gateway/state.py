@@ -10,7 +10,7 @@ from onboard.contract.codes import MachineState, Operation, TaskPhase
 from onboard.contract.messages import Halted, Reference
 from onboard.core.site import Segment
 from onboard.gateway.dialect import Connection, Dialect, Json
-from onboard.gateway.machines import Body, Machines, TaskInHand
+from onboard.gateway.machines import Machines, MobileMachine, TaskInHand
 from onboard.gateway.whereabouts import Whereabouts
 from onboard.holon.remedies import reason_words, remedy
 
@@ -133,7 +133,7 @@ def _actions(task: TaskInHand | None, does: Operation | None) -> list[Json]:
     return found
 
 
-def _errors(machines: Machines, body: Body, now_us: int) -> list[Json]:
+def _errors(machines: Machines, body: MobileMachine, now_us: int) -> list[Json]:
     node = body.machine.node_id
     found: list[Json] = []
     word = machines.halted(node, now_us)
@@ -173,7 +173,7 @@ def _error(kind: str, level: str, description: str) -> Json:
     return {"errorType": kind, "errorLevel": level, "errorDescription": description}
 
 
-def _information(machines: Machines, body: Body, now_us: int) -> list[Json]:
+def _information(machines: Machines, body: MobileMachine, now_us: int) -> list[Json]:
     wait = body.wait
     if wait is None or now_us - body.wait_us > WAIT_TOLD_US:
         return []

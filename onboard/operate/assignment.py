@@ -24,7 +24,7 @@ LAST_VERSION = (1 << 28) - 1
 MOST_TOKENS = 20_000
 
 
-class Claim(NamedTuple):
+class TokenClaim(NamedTuple):
     """Who says to hold a token, or is said to, under which version."""
 
     version: int
@@ -38,7 +38,7 @@ class Statements:
     site: Site
     lost: int
     held: dict[TokenKey, dict[int, int]] = field(default_factory=dict)
-    seen: dict[TokenKey, Claim] = field(default_factory=dict)
+    seen: dict[TokenKey, TokenClaim] = field(default_factory=dict)
     said_by: dict[int, set[TokenKey]] = field(default_factory=dict)
     cars: dict[TokenKey, CarAt] = field(default_factory=dict)
 
@@ -49,7 +49,7 @@ class Statements:
         self.said_by.setdefault(sender, set()).add(key)
         known = self.seen.get(key)
         if known is None or version > known.version:
-            self.seen[key] = Claim(version, holder)
+            self.seen[key] = TokenClaim(version, holder)
         if sender == self.lost:
             return
         if sender == holder:
@@ -87,14 +87,14 @@ class Statements:
 
 
 @dataclass(frozen=True)
-class Body:
+class BodySlots:
     """Slots and stations in which a machine's body is."""
 
     slots: frozenset[Segment] = frozenset()
     bay: Station | None = None
 
     @classmethod
-    def of_fixed(cls, site: Site, machine: Machine) -> "Body":
+    def of_fixed(cls, site: Site, machine: Machine) -> "BodySlots":
         """A lift's platform and gate, a compartment's bay."""
         if machine.station is not None:
             return cls(bay=machine.station)
@@ -103,7 +103,7 @@ class Body:
         return cls()
 
     @classmethod
-    def of_segments(cls, site: Site, segments: Iterable[Segment]) -> "Body":
+    def of_segments(cls, site: Site, segments: Iterable[Segment]) -> "BodySlots":
         """A platform goes with its gate: who may stand on the sill keeps the lift where it is."""
         slots: set[Segment] = set()
         for segment in segments:
@@ -122,10 +122,10 @@ class Body:
 
 
 #: Of a machine that is in no slot.
-NO_BODY = Body()
+NO_BODY = BodySlots()
 
 
-class Assignment(NamedTuple):
+class RightsAssignment(NamedTuple):
     """What is made anew, and which tokens are nobody's from now on."""
 
     given: tuple[TokenAssigned, ...]
@@ -137,11 +137,11 @@ class Whose(NamedTuple):
 
     lost: int
     absent: int
-    body: Body
-    blocked: Body
+    body: BodySlots
+    blocked: BodySlots
 
 
-def assign(said: Statements, whose: Whose, operator: int) -> Assignment:
+def assign(said: Statements, whose: Whose, operator: int) -> RightsAssignment:
     """The lost machine's rights: to it where its body is, else to who had them first, else to the lowest fixed one.
 
     What the absent machine held goes the same way, but for the slots of its body, which are nobody's.
@@ -157,7 +157,7 @@ def assign(said: Statements, whose: Whose, operator: int) -> Assignment:
             nobodys.append(key)
         else:
             given.append(TokenAssigned(operator, key.kind, key.number, version, to))
-    return Assignment(tuple(given), tuple(nobodys))
+    return RightsAssignment(tuple(given), tuple(nobodys))
 
 
 def _is_orphan(said: Statements, key: TokenKey, whose: Whose) -> bool:

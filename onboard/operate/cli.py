@@ -15,8 +15,8 @@ from onboard.io.open_bus import BusOpenError, BusSettings, add_site_arguments, b
 from onboard.operate.asking import Asker
 from onboard.operate.names import OperateError, tool_of
 from onboard.operate.order import MISTAKE
-from onboard.operate.station import Station
-from onboard.operate.wishes import Maker, Wish, maker_of
+from onboard.operate.station import OperatorStation
+from onboard.operate.wishes import CommandRequest, Maker, maker_of
 from onboard.systems.contract import codecs_for
 
 EXAMPLES = """\
@@ -109,10 +109,10 @@ def main(argv: Sequence[str]) -> int:
         return MISTAKE
 
 
-def wish_of(args: argparse.Namespace) -> Wish:
+def wish_of(args: argparse.Namespace) -> CommandRequest:
     """What a command line asks for."""
     seconds = getattr(args, "for_s", None)
-    return Wish(
+    return CommandRequest(
         args.command,
         machine=getattr(args, "machine", ""),
         segment=getattr(args, "segment", ""),
@@ -127,7 +127,7 @@ def wish_of(args: argparse.Namespace) -> Wish:
 
 async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make: Maker) -> int:
     bus = await open_bus(settings)
-    station = Station(site, codecs_for(site).fleet, bus, _tell)
+    station = OperatorStation(site, codecs_for(site).fleet, bus, _tell)
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, station.interrupt)
@@ -140,7 +140,7 @@ async def _run(args: argparse.Namespace, site: Site, settings: BusSettings, make
         await bus.close()
 
 
-async def _watch(wait_lost: Callable[[], Awaitable[str]], station: Station) -> None:
+async def _watch(wait_lost: Callable[[], Awaitable[str]], station: OperatorStation) -> None:
     station.lose(await wait_lost())
 
 

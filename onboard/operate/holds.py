@@ -3,12 +3,12 @@
 from onboard.contract.messages import ManualState, Message
 from onboard.core.site import Machine
 from onboard.gateway.pauses import Pauses
-from onboard.operate.order import DONE, Order
+from onboard.operate.order import DONE, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 
 
-class Hold(Order):
+class HoldCommand(OperatorCommand):
     """Holds a machine until it says that it has come to rest, or lets it go until it says so.
 
     ``seed`` begins the numbers of orders, so that another life of this station has others.

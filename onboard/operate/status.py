@@ -4,12 +4,12 @@ from onboard.contract.codes import Reason
 from onboard.contract.constants import MOBILE_KINDS
 from onboard.contract.messages import Message
 from onboard.holon.remedies import reason_words
-from onboard.operate.order import DONE, NOT_CONFIRMED, Order
+from onboard.operate.order import DONE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.words import state_words
 
 
-class Status(Order):
+class Status(OperatorCommand):
     """Listens for ``listen_us`` and tells; status 1 where a machine is silent or needs a person."""
 
     is_silent = True

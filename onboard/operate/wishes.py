@@ -9,15 +9,15 @@ from onboard.contract.constants import MOBILE_KINDS, NOBODY
 from onboard.core.journal_state import RIGHTS_LOST
 from onboard.core.site import Machine, Site
 from onboard.holon.remedies import START_ANEW, remedy
-from onboard.operate.assignment import Body
+from onboard.operate.assignment import BodySlots
 from onboard.operate.blocks import Mark
-from onboard.operate.holds import Hold
+from onboard.operate.holds import HoldCommand
 from onboard.operate.names import OperateError, machine_of, movable_of, node_of, reason_of, segment_of, slot_of
-from onboard.operate.order import Order
+from onboard.operate.order import OperatorCommand
 from onboard.operate.park import Park
 from onboard.operate.regenerate import Lost, Regenerate
 from onboard.operate.status import Status
-from onboard.operate.stops import GoAgain, LetGo, Stop
+from onboard.operate.stops import GoAgain, LetGo, StopCommand
 from onboard.ways.site import way_site
 
 #: Heartbeat periods for which the bus is listened to before anything is said: everybody is heard, and once lost.
@@ -27,11 +27,11 @@ LISTEN_BEATS = 2
 GONE = "gone"
 
 #: Makes the order from what was heard and the station's node-ID. May raise ``OperateError``.
-Maker = Callable[[Park, int], Order]
+Maker = Callable[[Park, int], OperatorCommand]
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class CommandRequest:
     """One command and its settings; those that it has no use for are as they are. ``for_us`` in us, None: not given."""
 
     command: str
@@ -46,14 +46,14 @@ class Wish:
     absent_body: tuple[str, ...] = ()
 
 
-def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
-    """What makes the order. Raises ``OperateError`` for what the site does not have. ``seed`` as in ``Hold``."""
+def maker_of(site: Site, wish: CommandRequest, seed: int) -> Maker:
+    """What makes the order. Raises ``OperateError`` for what the site does not have. ``seed`` as in ``HoldCommand``."""
     match wish.command:
         case "status":
             listen_us = wish.for_us or LISTEN_BEATS * site.timing.heartbeat_us
             return partial(Status, listen_us=listen_us)
         case "stop":
-            return partial(Stop, keep_us=wish.for_us)
+            return partial(StopCommand, keep_us=wish.for_us)
         case "go":
             return partial(GoAgain, stopper=node_of(site, wish.of) if wish.of else NOBODY)
         case "block":
@@ -62,7 +62,7 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
         case "clear":
             return partial(Mark, segment=segment_of(site, wish.segment), reason=Reason.OPERATOR, blocks=False)
         case "hold":
-            return partial(Hold, machine=movable_of(site, wish.machine), holds=True, seed=seed)
+            return partial(HoldCommand, machine=movable_of(site, wish.machine), holds=True, seed=seed)
         case "release":
             return partial(_release, site=site, machine=machine_of(site, wish.machine), seed=seed)
         case "regenerate":
@@ -70,7 +70,7 @@ def maker_of(site: Site, wish: Wish, seed: int) -> Maker:
     raise OperateError(f"{wish.command}: no command")
 
 
-def _lost_of(site: Site, wish: Wish) -> Lost:
+def _lost_of(site: Site, wish: CommandRequest) -> Lost:
     """Who lost its rights, who is locked off, and where their bodies are. Raises ``OperateError``."""
     ways = way_site(site)
     lost = machine_of(site, wish.machine)
@@ -91,7 +91,7 @@ def _lost_of(site: Site, wish: Wish) -> Lost:
     return Lost(lost.node_id, absent.node_id, body, _body_of(site, absent, wish.absent_body, "--absent-body"))
 
 
-def _regenerate(park: Park, node: int, *, site: Site, who: Lost) -> Order:
+def _regenerate(park: Park, node: int, *, site: Site, who: Lost) -> OperatorCommand:
     """What was heard of the site already may speak against it. Raises ``OperateError``."""
     seen = who.body.slots | who.blocked.slots
     for known in park.machines.values():
@@ -107,18 +107,18 @@ def _regenerate(park: Park, node: int, *, site: Site, who: Lost) -> Order:
     return Regenerate(park, node, who)
 
 
-def _body_of(site: Site, machine: Machine, told: tuple[str, ...], option: str) -> Body:
+def _body_of(site: Site, machine: Machine, told: tuple[str, ...], option: str) -> BodySlots:
     """Where a person sees a body: one that moves is told, one that does not is known."""
     if machine.kind not in MOBILE_KINDS:
-        return Body.of_fixed(site, machine)
+        return BodySlots.of_fixed(site, machine)
     if not told:
         raise OperateError(
             f"{machine.name}: where does it stand? {option} 'p(1,3)' for each slot of it, or {option} gone"
         )
-    return Body.of_segments(site, [slot_of(site, text) for text in told if text != GONE])
+    return BodySlots.of_segments(site, [slot_of(site, text) for text in told if text != GONE])
 
 
-def _release(park: Park, node: int, *, site: Site, machine: Machine, seed: int) -> Order:
+def _release(park: Park, node: int, *, site: Site, machine: Machine, seed: int) -> OperatorCommand:
     """A machine that says that it holds goes on by ``Go`` under its number; any other was held by a ``ManualOrder``."""
     # The latest word about it, however old: the time is not asked for here.
     word = park.machines[machine.node_id].halted
@@ -129,4 +129,4 @@ def _release(park: Park, node: int, *, site: Site, machine: Machine, seed: int) 
         raise OperateError(f"{machine.name}: holds by an emergency stop; onboard operate go")
     if word is not None and word.sender == machine.node_id:
         return LetGo(park, node, machine)
-    return Hold(park, node, movable_of(site, machine.name), holds=False, seed=seed)
+    return HoldCommand(park, node, movable_of(site, machine.name), holds=False, seed=seed)

@@ -8,8 +8,8 @@ from onboard.contract.codes import KindCode
 from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
 from onboard.history.history import Fact, History
-from onboard.trace.activity import Activities, Activity, Body
-from onboard.trace.dealings import ANSWER, Counts, Dealings
+from onboard.trace.activity import Activities, Activity, MachineActivity
+from onboard.trace.dealings import ANSWER, DealingCounts, Dealings
 from onboard.trace.durations import percentile
 
 _HOUR_US = 3_600_000_000
@@ -176,7 +176,7 @@ class Indicators:
             robots_empty_share=_per(empty_mm, travel_mm),
         )
 
-    def _utilisation(self, body: Body, passed_us: int) -> Utilisation:
+    def _utilisation(self, body: MachineActivity, passed_us: int) -> Utilisation:
         shares = {activity: body.spent_us[activity] / passed_us for activity in Activity}
         return Utilisation(
             self._site.machines[body.node].name,
@@ -197,7 +197,7 @@ def _per(count: int, of: int) -> float:
     return count / of if of else 0.0
 
 
-def _give_ways(counts: Counts) -> int:
+def _give_ways(counts: DealingCounts) -> int:
     return counts.replans["way", ANSWER] + counts.unasked_moves + counts.give_way_calls
 
 

@@ -4,11 +4,11 @@ import random
 from dataclasses import replace
 
 from bus_sim.systems.cell.plant import ORIGIN_US, CellPlant
-from bus_sim.systems.orders import Orders, last_of, tally_of
+from bus_sim.systems.orders import OrderArrivals, last_of, tally_of
 from bus_sim.systems.stage import Tally
 from onboard.contract.codes import OrderResult
 from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.site import Cell, Wish
+from onboard.systems.cell.site import Cell, GoalDemand
 
 #: Points are drawn so far from edges of areas and obstacles at least, mm: the gripper's width.
 MARGIN_MM = 500
@@ -18,10 +18,10 @@ ATTEMPTS = 100
 ORDER_S = 60.0
 
 
-def draw(site: Cell, orders: Orders, seed: int) -> Cell:
+def draw(site: Cell, orders: OrderArrivals, seed: int) -> Cell:
     """The site with drawn goals; none has a deadline, as faults may last longer than any."""
     chance = orders.chance(site.name, seed)
-    wishes = [Wish(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
+    wishes = [GoalDemand(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
     return replace(site, wishes=tuple(wishes))
 
 

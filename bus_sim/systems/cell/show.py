@@ -7,7 +7,7 @@ from onboard.systems.cell.geometry import Area, Point
 WIDTH, HEIGHT = 78, 24
 
 
-class _Sheet:
+class _CharacterSheet:
     """A sheet of characters over the span of all areas."""
 
     def __init__(self, areas: list[Area]) -> None:
@@ -44,7 +44,7 @@ class _Sheet:
 def plan(plant: CellPlant, view: CellView) -> str:
     """Areas as dotted frames, obstacles as #, parts as o (O in a gripper), robots by their names."""
     site = plant.site
-    sheet = _Sheet([arm.area for arm in site.arms.values()])
+    sheet = _CharacterSheet([arm.area for arm in site.arms.values()])
     for arm in site.arms.values():
         sheet.frame(arm.area)
     for obstacle in site.obstacles:

@@ -9,8 +9,8 @@ from bus_sim.systems.cell.plant import CellPlant
 from bus_sim.systems.cell.show import plan
 from bus_sim.systems.cell.tree import ContractTree
 from bus_sim.systems.cell.view import CellView
-from bus_sim.systems.orders import Orders
-from bus_sim.systems.stage import Stage, Tally
+from bus_sim.systems.orders import OrderArrivals
+from bus_sim.systems.stage import SystemStage, Tally
 from onboard.contract.codes import OrderResult
 from onboard.contract.messages import Reference
 from onboard.systems.cell.contracts import Goal
@@ -21,8 +21,8 @@ if TYPE_CHECKING:  # the page's libraries are an extra
     from bus_sim.web.run_source import RunSource
 
 
-class CellStage(Stage[CellPlant]):
-    """See ``Stage``."""
+class CellStage(SystemStage[CellPlant]):
+    """See ``SystemStage``."""
 
     who = "goals"
 
@@ -31,30 +31,32 @@ class CellStage(Stage[CellPlant]):
         self.view = CellView(run.plant.site)
 
     def head(self) -> list[str]:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return [f"{super().head()[0]}, {len(self.plant.site.wishes)} goals"]
 
     def listen(self) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         super().listen()
         self.run.observers.append(lambda message, _: self.view.feed(message))
 
     def tally(self) -> Tally:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return count(self.plant)
 
     def bring(self, site: Cell, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         alone = replace(site, arms={node: site.arms[node]})
-        next(iter(self.plant.counters.values())).add(draw(alone, Orders(1, 1.0), self.run.options.seed).wishes[0])
+        next(iter(self.plant.counters.values())).add(
+            draw(alone, OrderArrivals(1, 1.0), self.run.options.seed).wishes[0]
+        )
 
     def power_up(self, node: int) -> None:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         if node in self.plant.devices:
             self.plant.devices[node].start()
 
     def picture(self) -> str:
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         return plan(self.plant, self.view)
 
     def told(self) -> list[str]:
@@ -67,7 +69,7 @@ class CellStage(Stage[CellPlant]):
         return [*lines, *super().told()]
 
     def source(self) -> "RunSource":
-        """See ``Stage``."""
+        """See ``SystemStage``."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
         return let_order(super().source(), self.plant.counters, self.plant.site.wishes)

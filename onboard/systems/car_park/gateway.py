@@ -10,9 +10,9 @@ from onboard.contract.codes import Operation, OperatorAction
 from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CallForProposals, CarAt, Message, OperatorOrder, Reference
 from onboard.gateway.dialect import Json
-from onboard.gateway.edge import Body, Edge
-from onboard.gateway.order import Order, Wish
-from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.gateway.edge import PhysicalLimits, SystemEdge
+from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.gateway.wishes import NoWishes, OrderMessages, RefusedError, Wishes, refuse_load
 from onboard.systems.car_park.site import CarPark
 from onboard.trace.view import SiteView
 from onboard.ways.site import WaySite, way_site
@@ -31,7 +31,7 @@ class ParkWishes(NoWishes):
         self._view, self._place = view, place
         self._desks = {machine.name: node for node, machine in site.machines.items() if node in site.compartments}
 
-    def transport(self, told: dict[str, Any]) -> Wish:
+    def transport(self, told: dict[str, Any]) -> OrderRequest:
         """``to`` a compartment: fetch. ``from`` a compartment: park what stands in it."""
         urgent = told.get("priority", 0) > 0
         refuse_load(told)
@@ -40,24 +40,26 @@ class ParkWishes(NoWishes):
             if "car" not in told and "from" not in told:
                 raise RefusedError("INCOMPLETE", "name the car, or from where", "$.car")
             car = _car(told["car"]) if "car" in told else self._standing(told["from"])
-            return Wish("fetch", node, car, urgent=urgent)
+            return OrderRequest("fetch", node, car, urgent=urgent)
         if "from" not in told:
             raise RefusedError("INCOMPLETE", "name a compartment to hand out at, or one to park from", "$.to")
-        return Wish("park", self._desk(told["from"], "$.from"), urgent=urgent)
+        return OrderRequest("park", self._desk(told["from"], "$.from"), urgent=urgent)
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """A ticket, or the key."""
         wish = order.wish
         if wish.car is None:
             if order.was_said:
                 raise RefusedError("NOT_TAKEN", "the compartment has not called for it: no car in it, or not ready")
-            return Said((OperatorOrder(sender, wish.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US)
+            return OrderMessages(
+                (OperatorOrder(sender, wish.node, OperatorAction.PRESS_KEY, Reference(0, 0)),), KEY_PATIENCE_US
+            )
         if wish.car not in self._view.cars:
             raise RefusedError("UNKNOWN_TICKET", "no such car is in the park", "$.car")
         action = OperatorAction.URGENT_TICKET if wish.urgent else OperatorAction.INSERT_TICKET
-        return Said((OperatorOrder(sender, wish.node, action, wish.car),), TICKET_AGAIN_US)
+        return OrderMessages((OperatorOrder(sender, wish.node, action, wish.car),), TICKET_AGAIN_US)
 
-    def task_of(self, order: Order, message: Message) -> Reference | None:
+    def task_of(self, order: GatewayOrder, message: Message) -> Reference | None:
         """The compartment's call for the car, or its next call to park."""
         if not isinstance(message, CallForProposals) or message.sender != order.wish.node or message.depth:
             return None
@@ -66,7 +68,7 @@ class ParkWishes(NoWishes):
         is_it = message.operation is Operation.RETRIEVE and message.car == order.wish.car
         return message.task if is_it else None
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, message: Message) -> bool:
         """The car has left; or it stands in a place, and its parking was the task, which has the car's own name."""
         if not isinstance(message, CarAt) or order.task is None:
             return False
@@ -94,7 +96,7 @@ def _car(text: str) -> Reference:
     return Reference(int(origin), int(number))
 
 
-class CarParkEdge(Edge):
+class CarParkEdge(SystemEdge):
     """A car park: carriers with a speed and a length, cars with limits."""
 
     def __init__(self, site: CarPark) -> None:
@@ -105,10 +107,10 @@ class CarParkEdge(Edge):
         """Orders from outside become tickets and keys at the compartments' desks."""
         return ParkWishes(self._park, view, place)
 
-    def body(self) -> Body:
+    def body(self) -> PhysicalLimits:
         """The carrier's axis and length; it takes the heaviest car."""
         axis = self._park.carrier
-        return Body(
+        return PhysicalLimits(
             axis.speed_mm_s / 1000,
             axis.acceleration_mm_s2 / 1000,
             self._park.carrier_length_mm / 1000,

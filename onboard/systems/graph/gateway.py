@@ -6,10 +6,10 @@ from typing import Any
 from onboard.contract.codes import KindCode
 from onboard.contract.graph import RobotAt, VisitList
 from onboard.contract.messages import Message
-from onboard.gateway.edge import Body, Edge
-from onboard.gateway.order import Order, Wish
+from onboard.gateway.edge import PhysicalLimits, SystemEdge
+from onboard.gateway.order import GatewayOrder, OrderRequest
 from onboard.gateway.whereabouts import Tracker, Whereabouts
-from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes, refuse_load
+from onboard.gateway.wishes import NoWishes, OrderMessages, RefusedError, Wishes, refuse_load
 from onboard.systems.graph.fields import NO_NODE, five
 from onboard.systems.graph.site import MAX_STOPS, FactoryGraph
 from onboard.trace.view import SiteView
@@ -25,7 +25,7 @@ class GraphWishes(NoWishes):
         super().__init__(site)
         self._graph = site
 
-    def transport(self, told: dict[str, Any]) -> Wish:
+    def transport(self, told: dict[str, Any]) -> OrderRequest:
         """``from`` one node ``to`` another: a desk calls for it, and the robot that does it best has it (row G28)."""
         desks = sorted(node for node, one in self._graph.machines.items() if one.kind is KindCode.DESK)
         if not desks:
@@ -37,9 +37,9 @@ class GraphWishes(NoWishes):
             if key not in told:
                 raise RefusedError("INCOMPLETE", "say from where to where", f"$.{key}")
             self._node(told[key], f"$.{key}")
-        return Wish("send", desks[0], stops=(int(told["from"]), int(told["to"])))
+        return OrderRequest("send", desks[0], stops=(int(told["from"]), int(told["to"])))
 
-    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> Wish:
+    def visit(self, node: int, told: dict[str, Any], since: tuple[str, int] | None = None) -> OrderRequest:
         """The nodes with an action and the last one are stops; between them the robot goes its own way.
 
         Nodes that are not released yet are its horizon: nothing is done for them before an update releases them.
@@ -61,7 +61,7 @@ class GraphWishes(NoWishes):
         if len(stops) > MAX_STOPS:
             raise RefusedError("TOO_LONG", f"at most {MAX_STOPS} stops fit into one order", "$.nodes")
         end = (base[-1]["nodeId"], base[-1]["sequenceId"])
-        return Wish("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
+        return OrderRequest("visit", node, stops=stops, base=end, is_open=len(base) < len(nodes))
 
     def _check(self, node: dict[str, Any], path: str) -> None:
         self._node(node["nodeId"], f"{path}.nodeId")
@@ -74,12 +74,12 @@ class GraphWishes(NoWishes):
         if not name.isdecimal() or int(name) not in self._graph.graph.neighbours:
             raise RefusedError("UNKNOWN_PLACE", "no node of this graph", path)
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """The list of nodes until the robot answers; without any node, that the order is taken back."""
         wish = order.wish
         stops = () if order.is_cancelled else wish.stops
         assert stops or order.is_cancelled, "an empty list takes an order back"
-        return Said((VisitList(sender, wish.number, wish.node, *five(stops)),), VISIT_AGAIN_US)
+        return OrderMessages((VisitList(sender, wish.number, wish.node, *five(stops)),), VISIT_AGAIN_US)
 
 
 class GraphTracker:
@@ -108,7 +108,7 @@ class GraphTracker:
         return self._at[node_id]
 
 
-class GraphEdge(Edge):
+class GraphEdge(SystemEdge):
     """A factory graph: nodes by number."""
 
     takes_visits = True
@@ -129,9 +129,9 @@ class GraphEdge(Edge):
         """A node, which orders name by its number alone."""
         return str(number)
 
-    def body(self) -> Body:
+    def body(self) -> PhysicalLimits:
         """Of a robot only its speed is known."""
-        return Body(speed=self._graph.speed_mm_s / 1000)
+        return PhysicalLimits(speed=self._graph.speed_mm_s / 1000)
 
 
 EDGE = GraphEdge

@@ -16,7 +16,7 @@ from onboard.core.effects import Effect, Record, Send, Tell
 from onboard.core.journal_records import Entry, records_in
 from onboard.core.negotiation.winners import STANDS_AFTER_US
 from onboard.core.records import BootRecord
-from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import award_of, call_of, mark_of, number_of, terms_of
 from onboard.systems.mapd.fields import NO_TASK
 from onboard.systems.mapd.knowledge import Knowledge
@@ -35,7 +35,7 @@ _LOW = 1 << 16
 
 
 @dataclass
-class OrderDesk(Plain):
+class TransportDesk(Plain):
     """One desk. ``step`` is the next to be opened, or the one whose round is open (``is_open``)."""
 
     kind: KindCode = KindCode.DESK
@@ -47,7 +47,7 @@ class OrderDesk(Plain):
     #: Robots without a task that asked for a turn in this round.
     yielding: set[int] = field(default_factory=set)
     #: Tasks that were ordered and not served, by number, with the step from which on they are to be called for.
-    orders: dict[int, Task] = field(default_factory=dict)
+    orders: dict[int, TransportTask] = field(default_factory=dict)
     served: set[int] = field(default_factory=set)
     _attempt: int = 0
     _due_us: int = 0
@@ -149,7 +149,7 @@ class OrderDesk(Plain):
         if max(key.pickup, key.delivery) >= floor.size:
             return [Tell(TransportAnswer(self.fleet.node_id, key.task, OrderResult.REFUSED))]
         release = self.step + (key.release - self.step + _LOW // 2) % _LOW - _LOW // 2
-        task = Task(key.task, release, key.pickup, key.delivery)
+        task = TransportTask(key.task, release, key.pickup, key.delivery)
         self.orders[key.task] = task
         return [Record(TransportRecord(key.task, task.pickup, task.delivery, task.release)), answer]
 
@@ -167,7 +167,7 @@ class OrderDesk(Plain):
         answer = Tell(TransportAnswer(self.fleet.node_id, task, OrderResult.DONE))
         return [Record(ServedRecord(task)), answer]
 
-    def _call(self, task: Task, now_us: int) -> Effect:
+    def _call(self, task: TransportTask, now_us: int) -> Effect:
         """The call for a task: said again, it is the same."""
         calls = self.knowledge.calls
         if task.number not in calls:
@@ -246,7 +246,7 @@ class OrderDesk(Plain):
                 case BootRecord():
                     self._attempt = record.boot
                 case TransportRecord():
-                    task = Task(record.task, record.release, record.pickup, record.delivery)
+                    task = TransportTask(record.task, record.release, record.pickup, record.delivery)
                     self.orders[record.task] = task
                 case ServedRecord():
                     self.orders.pop(record.task, None)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from onboard.contract.mapd import StepState
 from onboard.contract.messages import Message
-from onboard.gateway.edge import Edge
+from onboard.gateway.edge import SystemEdge
 from onboard.gateway.whereabouts import Tracker, Whereabouts
 from onboard.systems.mapd.site import Mapd
 
@@ -29,7 +29,7 @@ class CellTracker:
         return self._at[node_id]
 
 
-class MapdEdge(Edge):
+class MapdEdge(SystemEdge):
     """What the gateway tells of a floor of cells; it takes no orders."""
 
     def __init__(self, site: Mapd) -> None:

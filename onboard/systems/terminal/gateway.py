@@ -6,11 +6,11 @@ from typing import Any
 
 from onboard.contract.messages import CarAt, Message
 from onboard.contract.terminal import BoxOrder, PlanHead, PlanStep, StepReport, StepResult
-from onboard.gateway.edge import Edge
-from onboard.gateway.order import Order, Wish
-from onboard.gateway.records import Life
+from onboard.gateway.edge import SystemEdge
+from onboard.gateway.order import GatewayOrder, OrderRequest
+from onboard.gateway.records import OrderPhase
 from onboard.gateway.whereabouts import Tracker, Whereabouts
-from onboard.gateway.wishes import NoWishes, RefusedError, Said, Wishes
+from onboard.gateway.wishes import NoWishes, OrderMessages, RefusedError, Wishes
 from onboard.systems.terminal.site import EntityKind, Terminal
 from onboard.trace.view import SiteView
 
@@ -30,7 +30,7 @@ class TerminalWishes(NoWishes):
         stations = [one for one in site.entities.values() if one.kind is EntityKind.STATION]
         self._stations = {one.name: one.number for one in stations}
 
-    def transport(self, told: dict[str, Any]) -> Wish:
+    def transport(self, told: dict[str, Any]) -> OrderRequest:
         """``load``, a box by its name, ``to`` a station."""
         for key in ("load", "to"):
             if key not in told:
@@ -40,19 +40,21 @@ class TerminalWishes(NoWishes):
         if told["to"] not in self._stations:
             raise RefusedError("UNKNOWN_PLACE", f"no station; one of {', '.join(self._stations)}", "$.to")
         stops = (self._boxes[told["load"]], self._stations[told["to"]])
-        return Wish("send", self._terminal.desk, stops=stops, urgent=told.get("priority", 0) > 0)
+        return OrderRequest("send", self._terminal.desk, stops=stops, urgent=told.get("priority", 0) > 0)
 
-    def say(self, order: Order, sender: int, wall_us: int) -> Said:
+    def say(self, order: GatewayOrder, sender: int, wall_us: int) -> OrderMessages:
         """The order, until the desk answers."""
         wish, within_s = order.wish, 0
         if order.before_us is not None:
             within_s = min(max(1, (order.before_us - wall_us) // 1_000_000), MOST_WITHIN_S)
         box, station = wish.stops
-        return Said((BoxOrder(sender, wish.node, wish.number, box, station, within_s, wish.urgent),), ORDER_AGAIN_US)
+        return OrderMessages(
+            (BoxOrder(sender, wish.node, wish.number, box, station, within_s, wish.urgent),), ORDER_AGAIN_US
+        )
 
-    def is_done(self, order: Order, message: Message) -> bool:
+    def is_done(self, order: GatewayOrder, message: Message) -> bool:
         """The box stands there: the vehicle's own report may have been lost."""
-        if not isinstance(message, CarAt) or order.life in (Life.ACCEPTED, Life.CALLED):
+        if not isinstance(message, CarAt) or order.life in (OrderPhase.ACCEPTED, OrderPhase.CALLED):
             return False
         box, station = order.wish.stops
         return (message.car.number, message.station) == (box, station)
@@ -117,7 +119,7 @@ class EntityTracker:
         return entity.name if entity is not None else str(number)
 
 
-class TerminalEdge(Edge):
+class TerminalEdge(SystemEdge):
     """A terminal: entities by their names."""
 
     def __init__(self, site: Terminal) -> None:

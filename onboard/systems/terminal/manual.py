@@ -13,7 +13,7 @@ from onboard.work import manual
 
 
 @dataclass
-class Manual(manual.Manual):
+class VehicleMode(manual.Manual):
     """One vehicle's mode. ``allowed`` are plan version and step of a step by hand."""
 
     allowed: tuple[int, int] | None = None

@@ -19,7 +19,7 @@ from onboard.trace.commands.common import (
 )
 from onboard.trace.listener import Listener
 from onboard.trace.story.calls import told as told_call
-from onboard.trace.story.why import TaskStory, Why
+from onboard.trace.story.why import TaskStory, WaitingStory
 from onboard.trace.story.why import told as told_task
 from onboard.trace.words import Words
 
@@ -86,7 +86,7 @@ def run_why(args: argparse.Namespace) -> int:
     assert site is not None, "argparse asks for it"
     task = task_of(args.task, site)
     words = Words(site)
-    listener, why = Listener(codecs_for(site)), Why(site, words)
+    listener, why = Listener(codecs_for(site)), WaitingStory(site, words)
     start_us: int | None = None
     with open_log(args) as log:
         for said in listener.messages(log):

@@ -9,8 +9,8 @@ from onboard.contract.constants import ANY_STATION, OUTSIDE
 from onboard.contract.messages import CarAt, Reference, TaskReport
 from onboard.core.serial import is_newer
 from onboard.core.site import Station
-from onboard.trace.check.event import Event, Finding
-from onboard.trace.check.picture import Picture
+from onboard.trace.check.event import Finding, LogEvent
+from onboard.trace.check.picture import BusPicture
 from onboard.trace.check.rule import Handlers, Rule
 from onboard.trace.check.tokens_seen import Token
 from onboard.ways.site import way_site
@@ -42,7 +42,7 @@ class CarsConserved(Rule):
     title = "cars conserved, one in a place"
     source = "issue 4, point 1"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._cars: OrderedDict[Reference, CarSeen] = OrderedDict()
         self._at: dict[int, Reference] = {}
@@ -52,7 +52,7 @@ class CarsConserved(Rule):
         """Reads where cars are said to stand."""
         return {CarAt: self._on_car}
 
-    def _on_car(self, event: Event[CarAt]) -> None:
+    def _on_car(self, event: LogEvent[CarAt]) -> None:
         said = event.message
         before = self._cars.get(said.car)
         if before is not None and is_newer(before.version, said.version, VERSION_BITS):
@@ -126,10 +126,10 @@ class OneCustodian(Rule):
     title = "one custodian a car"
     source = "dbc/fleet.dbc, CarAt; design 5"
 
-    def __init__(self, picture: Picture, report: Callable[[Finding], None]) -> None:
+    def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
         self._stated: OrderedDict[tuple[int, int], int] = OrderedDict()
-        self._open: list[tuple[Event[TaskReport], int]] = []
+        self._open: list[tuple[LogEvent[TaskReport], int]] = []
         #: The place that each machine named last: a report may be long held up, while nobody acknowledges frames.
         self._named: dict[int, int] = {}
         #: What each machine has told itself to have taken: a report may be said again after the whole site was off.
@@ -151,7 +151,7 @@ class OneCustodian(Rule):
                 what = f"put a car down {_where(report.station)} and does not say which"
                 self.find(event, (report.sender,), what)
 
-    def _on_car(self, event: Event[CarAt]) -> None:
+    def _on_car(self, event: LogEvent[CarAt]) -> None:
         said = event.message
         if self.picture.tokens.is_frozen(event.time_us):
             # Whoever remembers where a lost machine's car stands says so in its place.
@@ -174,7 +174,7 @@ class OneCustodian(Rule):
             what = f"states {car} under version {said.version}, whose custodian is {custodian}"
             self.find(event, (said.sender, custodian or 0), what)
 
-    def _on_report(self, event: Event[TaskReport]) -> None:
+    def _on_report(self, event: LogEvent[TaskReport]) -> None:
         report = event.message
         if report.phase is TaskPhase.LOADED:
             self._loaded[report.sender, report.task] = None
