@@ -11,7 +11,7 @@ from pathlib import Path
 from bus_sim.options import RunOptions
 from bus_sim.session import run_site
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import DayOptions
+from bus_sim.systems.car_park.day import ParkingDay
 from bus_sim.systems.car_park.summary import RunSummary
 
 
@@ -32,27 +32,27 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         trace = Path(folder) / "trace.log"
-        row("level1, its real day, no log", "level1", RunOptions(demand=DayOptions(), quiet=True))
+        row("level1, its real day, no log", "level1", RunOptions(demand=ParkingDay(), quiet=True))
         row(
-            "level1, all buses logged", "level1", RunOptions(demand=DayOptions(), trace=trace, devices=True, quiet=True)
+            "level1, all buses logged", "level1", RunOptions(demand=ParkingDay(), trace=trace, devices=True, quiet=True)
         )
-        row("standard, the real day, no log", "standard", RunOptions(demand=DayOptions(), quiet=True))
+        row("standard, the real day, no log", "standard", RunOptions(demand=ParkingDay(), quiet=True))
         row(
             "standard, all buses logged",
             "standard",
-            RunOptions(demand=DayOptions(), trace=trace, devices=True, quiet=True),
+            RunOptions(demand=ParkingDay(), trace=trace, devices=True, quiet=True),
         )
         row(
             "standard, its busiest hour, no log",
             "standard",
-            RunOptions(demand=DayOptions(window="busiest"), quiet=True),
+            RunOptions(demand=ParkingDay(window="busiest"), quiet=True),
         )
         if len(sys.argv) == 3:
             sessions, day = Path(sys.argv[1]), sys.argv[2]
             row(
                 f"standard, {day}, no log",
                 "standard",
-                RunOptions(demand=DayOptions(sessions=sessions, day=day), quiet=True),
+                RunOptions(demand=ParkingDay(sessions=sessions, day=day), quiet=True),
             )
 
 

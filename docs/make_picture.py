@@ -13,7 +13,7 @@ from rich.console import Console
 
 from bus_sim.options import RunOptions
 from bus_sim.sites import find_site
-from bus_sim.systems.car_park.day import DayOptions, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, choose_demand
 from bus_sim.systems.car_park.show import DayClock, draw
 from bus_sim.systems.car_park.simulation import build
 from bus_sim.systems.car_park.stage import ORIGIN_US
@@ -30,7 +30,7 @@ async def _picture() -> str:
     loop = asyncio.get_running_loop()
     assert isinstance(loop, VirtualTimeLoop)
     site = find_site("standard")
-    demand = choose_demand(DayOptions(), site)
+    demand = choose_demand(ParkingDay(), site)
     demand = with_short_eve(demand, two_way_hour(demand), len(site.compartments))
     first_us = demand.stays[0].arrival_us
     simulation = build(site, RunOptions(), loop)

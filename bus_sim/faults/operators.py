@@ -8,10 +8,10 @@ from bus_sim.run import BusRun
 from onboard.contract.codes import Reason
 from onboard.contract.messages import Blocked, Clear, EmergencyStop, Message
 from onboard.core.site import Segment
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
 from onboard.operate.order import OperatorCommand
 from onboard.operate.station import OperatorStation
-from onboard.operate.wishes import CommandRequest, maker_of
 
 #: The station's node-ID: 251 to 255 are kept for gateways and tools (dbc/fleet.dbc).
 STATION = 251

@@ -120,12 +120,12 @@ class Figures:
     figures: dict[str, object]
     is_good: bool
     wall_s: float
-    told: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def lines(self, width: int | None = None) -> list[str]:
         """See ``RunFigures``."""
         figures = (f"{name.replace('_', ' ')}: {_shown(value)}" for name, value in self.figures.items())
-        return [*self.told, *figures, f"wall time: {self.wall_s:.1f} s"]
+        return [*self.remarks, *figures, f"wall time: {self.wall_s:.1f} s"]
 
     def to_json(self) -> dict[str, object]:
         """See ``RunFigures``."""
@@ -253,7 +253,7 @@ class SystemStage(ABC, Generic[PlantT]):
         """The site as it is now, for a terminal; empty where there is none."""
         return ""
 
-    def told(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """Lines about what was done, before the figures."""
         last = self.picture()
         return ["", last, ""] if last else []
@@ -289,4 +289,4 @@ class SystemStage(ABC, Generic[PlantT]):
             "halted": halted,
             "over": self.is_over,
         }
-        return Figures(whole, self.is_over and not violations and not halted, ended.wall_s, tuple(self.told()))
+        return Figures(whole, self.is_over and not violations and not halted, ended.wall_s, tuple(self.remarks()))

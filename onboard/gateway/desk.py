@@ -49,12 +49,12 @@ class GatewayDesk:
         settings, fleet = publisher.settings, publisher.fleet
         assert settings.node_id is not None, "who only listens takes no orders"
         self.inbox = Inbox(settings.dialect, publisher.root, settings.manufacturer)
-        wishes = edge_of(site).wishes(fleet.picture.view, fleet.place)
+        bus_orders = edge_of(site).bus_orders(fleet.picture.view, fleet.place)
         seed = (settings.epoch_us + now_us) // 1_000_000
-        self.orders = OrderBook(site, wishes, settings.node_id, reports.others, now_us=now_us, seed=seed)
+        self.orders = OrderBook(site, bus_orders, settings.node_id, reports.others, now_us=now_us, seed=seed)
         reports.keep = self.orders.entries
         self.pauses = Pauses(settings.node_id, seed)
-        self._no_pause = wishes.no_pause
+        self._no_pause = bus_orders.no_pause
         #: Actions that take a robot's order back, until it says so.
         self._cancelling: dict[int, list[Json]] = {}
         self._waiting: deque[tuple[Publication, Callable[[], None]]] = deque()
@@ -83,8 +83,8 @@ class GatewayDesk:
             # Only now: had the power failed before, the broker would bring it again.
             taken()
         await self._perform(self.orders.wake(now_us, self._publisher.settings.epoch_us + now_us), now_us)
-        said, closed = self.pauses.wake(now_us)
-        for message in said:
+        due, closed = self.pauses.wake(now_us)
+        for message in due:
             self._send(message)
         self._close(closed, now_us)
 
@@ -116,7 +116,7 @@ class GatewayDesk:
             self._refuse(self.inbox.refuse(incoming, "UNKNOWN_MACHINE", "no machine of this name travels"), now_us)
             return
         node = self._site.machine(incoming.serial).node_id
-        for action in incoming.told["actions"]:
+        for action in incoming.body["actions"]:
             if known.is_known(action):
                 continue
             kind = action["actionType"]
@@ -171,11 +171,11 @@ class GatewayDesk:
                 self._tell(order, now_us)
             if order.life.is_over:
                 failure = "" if order.reason == "CANCELLED" else f"the order was {order.life.value} before"
-                over = self._cancelling.pop(order.wish.node, []) if order.wish.what == "visit" else []
-                self._close([(order.wish.node, action, failure) for action in over], now_us)
+                over = self._cancelling.pop(order.request.node, []) if order.request.what == "visit" else []
+                self._close([(order.request.node, action, failure) for action in over], now_us)
         for message in outcome.say:
             self._send(message)
-        for order in outcome.told:
+        for order in outcome.to_tell:
             self._post([Outgoing(FLEET, self._answer(order, now_us))])
         for incoming in outcome.refused:
             self._refuse(incoming, now_us)
@@ -184,39 +184,39 @@ class GatewayDesk:
         answer = self._answer(order, now_us)
         name = f"order {order.name} {order.life.value}" if order.life.is_over else ""
         self._post([Outgoing(FLEET, answer, name)])
-        if order.wish.what == "visit":
-            self._tell_machine(order.wish.node, now_us)
+        if order.request.what == "visit":
+            self._tell_machine(order.request.node, now_us)
 
     def _answer(self, order: GatewayOrder, now_us: int) -> Publication:
-        told: Json = {"at": self._publisher.at(now_us), "id": order.name, "phase": order.life.value}
+        body: Json = {"at": self._publisher.at(now_us), "id": order.name, "phase": order.life.value}
         if order.task is not None:
             stands = self._publisher.fleet.task(order.task, now_us)
-            told |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
+            body |= {key: stands[key] for key in ("task", "car", "promised") if key in stands}
         if order.owner:
-            told["owner"] = self._publisher.fleet.picture.view.name(order.owner)
+            body["owner"] = self._publisher.fleet.picture.view.name(order.owner)
         if order.before_us is not None:
-            told["before"] = timestamp(order.before_us)
-            told["late"] = (
-                max(told.get("promised", ""), told["at"] if order.life is OrderPhase.DONE else "") > told["before"]
+            body["before"] = timestamp(order.before_us)
+            body["late"] = (
+                max(body.get("promised", ""), body["at"] if order.life is OrderPhase.DONE else "") > body["before"]
             )
-        told |= {key: one for key, one in (("reason", order.reason), ("why", order.why)) if one}
-        return self._publisher.publication(f"order/{level(order.name)}", told, qos=1)
+        body |= {key: one for key, one in (("reason", order.reason), ("why", order.why)) if one}
+        return self._publisher.publication(f"order/{level(order.name)}", body, qos=1)
 
     def _refuse(self, incoming: Incoming, now_us: int) -> None:
         name = name_of(incoming)[: 2 * MOST_ID]
-        told = {
+        body = {
             "at": self._publisher.at(now_us),
             "id": name,
             "phase": OrderPhase.REFUSED.value,
             "reason": incoming.reason,
         }
-        told |= {"path": incoming.path, "why": incoming.why}
-        self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", told, qos=1))])
+        body |= {"path": incoming.path, "why": incoming.why}
+        self._post([Outgoing(FLEET, self._publisher.publication(f"order/{level(name)}", body, qos=1))])
         node = next((one.node_id for one in self._site.machines.values() if one.name == incoming.serial), None)
         if node is not None:
             references = [{"referenceKey": "path", "referenceValue": incoming.path}]
             references.append(
-                {"referenceKey": "orderId", "referenceValue": str(incoming.told.get("orderId", ""))[:MOST_ID]}
+                {"referenceKey": "orderId", "referenceValue": str(incoming.body.get("orderId", ""))[:MOST_ID]}
             )
             kind = _ERRORS.get(incoming.reason, "orderError")
             error = {"errorType": kind, "errorLevel": "WARNING", "errorReferences": references}

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from onboard.core.site import Site
+from onboard.gateway.bus_orders import BusOrders, NoBusOrders
 from onboard.gateway.dialect import Json
-from onboard.gateway.whereabouts import Tracker, TrackTracker
-from onboard.gateway.wishes import NoWishes, Wishes
+from onboard.gateway.positions import Tracker, TrackTracker
 from onboard.systems.registry import part
 from onboard.systems.words import words_of
 from onboard.trace.view import SiteView
@@ -35,9 +35,9 @@ class SystemEdge:
     def __init__(self, site: Site) -> None:
         self.site = site
 
-    def wishes(self, view: SiteView, place: Callable[[int], str | None]) -> Wishes:
+    def bus_orders(self, view: SiteView, place: Callable[[int], str | None]) -> BusOrders:
         """What orders become; ``view`` is what was heard, ``place`` names a station by its number."""
-        return NoWishes(self.site)
+        return NoBusOrders(self.site)
 
     def tracker(self) -> Tracker:
         """What follows where machines are; the default reads places on tracks."""

@@ -83,10 +83,10 @@ class Gateway:
 
     def event(self, time_us: int, source: str, text: str) -> None:
         """``ports.Telemetry``: what a controller in this process says in words, on ``log/MACHINE``."""
-        told = {"at": self.publisher.at(time_us), "machine": source, "text": text}
+        outgoing = {"at": self.publisher.at(time_us), "machine": source, "text": text}
         link = self.links.get(level(source), self.links.get(FLEET))
         if link is not None:
-            link.post(self.publisher.publication(f"log/{level(source)}", told))
+            link.post(self.publisher.publication(f"log/{level(source)}", outgoing))
 
     def news(self) -> str:
         """The sessions in one line: how many there are, why the others are not, and what was lost."""
@@ -154,8 +154,8 @@ class Gateway:
         await self._news.wait()
         timer.cancel()
 
-    def _post(self, told: Iterable[Outgoing]) -> None:
-        for one in told:
+    def _post(self, outgoing: Iterable[Outgoing]) -> None:
+        for one in outgoing:
             if one.report and self.reports is not None:
                 self._to_keep.append((one.report, one.publication))
             elif one.link in self.links:

@@ -20,7 +20,7 @@ from onboard.contract.messages import (
 )
 from onboard.core.site import Machine, Segment, Site
 from onboard.gateway.edge import edge_of
-from onboard.gateway.whereabouts import Tracker, Whereabouts
+from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.history.calls import CallAnswered
 from onboard.history.history import Fact
 
@@ -86,7 +86,7 @@ class Machines:
         self.bodies = {node: MobileMachine(self.site.machines[node]) for node in mobile}
         self._tracker = edge_of(self.site).tracker()
 
-    def where(self, node_id: int) -> Whereabouts:
+    def where(self, node_id: int) -> MachinePosition:
         """Where a mobile machine is."""
         return self._tracker.where(node_id)
 

@@ -39,7 +39,7 @@ class GatewayOrder:
     """
 
     name: str
-    wish: OrderRequest
+    request: OrderRequest
     content: int
     before_us: int | None = None
     update: int = 0
@@ -50,21 +50,21 @@ class GatewayOrder:
     owner: int = 0
     was_said: bool = False
     due_us: int | None = None
-    #: Stops of updates, list by list, that the robot gets once it has done those of ``wish``.
+    #: Stops of updates, list by list, that the robot gets once it has done those of ``request``.
     ahead: tuple[tuple[int, ...], ...] = ()
     #: It was taken back while the robot had it: the robot is told until it says so.
     is_cancelled: bool = False
 
     def entry(self) -> Entry:
         """The whole order, for the journal; the newest record of a name counts."""
-        wish = self.wish
+        request = self.request
         return WishRecord(
             self.name,
-            wish.what,
-            wish.node,
-            wish.stops,
-            wish.number,
-            wish.urgent,
+            request.what,
+            request.node,
+            request.stops,
+            request.number,
+            request.urgent,
             self.content,
             self.update,
             self.life,
@@ -73,11 +73,11 @@ class GatewayOrder:
             self.owner,
             self.was_said,
             ahead=",".join(_words(stops) for stops in self.ahead),
-            base=wish.base[0],
-            sequence=wish.base[1],
-            open=wish.is_open,
+            base=request.base[0],
+            sequence=request.base[1],
+            open=request.is_open,
             cancelled=self.is_cancelled,
-            car=wish.car,
+            car=request.car,
             task=self.task,
             before_us=self.before_us,
         ).entry
@@ -85,7 +85,7 @@ class GatewayOrder:
 
 def order_of(record: WishRecord) -> GatewayOrder:
     """The order that a journal record of it stands for."""
-    wish = OrderRequest(
+    request = OrderRequest(
         record.what,
         record.node,
         record.car,
@@ -97,7 +97,7 @@ def order_of(record: WishRecord) -> GatewayOrder:
     )
     return GatewayOrder(
         record.name,
-        wish,
+        request,
         record.content,
         record.before_us,
         record.update,
@@ -117,9 +117,9 @@ def same_content(*parts: object) -> int:
     return zlib.crc32(repr(parts).encode())
 
 
-def with_number(wish: OrderRequest, number: int) -> OrderRequest:
-    """The same wish under a number on the bus."""
-    return replace(wish, number=number)
+def with_number(request: OrderRequest, number: int) -> OrderRequest:
+    """The same request under a number on the bus."""
+    return replace(request, number=number)
 
 
 def _words(stops: tuple[int, ...]) -> str:

@@ -141,18 +141,18 @@ class Whose(NamedTuple):
     blocked: BodySlots
 
 
-def assign(said: Statements, whose: Whose, operator: int) -> RightsAssignment:
+def assign(statements: Statements, whose: Whose, operator: int) -> RightsAssignment:
     """The lost machine's rights: to it where its body is, else to who had them first, else to the lowest fixed one.
 
     What the absent machine held goes the same way, but for the slots of its body, which are nobody's.
     """
     given: list[TokenAssigned] = []
     nobodys: list[TokenKey] = []
-    for key in sorted({*tokens_of(way_site(said.site)), *said.seen}):
-        if key in said.held or not _is_orphan(said, key, whose):
+    for key in sorted({*tokens_of(way_site(statements.site)), *statements.seen}):
+        if key in statements.held or not _is_orphan(statements, key, whose):
             continue
-        to = _heir(said, key, whose)
-        version = said.seen[key].version + 1 if key in said.seen else 1
+        to = _heir(statements, key, whose)
+        version = statements.seen[key].version + 1 if key in statements.seen else 1
         if to == NOBODY or version > LAST_VERSION:
             nobodys.append(key)
         else:
@@ -160,22 +160,22 @@ def assign(said: Statements, whose: Whose, operator: int) -> RightsAssignment:
     return RightsAssignment(tuple(given), tuple(nobodys))
 
 
-def _is_orphan(said: Statements, key: TokenKey, whose: Whose) -> bool:
+def _is_orphan(statements: Statements, key: TokenKey, whose: Whose) -> bool:
     """Whether a token that nobody says to hold is lost: one never seen to move is with its first holder."""
-    if key in said.seen:
+    if key in statements.seen:
         return True
-    return genesis_holder(said.site, key) in (whose.lost, whose.absent)
+    return genesis_holder(statements.site, key) in (whose.lost, whose.absent)
 
 
-def _heir(said: Statements, key: TokenKey, whose: Whose) -> int:
-    site, absent = said.site, whose.absent
+def _heir(statements: Statements, key: TokenKey, whose: Whose) -> int:
+    site, absent = statements.site, whose.absent
     if whose.blocked.has(key):
         return NOBODY
     if whose.body.has(key):
         return whose.lost
     if key.kind in (TokenKind.CAR, TokenKind.TASK):
-        return _heir_of_car(said, key, whose)
-    seen = said.seen.get(key)
+        return _heir_of_car(statements, key, whose)
+    seen = statements.seen.get(key)
     # A grant to a machine that lives is on its way: it is that machine's.
     wanted = NOBODY if seen is None or seen.node == whose.lost else seen.node
     # A machine that moves learns from the slots that it gets where it is: it gets no others.
@@ -186,16 +186,16 @@ def _heir(said: Statements, key: TokenKey, whose: Whose) -> int:
     return _lowest_fixed(site, absent)
 
 
-def _heir_of_car(said: Statements, key: TokenKey, whose: Whose) -> int:
+def _heir_of_car(statements: Statements, key: TokenKey, whose: Whose) -> int:
     """Who keeps the station at which a car stands; nobody where nobody knows it, or it is aboard who is absent."""
-    word = said.cars.get(key)
+    word = statements.cars.get(key)
     if word is not None and word.station not in (ANY_STATION, OUTSIDE):
         station = Station.from_number(word.station)
-        keeper = next((node for node, one in way_site(said.site).compartments.items() if one == station), None)
-        keeper = said.site.stewards.get(station.track, NOBODY) if keeper is None else keeper
-        if keeper in said.site.machines and keeper != whose.absent:
+        keeper = next((node for node, one in way_site(statements.site).compartments.items() if one == station), None)
+        keeper = statements.site.stewards.get(station.track, NOBODY) if keeper is None else keeper
+        if keeper in statements.site.machines and keeper != whose.absent:
             return keeper
-        return _lowest_fixed(said.site, whose.absent)
+        return _lowest_fixed(statements.site, whose.absent)
     return NOBODY if whose.lost == whose.absent else whose.lost
 
 

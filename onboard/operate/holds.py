@@ -56,7 +56,7 @@ class HoldCommand(OperatorCommand):
         """Repeat the request as ``Pauses`` says; give up after ``REST_US``."""
         if self.status is not None:
             return []
-        said, closed = self._pauses.wake(now_us)
+        due, closed = self._pauses.wake(now_us)
         self._wake_us = min(self._pauses.due(), default=None)
         if closed or now_us >= self.began_us + REST_US:
             state = state_words(self.park, self._machine.node_id, now_us)
@@ -64,7 +64,7 @@ class HoldCommand(OperatorCommand):
             self.tell(f"{self._machine.name} {why}; it {state}")
             self.end([self._machine.name])
             return []
-        return said
+        return due
 
 
 #: The longest way to a place where a held robot may stand: a ride and a spur of the largest site, us.

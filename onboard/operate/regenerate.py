@@ -257,8 +257,8 @@ class Regenerate(OperatorCommand):
         for node in self.park.machines:
             kinds = [one.token_kind for one in self._assignment.given if one.holder == node]
             if kinds:
-                told = ", ".join(f"{kinds.count(kind)} {kind.name.lower()}s" for kind in TokenKind if kind in kinds)
-                self.tell(f"{self.park.name(node)} gets {told}")
+                rights = ", ".join(f"{kinds.count(kind)} {kind.name.lower()}s" for kind in TokenKind if kind in kinds)
+                self.tell(f"{self.park.name(node)} gets {rights}")
         if self._assignment.nobodys:
             self.tell(f"{len(self._assignment.nobodys)} rights stay nobody's")
 
@@ -325,11 +325,11 @@ class Regenerate(OperatorCommand):
     # --- what is heard -----------------------------------------------------------------------------------------
 
     def _absent_is_heard(self, message: Message, now_us: int) -> None:
-        name, said = self.park.name(message.sender), type(message).__name__
+        name, sign_of_life = self.park.name(message.sender), type(message).__name__
         if self._step in (RegenerationStep.COMMIT, RegenerationStep.ABORT):
-            self.tell(f"{name} LIVES though it is said to be locked off ({said})")
+            self.tell(f"{name} LIVES though it is said to be locked off ({sign_of_life})")
             return
-        self._abort(f"{name} LIVES though it is said to be locked off ({said}): go and see", now_us)
+        self._abort(f"{name} LIVES though it is said to be locked off ({sign_of_life}): go and see", now_us)
 
     def _on_state(self, state: RegenerationState, now_us: int) -> None:
         wanted = self._word()

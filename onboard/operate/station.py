@@ -6,10 +6,10 @@ from collections.abc import Awaitable, Callable
 from onboard.contract.messages import Message
 from onboard.core.frame import Frame
 from onboard.core.site import Site
+from onboard.operate.commands import LISTEN_BEATS, Maker
 from onboard.operate.names import FIRST_TOOL, LAST_TOOL, OperateError
 from onboard.operate.order import MISTAKE, NOT_CONFIRMED, OperatorCommand
 from onboard.operate.park import Park
-from onboard.operate.wishes import LISTEN_BEATS, Maker
 from onboard.ports.bus import Bus
 from onboard.wire.codec import Codec
 from onboard.wire.decoder import Decoder

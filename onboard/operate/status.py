@@ -45,8 +45,8 @@ def status_lines(park: Park, now_us: int) -> list[str]:
         what = "a gateway or tool" if node in park.tools() else "no machine of this site"
         lines.append(f"node {node} is heard: {what}, last with {park.others[node]}")
     for node, counts in sorted(park.dropped.items()):
-        told = ", ".join(f"{reason_words(reason)} {count}" for reason, count in sorted(counts.items()))
-        lines.append(f"{park.name(node)} has dropped since its start: {told}")
+        drops = ", ".join(f"{reason_words(reason)} {count}" for reason, count in sorted(counts.items()))
+        lines.append(f"{park.name(node)} has dropped since its start: {drops}")
     return lines
 
 

@@ -9,8 +9,8 @@ from onboard.contract.messages import BusTime, Heartbeat, Message
 from onboard.core.site import Site
 from onboard.history.history import Fact, History
 from onboard.trace.activity import Activities, Activity, MachineActivity
-from onboard.trace.dealings import ANSWER, DealingCounts, Dealings
 from onboard.trace.durations import percentile
+from onboard.trace.negotiations import ANSWER, DealingCounts, NegotiationFold
 
 _HOUR_US = 3_600_000_000
 #: Said by the clock and not because of a task.
@@ -125,7 +125,7 @@ class Indicators:
         self._history = history if history is not None else History()
         self._begin_us = begin_us
         self._activities = Activities(site, begin_us)
-        self._dealings = Dealings(self._history)
+        self._negotiations = NegotiationFold(self._history)
 
     def feed(self, message: Message, time_us: int) -> None:
         """Take up one message, where the history is these indicators' own."""
@@ -133,7 +133,7 @@ class Indicators:
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message, and what the history made of it."""
-        self._dealings.take(message, fact, time_us)
+        self._negotiations.take(message, fact, time_us)
         self._activities.take(message, fact, time_us)
 
     def begin(self, time_us: int) -> None:
@@ -141,13 +141,13 @@ class Indicators:
         self._begin_us = time_us
         self._activities.settle_all(time_us)
         self._activities.begin(time_us)
-        self._dealings.begin()
+        self._negotiations.begin()
 
     def figures(self, now_us: int) -> FleetIndicators:
         """The figures from the last ``begin`` up to now."""
         self._activities.settle_all(now_us)
         passed_us = max(1, now_us - self._begin_us)
-        counts = self._dealings.counts
+        counts = self._negotiations.counts
         bodies = self._activities.bodies
         robots = [body for body in bodies.values() if body.kind is KindCode.ROBOT]
         travel_mm, empty_mm = sum(body.travel_mm for body in robots), sum(body.empty_mm for body in robots)

@@ -131,12 +131,12 @@ class SiteView:
             case TaskTold() if fact.is_first:
                 self._on_phase(fact, time_us)
 
-    def _on_progress(self, told: Progress) -> None:
-        here, word = (Segment(told.track, told.index), told.offset_mm), self.halts.get(told.sender)
-        if word is not None and word.reason is Reason.FALSE_STATEMENT and here != self.positions.get(told.sender):
+    def _on_progress(self, statement: Progress) -> None:
+        here, word = (Segment(statement.track, statement.index), statement.offset_mm), self.halts.get(statement.sender)
+        if word is not None and word.reason is Reason.FALSE_STATEMENT and here != self.positions.get(statement.sender):
             # Said by others, because it stood: it moves.
-            del self.halts[told.sender]
-        self.positions[told.sender] = here
+            del self.halts[statement.sender]
+        self.positions[statement.sender] = here
 
     def _on_heartbeat(self, beat: Heartbeat) -> None:
         word = self.halts.get(beat.sender)
@@ -199,8 +199,8 @@ class SiteView:
         else:
             self.say(time_us, f"{self.name(award.winner)} wins {thing}")
 
-    def _on_phase(self, told: TaskTold, time_us: int) -> None:
-        task, report = told.task, told.report
+    def _on_phase(self, statement: TaskTold, time_us: int) -> None:
+        task, report = statement.task, statement.report
         if report.phase is TaskPhase.DONE:
             self._count_done(task, time_us)
             self.parked += task.operation is Operation.PARK

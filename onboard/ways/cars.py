@@ -34,7 +34,7 @@ class CarMirror(Mirror):
 
     cars: dict[Reference, KnownCar] = field(default_factory=dict)
     #: Where cars stand whose custody came to this machine as rights were made anew, by who remembers it.
-    told: dict[Reference, CarAt] = field(default_factory=dict)
+    taken_over: dict[Reference, CarAt] = field(default_factory=dict)
     #: Who wants to know that a car which left long ago is remembered no longer.
     on_forgotten: list[Callable[[Reference], object]] = field(default_factory=list)
     words: CarWords | None = None
@@ -148,7 +148,7 @@ class CarMirror(Mirror):
 
     def takes_over(self, keys: Collection[TokenKey]) -> None:
         """These cars are in my custody: where they stand by who remembers it, for my behaviour to take up."""
-        self.told.update({car: one for car, one in self._recalled.items() if car_token(*car) in keys})
+        self.taken_over.update({car: one for car, one in self._recalled.items() if car_token(*car) in keys})
 
 
 @dataclass

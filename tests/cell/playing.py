@@ -24,7 +24,7 @@ M = TypeVar("M", bound=Message)
 
 
 def cell(
-    *wishes: GoalDemand,
+    *goals: GoalDemand,
     arms: tuple[Arm, ...] = ARMS,
     obstacles: tuple[Area, ...] = (),
     desks: tuple[int, ...] = (DESK,),
@@ -39,7 +39,7 @@ def cell(
         machines=dict(sorted(machines.items())),
         arms={one.node_id: one for one in arms},
         obstacles=obstacles,
-        wishes=wishes or (GoalDemand(0, GOAL.start, GOAL.end),),
+        goals=goals or (GoalDemand(0, GOAL.start, GOAL.end),),
     )
 
 
@@ -84,7 +84,9 @@ class Scene:
         assert self.played.is_over
 
 
-def wish(start: tuple[float, float], end: tuple[float, float], *, at_s: float = 0, within_s: int = 0) -> GoalDemand:
+def goal_demand(
+    start: tuple[float, float], end: tuple[float, float], *, at_s: float = 0, within_s: int = 0
+) -> GoalDemand:
     """A goal by metres and seconds."""
     one, other = (Point(round(1000 * x), round(1000 * y)) for x, y in (start, end))
     return GoalDemand(round(1000 * at_s), one, other, within_s * 1000)

@@ -41,7 +41,7 @@ def test_p55_the_whole_shipped_day_has_82_cars_at_52_stalls_and_holds_the_day_of
 def test_the_busiest_hour_of_the_shipped_day_is_found_from_its_events() -> None:
     whole = Demand.from_sessions(shipped=WHOLE_DAY)
     window = busiest_hour(whole)
-    assert window.told(whole) == "2019-07-24 06:34 to 07:34"
+    assert window.described(whole) == "2019-07-24 06:34 to 07:34"
     events = [time_us for stay in whole.stays for time_us in (stay.arrival_us, stay.departure_us or 0)]
 
     def busy(begin_us: int) -> int:
@@ -59,7 +59,7 @@ def test_departures_count_as_much_as_arrivals_and_the_first_of_equal_hours_wins(
 def test_the_two_way_hour_of_the_shipped_day_has_cars_that_come_and_cars_that_go() -> None:
     whole = Demand.from_sessions(shipped=WHOLE_DAY)
     window = two_way_hour(whole)
-    assert choose_window(whole, "two-way") == window and window.told(whole) == "2019-07-24 15:31 to 16:31"
+    assert choose_window(whole, "two-way") == window and window.described(whole) == "2019-07-24 15:31 to 16:31"
     assert sum(window.begin_us <= stay.arrival_us < window.end_us for stay in whole.stays) == 9
     assert sum(window.begin_us <= (stay.departure_us or 0) < window.end_us for stay in whole.stays) == 21
     one_way = demand((0, None), (10, None), (200, 900))
@@ -112,8 +112,8 @@ def test_a_window_that_is_none_gets_one_clear_line(text: str) -> None:
 
 def test_a_window_over_midnight_tells_both_days() -> None:
     whole = Demand.from_sessions(shipped=WHOLE_DAY)
-    assert choose_window(whole, "23:30").told(whole) == "2019-07-24 23:30 to 2019-07-25 00:30"
-    assert choose_window(demand((1, None)), "00:00").told(demand()) == "00:00 to 01:00"
+    assert choose_window(whole, "23:30").described(whole) == "2019-07-24 23:30 to 2019-07-25 00:30"
+    assert choose_window(demand((1, None)), "00:00").described(demand()) == "00:00 to 01:00"
 
 
 def test_p55_the_densest_five_minutes_of_arrivals() -> None:

@@ -11,7 +11,7 @@ from onboard.core.authority import TokenBook
 from onboard.core.negotiation import Negotiation, Proposal
 from onboard.core.site import Machine, Segment, Site
 from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
-from onboard.systems.car_park.program import Program, ProgramStep
+from onboard.systems.car_park.program import CarStep, Program
 from onboard.ways.mirror import WayFleet, WayMirror
 from onboard.ways.reservations import FOREVER
 from onboard.ways.sipp import Route, Visit, plan_route
@@ -54,7 +54,7 @@ class Robot(NamedTuple):
         return self.giving_way.heed(itinerary.sender, now_us)
 
 
-def robot(site: WaySite, node: int, steps: list[ProgramStep], *, award_ms: int = 0) -> Robot:
+def robot(site: WaySite, node: int, steps: list[CarStep], *, award_ms: int = 0) -> Robot:
     machine = Machine(node, f"MR{node}", KindCode.ROBOT, Segment(ALLEY, 1))
     mirror = WayMirror(site, node)
     negotiation = Negotiation(node, KindCode.ROBOT, site.timing, Nobody(), boot=1)
@@ -73,12 +73,12 @@ def tell_all(robots: list[Robot]) -> None:
                 other.fleet.mirror.on_itinerary(one.told(), 0)
 
 
-def travel(from_index: int, to_index: int, begin_ms: int, end_ms: int) -> ProgramStep:
-    return ProgramStep(LegAction.TRAVEL, ALLEY, from_index, to_index, begin_ms * MS, end_ms * MS)
+def travel(from_index: int, to_index: int, begin_ms: int, end_ms: int) -> CarStep:
+    return CarStep(LegAction.TRAVEL, ALLEY, from_index, to_index, begin_ms * MS, end_ms * MS)
 
 
-def stand(index: int, begin_ms: int, end_ms: int) -> ProgramStep:
-    return ProgramStep(LegAction.STAND, ALLEY, index, index, begin_ms * MS, end_ms * MS)
+def stand(index: int, begin_ms: int, end_ms: int) -> CarStep:
+    return CarStep(LegAction.STAND, ALLEY, index, index, begin_ms * MS, end_ms * MS)
 
 
 def pair(first_ms: int = 200, second_ms: int = 300) -> tuple[Robot, Robot]:
@@ -180,7 +180,7 @@ def test_what_is_over_means_nothing() -> None:
 # --- any plans, any delays -------------------------------------------------------------------------------------------
 
 
-def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) -> list[ProgramStep] | None:
+def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) -> list[CarStep] | None:
     """A route of one robot around all others': to work somewhere, and to stand on a floor of its own."""
     mirror = WayMirror(way_site(place), node)
     for other in robots:
@@ -196,7 +196,7 @@ def planned(chance: random.Random, node: int, robots: list[Robot], place: Site) 
     if not isinstance(route, Route):
         return None
     return [
-        ProgramStep(leg.action, leg.track, leg.from_index, leg.to_index, leg.begin_us, leg.end_us) for leg in route.legs
+        CarStep(leg.action, leg.track, leg.from_index, leg.to_index, leg.begin_us, leg.end_us) for leg in route.legs
     ]
 
 
@@ -237,7 +237,7 @@ def test_a_hop_out_of_a_spur_has_no_time_to_spare() -> None:
     # It holds the mouth from its very begin: a delay of who passes there before is answered in full.
     site = line_site(9, 10, QUICK, 10, spur_at=3)
     one = robot(site, FIRST, [stand(1, 0, 200), travel(1, 8, 200, 280)])
-    inside = ProgramStep(LegAction.STAND, SPUR, 1, 1, 0, 300 * MS)
+    inside = CarStep(LegAction.STAND, SPUR, 1, 1, 0, 300 * MS)
     two = robot(site, SECOND, [inside, travel(3, 3, 300, 320)])
     tell_all([one, two])
     two.program.current = 1

@@ -6,7 +6,7 @@ from onboard.core.authority import station_token
 from onboard.core.effects import Record
 from onboard.core.site import Station
 from onboard.holon.holon import Holon
-from onboard.systems.car_park.program import CarHandling, ProgramStep, StationWork, to_itinerary
+from onboard.systems.car_park.program import CarHandling, CarStep, StationWork, to_itinerary
 from onboard.systems.car_park.recovery import JournalRecovery
 from onboard.systems.registry import factory_for
 from tests.kinds.board import AWARDED, CALL, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, TASK, Board
@@ -35,9 +35,9 @@ def rival(stamp_ms: int) -> Itinerary:
     work = StationWork(CarHandling.LEAVE, PLACE, RIVAL, 2_700, CALL)
     at = PLACE.index
     steps = [
-        ProgramStep(LegAction.TRAVEL, 1, 11, at, 60_000_000, 70_000_000),
-        ProgramStep(LegAction.WORK, 1, at, at, 70_000_000, 90_000_000, work),
-        ProgramStep(LegAction.TRAVEL, 1, at, 12, 90_000_000, 99_000_000),
+        CarStep(LegAction.TRAVEL, 1, 11, at, 60_000_000, 70_000_000),
+        CarStep(LegAction.WORK, 1, at, at, 70_000_000, 90_000_000, work),
+        CarStep(LegAction.TRAVEL, 1, at, 12, 90_000_000, 99_000_000),
     ]
     return to_itinerary(OTHER, 1, Grade.FIRM, Stamp(stamp_ms, OTHER, 0), steps)
 

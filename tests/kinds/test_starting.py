@@ -5,15 +5,15 @@ import pytest
 from onboard.contract.codes import CallResult, Grade, LegAction, MachineState, Reason, ShuttleMode
 from onboard.contract.messages import Award, Itinerary, Reference, Stamp
 from onboard.core.site import Segment
-from onboard.systems.car_park.program import HandlingPhase, Program, ProgramStep, to_itinerary
+from onboard.systems.car_park.program import CarStep, HandlingPhase, Program, to_itinerary
 from tests.kinds.board import AWARDED, BOOT, MOVED_US, OTHER, PLACE, ROBOT, SITE, STEWARD, TAKEN, Board, Entry
 
 
 def through(index: int) -> Itinerary:
     """The other's plan leads through a position, and stamps it before all others."""
     steps = [
-        ProgramStep(LegAction.TRAVEL, 1, 11, 1, 0, 15_000_000),
-        ProgramStep(LegAction.STAND, 1, 1, 1, 15_000_000, 16_000_000),
+        CarStep(LegAction.TRAVEL, 1, 11, 1, 0, 15_000_000),
+        CarStep(LegAction.STAND, 1, 1, 1, 15_000_000, 16_000_000),
     ]
     assert 1 <= index <= 11
     return to_itinerary(OTHER, 1, Grade.FIRM, Stamp(0, OTHER, 0), steps)
@@ -109,7 +109,7 @@ def test_pushed_away_while_it_listens_it_says_where_it_is_then() -> None:
 
 def test_a_program_without_a_place_refuses_to_be_changed() -> None:
     program = Program(SITE)
-    step = ProgramStep(LegAction.TRAVEL, 1, 1, 5, 0, 1)
+    step = CarStep(LegAction.TRAVEL, 1, 1, 5, 0, 1)
     for change in (
         lambda: program.replace([step], program.stamp),
         lambda: program.shift(1),

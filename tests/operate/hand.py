@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from bus_sim.sites import find_site
 from onboard.contract.codes import CONTRACT_VERSION, MachineState, Reason
 from onboard.contract.messages import Halted, Heartbeat, Message
+from onboard.operate.commands import Maker
 from onboard.operate.order import OperatorCommand
 from onboard.operate.park import Park
-from onboard.operate.wishes import Maker
 
 SITE = find_site("small")
 ALL = tuple(SITE.machines)

@@ -4,9 +4,9 @@ import asyncio
 from dataclasses import dataclass, field
 
 from bus_sim.systems.car_park.simulation import Simulation
+from onboard.operate.commands import Maker
 from onboard.operate.order import OperatorCommand
 from onboard.operate.station import OperatorStation
-from onboard.operate.wishes import Maker
 
 
 @dataclass

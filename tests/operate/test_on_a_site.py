@@ -9,9 +9,9 @@ from onboard.contract.codes import MachineState, ManualMode, Reason
 from onboard.contract.messages import Blocked, Clear, Heartbeat, ManualOrder
 from onboard.core.site import Segment
 from onboard.operate.blocks import Mark
+from onboard.operate.commands import Maker
 from onboard.operate.holds import HoldCommand
 from onboard.operate.status import Status
-from onboard.operate.wishes import Maker
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
 

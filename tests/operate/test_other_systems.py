@@ -32,10 +32,10 @@ from onboard.contract.messages import (
     TokenRequest,
 )
 from onboard.core.site import Site
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
 from onboard.operate.park import Park
 from onboard.operate.status import Status
-from onboard.operate.wishes import CommandRequest, maker_of
 from tests.faults.systems import PLANTS
 
 AT_S, OFF_S, END_S = 30, 3, 60

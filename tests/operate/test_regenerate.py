@@ -21,8 +21,8 @@ from onboard.contract.messages import (
 from onboard.core.assignments import assignment_digest
 from onboard.core.authority import TokenKey, genesis_holder, segment_token
 from onboard.core.site import Segment
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
-from onboard.operate.wishes import CommandRequest, maker_of
 from onboard.ways.site import way_site
 from tests.operate.hand import ALL, SECOND, SITE, Hand, beat, halted
 
@@ -110,9 +110,9 @@ WORDS = (
 
 
 def started(
-    *words: Message, wish: CommandRequest | None = None, without: tuple[int, ...] = ()
+    *words: Message, command: CommandRequest | None = None, without: tuple[int, ...] = ()
 ) -> tuple[Hand, Machines]:
-    make = maker_of(SITE, wish or CommandRequest("regenerate", machine="MR1", body=("p(1,3)", "p(1,4)")), 1)
+    make = maker_of(SITE, command or CommandRequest("regenerate", machine="MR1", body=("p(1,3)", "p(1,4)")), 1)
     hand = Hand(make, [beat(node) for node in ALL if node not in without]).begin()
     return hand, Machines(hand, *(words or WORDS), without=without)
 
@@ -158,7 +158,7 @@ def test_the_lost_rights_are_made_anew_above_every_version_and_nobody_elses() ->
     ids=["another robot's", "its steward's, that never moved"],
 )
 def test_a_body_where_somebody_else_has_the_right_to_be_is_a_mistake(body: Segment, wrong: str, whose: str) -> None:
-    hand, machines = started(wish=CommandRequest("regenerate", machine="MR1", body=("p(1,3)", str(body))))
+    hand, machines = started(command=CommandRequest("regenerate", machine="MR1", body=("p(1,3)", str(body))))
     machines.turn(5)
     told = f"--body {wrong}: {whose} holds it, so MR1 cannot be there: look again; "
     assert told + "by the words of the others it may be in p(1,2), p(1,3), p(1,4)" in hand.lines
@@ -220,7 +220,7 @@ def test_a_car_goes_to_who_keeps_its_place() -> None:
 def test_an_absent_body_on_a_platform_keeps_platform_and_gate_from_all() -> None:
     lift = SITE.machine("ER1").home.track
     words = (seen(ER1, Segment(lift, 0), 4, MR1), seen(ER1, Segment(lift, 255), 5, MR1))
-    hand, machines = started(*words, wish=absent("ER1"), without=(MR1,))
+    hand, machines = started(*words, command=absent("ER1"), without=(MR1,))
     machines.turn(2)
     hand.order.answered(hand.now_us, agrees=True)
     machines.turn(5)
@@ -229,8 +229,8 @@ def test_an_absent_body_on_a_platform_keeps_platform_and_gate_from_all() -> None
 
 def test_a_lost_steward_gets_back_what_it_did_not_give_away() -> None:
     given = Segment(1, 6)
-    wish = CommandRequest("regenerate", machine=SITE.machines[STEWARD].name)
-    hand, machines = started(held(MR2, given, 3), wish=wish)
+    command = CommandRequest("regenerate", machine=SITE.machines[STEWARD].name)
+    hand, machines = started(held(MR2, given, 3), command=command)
     machines.turn(2)
     hand.order.answered(hand.now_us, agrees=True)
     machines.turn(10)
@@ -329,7 +329,7 @@ def absent(body: str = "p(1,3)") -> CommandRequest:
 
 
 def test_an_absent_machine_is_typed_by_name_and_its_slots_stay_blocked_and_nobodys() -> None:
-    hand, machines = started(*WORDS[1:], wish=absent(), without=(MR1,))
+    hand, machines = started(*WORDS[1:], command=absent(), without=(MR1,))
     assert hand.order.answer == "MR1" and "padlock" in hand.order.question
     machines.turn(2)
     assert hand.order.answer == ""
@@ -342,7 +342,7 @@ def test_an_absent_machine_is_typed_by_name_and_its_slots_stay_blocked_and_nobod
 
 
 def test_an_absent_machine_that_lives_is_found_out() -> None:
-    hand, machines = started(*WORDS[1:], wish=absent(), without=(MR1,))
+    hand, machines = started(*WORDS[1:], command=absent(), without=(MR1,))
     machines.turn(2)
     hand.hear(Progress(MR1, 1, 0, 1, 3, 0, 0))
     machines.turn(5)
@@ -389,7 +389,7 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("wish", "told"), MISTAKES)
-def test_a_mistake_is_told_before_anything_is_said(wish: CommandRequest, told: str) -> None:
+@pytest.mark.parametrize(("command", "told"), MISTAKES)
+def test_a_mistake_is_told_before_anything_is_said(command: CommandRequest, told: str) -> None:
     with pytest.raises(OperateError, match=told):
-        maker_of(SITE, wish, 1)
+        maker_of(SITE, command, 1)

@@ -6,7 +6,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import Reason
 from onboard.contract.messages import EmergencyStop, Go, Halted, Progress
-from onboard.operate.wishes import CommandRequest, maker_of
+from onboard.operate.commands import CommandRequest, maker_of
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
 
@@ -18,7 +18,7 @@ def played(*orders: tuple[float, CommandRequest], faults: tuple[str, ...] = ()) 
     told: list[Played] = []
 
     def before(simulation: Simulation) -> None:
-        told.extend(operates(simulation, at_s, maker_of(SITE, wish, 1)) for at_s, wish in orders)
+        told.extend(operates(simulation, at_s, maker_of(SITE, command, 1)) for at_s, command in orders)
 
     def plant(simulation: Simulation) -> None:
         arm(simulation, [parse_injection(fault) for fault in faults])

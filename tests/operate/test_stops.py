@@ -4,8 +4,8 @@ import pytest
 
 from onboard.contract.codes import MachineState, Reason
 from onboard.contract.messages import EmergencyStop, Go, ManualOrder
+from onboard.operate.commands import CommandRequest, maker_of
 from onboard.operate.names import OperateError
-from onboard.operate.wishes import CommandRequest, maker_of
 from tests.operate.hand import ALL, SITE, Hand, beat, halted
 
 STOPPED = Reason.EMERGENCY_STOP

@@ -8,7 +8,7 @@ from bus_sim.sites import find_site
 from bus_sim.systems.car_park.simulation import Simulation
 from onboard.contract.codes import MachineState, TaskPhase
 from onboard.contract.messages import Award, Heartbeat, Progress, TaskReport
-from onboard.operate.wishes import CommandRequest, maker_of
+from onboard.operate.commands import CommandRequest, maker_of
 from tests.operate.played import Played, operates
 from tests.system.scene import Scene, play, stays
 

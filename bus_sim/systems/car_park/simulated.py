@@ -10,7 +10,7 @@ from bus_sim.demand import DemandError
 from bus_sim.faults import operators
 from bus_sim.options import RunOptions
 from bus_sim.systems.car_park import drives, people
-from bus_sim.systems.car_park.day import DayOptions, asked_day, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, asked_day, choose_demand
 from bus_sim.systems.car_park.demand import Arrivals
 from bus_sim.systems.car_park.forged import ForgedRetrievals
 from bus_sim.systems.car_park.plant.plant import Plant
@@ -76,16 +76,16 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
     # --- a run -------------------------------------------------------------------------------------------------
 
     def stage(self, site: CarPark, options: RunOptions, loop: VirtualTimeLoop) -> CarParkStage:
-        """See ``SimulatedSystem``; ``options.demand`` is a ``DayOptions``, or ``Arrivals`` by chance."""
+        """See ``SimulatedSystem``; ``options.demand`` is a ``ParkingDay``, or ``Arrivals`` by chance."""
         coming = _coming(site, options)
         dated = replace(options, epoch_us=round(coming.zero.timestamp() * 1_000_000))
-        return CarParkStage(build(site, dated if isinstance(options.demand, DayOptions) else options, loop), coming)
+        return CarParkStage(build(site, dated if isinstance(options.demand, ParkingDay) else options, loop), coming)
 
-    def asked(self, site: CarPark, args: Namespace, given: Mapping[str, object], *, live: bool) -> DayOptions:
+    def asked(self, site: CarPark, args: Namespace, given: Mapping[str, object], *, live: bool) -> ParkingDay:
         """See ``SimulatedSystem``."""
         return asked_day(args, live=live)
 
-    def speed(self, demand: DayOptions, *, web: bool, terminal: bool) -> float | None:
+    def speed(self, demand: ParkingDay, *, web: bool, terminal: bool) -> float | None:
         """See ``SimulatedSystem``."""
         return WINDOW_SPEED if demand.window is not None else HAND_SPEED if web or demand.by_hand else None
 
@@ -140,7 +140,7 @@ class CarParkSystem(SimulatedSystem[CarPark, Plant]):
 
 def _coming(site: CarPark, options: RunOptions) -> ComingCustomers:
     wanted = options.demand
-    if not isinstance(wanted, DayOptions):
+    if not isinstance(wanted, ParkingDay):
         return ComingCustomers((wanted or Arrivals()).demand(options.seed))
     demand = choose_demand(wanted, site, options.seed)
     window = choose_window(demand, wanted.window) if wanted.window is not None else None

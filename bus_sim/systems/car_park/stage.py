@@ -160,7 +160,7 @@ class CarParkStage(SystemStage[Plant]):
         assert window is not None and self.shown_us is not None, "only what comes before a window is hurried"
         if wall_s is not None:
             speed = self.run.options.speed or "unlimited"
-            return f"warmed up in {wall_s:.1f} s; now {window.told(demand)} at speed {speed}"
+            return f"warmed up in {wall_s:.1f} s; now {window.described(demand)} at speed {speed}"
         before, until = sum(stay.arrival_us < window.begin_us for stay in demand.stays), self.shown_us[0]
         span = f"from {self._clock.at(0)} to {self._clock.at(until)}"
         return f"warm-up {span}, as fast as possible: {before} cars come before"
@@ -242,7 +242,7 @@ class CarParkStage(SystemStage[Plant]):
         if coming.window is None:
             return None
         begin_us = coming.window.begin_us if ended.is_warm else ended.begin_us - coming.origin_us
-        played = DayWindow(begin_us, self.run.loop.now_us() - coming.origin_us).told(coming.demand)
+        played = DayWindow(begin_us, self.run.loop.now_us() - coming.origin_us).described(coming.demand)
         return played if ended.is_warm else f"warm-up, {played}"
 
     def _burst(self, ended: EndedRun) -> BurstFigures | None:

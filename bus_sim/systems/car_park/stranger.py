@@ -62,7 +62,7 @@ class _StandingRobot(Plain):
     kind: KindCode = KindCode.ROBOT
     state: MachineState = MachineState.IDLE
     silent: bool = False
-    told: Itinerary | None = field(default=None)
+    itinerary: Itinerary | None = field(default=None)
     _version: int = 0
 
     def start(self, now_us: int) -> list[Effect]:
@@ -74,7 +74,7 @@ class _StandingRobot(Plain):
         """Its place and its plan."""
         home = self.fleet.machine.home
         progress = Progress(self.fleet.node_id, self._version, 0, home.track, home.index, 0, 0)
-        return [Send(progress), *([] if self.told is None else [Send(self.told)])]
+        return [Send(progress), *([] if self.itinerary is None else [Send(self.itinerary)])]
 
     def negotiated(self, event: NegotiationEvent, now_us: int) -> list[Effect]:
         """A task is won: a plan is told where it tells anything."""
@@ -97,8 +97,8 @@ class _StandingRobot(Plain):
 
     def _say(self, legs: tuple[Leg, ...], stamp: Stamp) -> None:
         self._version = successor(self._version, 8)
-        self.told = Itinerary(self.fleet.node_id, self._version, Grade.FIRM, stamp, legs)
-        self.fleet.mirror.on_itinerary(self.told, 0)
+        self.itinerary = Itinerary(self.fleet.node_id, self._version, Grade.FIRM, stamp, legs)
+        self.fleet.mirror.on_itinerary(self.itinerary, 0)
 
 
 @dataclass

@@ -25,7 +25,7 @@ class DayWindow:
     begin_us: int
     end_us: int
 
-    def told(self, demand: Demand) -> str:
+    def described(self, demand: Demand) -> str:
         """Both ends in local time, with the day where the demand has one and the window leaves its first."""
         zero = demand.zero or datetime(2000, 1, 1)  # noqa: DTZ001  # a demand without a date: only its clock is shown
         begin, end = (zero + timedelta(microseconds=time_us) for time_us in (self.begin_us, self.end_us))

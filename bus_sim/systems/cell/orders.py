@@ -21,8 +21,8 @@ ORDER_S = 60.0
 def draw(site: Cell, orders: OrderArrivals, seed: int) -> Cell:
     """The site with drawn goals; none has a deadline, as faults may last longer than any."""
     chance = orders.chance(site.name, seed)
-    wishes = [GoalDemand(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
-    return replace(site, wishes=tuple(wishes))
+    goals = [GoalDemand(at_ms, _point(site, chance), _point(site, chance)) for at_ms in orders.moments_ms(chance)]
+    return replace(site, goals=tuple(goals))
 
 
 def _point(site: Cell, chance: random.Random) -> Point:
@@ -43,10 +43,10 @@ def _is_on(point: Point, x0_mm: int, y0_mm: int, x1_mm: int, y1_mm: int) -> bool
 
 def last_s(site: Cell) -> float:
     """When the last order comes, s after power-up."""
-    return last_of((one.at_ms for one in site.wishes), ORIGIN_US)
+    return last_of((one.at_ms for one in site.goals), ORIGIN_US)
 
 
 def count(plant: CellPlant) -> Tally:
     """What became of the goals."""
-    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.wishes)
+    done, refused, expected = OrderResult.DONE, OrderResult.REFUSED, len(plant.site.goals)
     return tally_of(plant.entries, done, refused, expected, plant.timers.now_us())

@@ -189,7 +189,7 @@ class GoalEntry:
     """One order at the counter and what became of it."""
 
     number: int
-    wish: GoalDemand
+    demand: GoalDemand
     begun_us: int
     result: OrderResult | None = None
     cost_mm: int = 0
@@ -206,20 +206,20 @@ class GoalCounter:
         self._link = link
         link.subscribe(self._on_message)
 
-    def add(self, wish: GoalDemand) -> None:
+    def add(self, demand: GoalDemand) -> None:
         """Somebody wants a part carried, now."""
         plant = self._plant
-        entry = GoalEntry(len(self.entries) + 1, wish, plant.timers.now_us())
+        entry = GoalEntry(len(self.entries) + 1, demand, plant.timers.now_us())
         self.entries.append(entry)
-        plant.parts.lying[Reference(self.node_id, entry.number)] = wish.start
+        plant.parts.lying[Reference(self.node_id, entry.number)] = demand.start
         self._say(entry)
 
     def _say(self, entry: GoalEntry) -> None:
         if entry.result is not None:
             return
-        wish = entry.wish
-        self._link.send(OrderFrom(self.node_id, entry.number, *wish.start))
-        self._link.send(OrderTo(self.node_id, entry.number, *wish.end, wish.within_ms))
+        demand = entry.demand
+        self._link.send(OrderFrom(self.node_id, entry.number, *demand.start))
+        self._link.send(OrderTo(self.node_id, entry.number, *demand.end, demand.within_ms))
         self._plant.timers.call_at(self._plant.timers.now_us() + ENTRY_REPEAT_US, lambda: self._say(entry))
 
     def _on_message(self, message: Message, now_us: int) -> None:
@@ -248,20 +248,20 @@ class CellPlant:
         self.counters = {node: GoalCounter(node, self, links[node]) for node in site.desks}
         #: Who took which part up, in order of time.
         self.takes: list[tuple[Reference, int]] = []
-        self._to_come = len(site.wishes)
+        self._to_come = len(site.goals)
 
     def start(self) -> None:
         """Power on, and let the demand come."""
         for device in self.devices.values():
             device.start()
         desks = list(self.counters.values())
-        for number, wish in enumerate(self.site.wishes):
+        for number, demand in enumerate(self.site.goals):
             counter = desks[number % len(desks)]
-            self.timers.call_at(ORIGIN_US + wish.at_ms * 1000, partial(self._come, counter, wish))
+            self.timers.call_at(ORIGIN_US + demand.at_ms * 1000, partial(self._come, counter, demand))
 
-    def _come(self, counter: GoalCounter, wish: GoalDemand) -> None:
+    def _come(self, counter: GoalCounter, demand: GoalDemand) -> None:
         self._to_come -= 1
-        counter.add(wish)
+        counter.add(demand)
 
     @property
     def entries(self) -> list[GoalEntry]:
@@ -296,7 +296,7 @@ class CellPlant:
     def check_end(self, part: Reference, entry: GoalEntry) -> None:
         """What was told to be achieved is so; what was refused lies where it lay."""
         lies = self.parts.lying.get(part)
-        wanted = entry.wish.end if entry.result is OrderResult.DONE else entry.wish.start
+        wanted = entry.demand.end if entry.result is OrderResult.DONE else entry.demand.start
         if lies is None or hypot(lies.x_mm - wanted.x_mm, lies.y_mm - wanted.y_mm) > REACH_MM:
             where = f"at {tuple(lies)}" if lies is not None else "in a gripper"
             told = entry.result.name if entry.result is not None else "nothing"

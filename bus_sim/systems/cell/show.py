@@ -57,7 +57,7 @@ def plan(plant: CellPlant, view: CellView) -> str:
     lines = [*sheet.lines(), ""]
     for entry in plant.entries:
         word = entry.result.name if entry.result is not None else "at the counter"
-        lines.append(f"order {entry.number}: {_place(entry.wish.start)} to {_place(entry.wish.end)}: {word}")
+        lines.append(f"order {entry.number}: {_place(entry.demand.start)} to {_place(entry.demand.end)}: {word}")
     lines.append(f"{now_us / 1e6:8.1f} s   goal messages {view.goal_messages}")
     return "\n".join(lines)
 

@@ -32,7 +32,7 @@ class CellStage(SystemStage[CellPlant]):
 
     def head(self) -> list[str]:
         """See ``SystemStage``."""
-        return [f"{super().head()[0]}, {len(self.plant.site.wishes)} goals"]
+        return [f"{super().head()[0]}, {len(self.plant.site.goals)} goals"]
 
     def listen(self) -> None:
         """See ``SystemStage``."""
@@ -46,9 +46,7 @@ class CellStage(SystemStage[CellPlant]):
     def bring(self, site: Cell, node: int) -> None:
         """See ``SystemStage``."""
         alone = replace(site, arms={node: site.arms[node]})
-        next(iter(self.plant.counters.values())).add(
-            draw(alone, OrderArrivals(1, 1.0), self.run.options.seed).wishes[0]
-        )
+        next(iter(self.plant.counters.values())).add(draw(alone, OrderArrivals(1, 1.0), self.run.options.seed).goals[0])
 
     def power_up(self, node: int) -> None:
         """See ``SystemStage``."""
@@ -59,20 +57,20 @@ class CellStage(SystemStage[CellPlant]):
         """See ``SystemStage``."""
         return plan(self.plant, self.view)
 
-    def told(self) -> list[str]:
+    def remarks(self) -> list[str]:
         """The paper's text for each goal, then the picture."""
         lines = []
         for node, counter in self.plant.counters.items():
             for entry in counter.entries:
                 text = self.view.text(Reference(node, entry.number))
                 lines += ["", f"Goal {entry.number}", *text.removesuffix("\n").split("\n")]
-        return [*lines, *super().told()]
+        return [*lines, *super().remarks()]
 
     def source(self) -> "RunSource":
         """See ``SystemStage``."""
         from bus_sim.web.orders import let_order  # noqa: PLC0415  # its libraries are an extra
 
-        return let_order(super().source(), self.plant.counters, self.plant.site.wishes)
+        return let_order(super().source(), self.plant.counters, self.plant.site.goals)
 
     def figures(self) -> dict[str, object]:
         """What a cell is judged by: goals, time to achieve them, cost beside the exhaustive optimum, goal messages."""
@@ -80,7 +78,7 @@ class CellStage(SystemStage[CellPlant]):
         done = [entry for entry in plant.entries if entry.result is OrderResult.DONE and entry.ended_us is not None]
         seconds = [(entry.ended_us - entry.begun_us) / 1e6 for entry in done if entry.ended_us is not None]
         in_time = [
-            s for s, e in zip(seconds, done, strict=True) if not e.wish.within_ms or s * 1000 <= e.wish.within_ms
+            s for s, e in zip(seconds, done, strict=True) if not e.demand.within_ms or s * 1000 <= e.demand.within_ms
         ]
         behaviours = [controller.holon.behaviour for controller in self.run.controllers.values()]
         generations = [one.generation for one in behaviours if isinstance(one, ArmRobot)]
@@ -106,6 +104,6 @@ def _over_optimum(plant: CellPlant) -> float:
     if entry is None or not entry.cost_mm:
         return 0.0
     homes = {node: arm.home for node, arm in site.arms.items()}
-    goal = Goal(Reference(0, 1), Reference(0, 1), entry.wish.start, entry.wish.end)
+    goal = Goal(Reference(0, 1), Reference(0, 1), entry.demand.start, entry.demand.end)
     best = ContractTree(tuple(site.arms.values()), homes, site.obstacles).solve(goal)
     return entry.cost_mm / 1000 / best.cost if best is not None else 0.0

@@ -11,7 +11,7 @@ from onboard.contract.messages import CallForProposals
 from onboard.core.negotiation import NeededAnswers, Proposal, SubCallAnswer
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.systems.car_park.generation import Alternative, CarParkGeneration, Solution
-from onboard.systems.car_park.program import ProgramStep
+from onboard.systems.car_park.program import CarStep
 from onboard.systems.car_park.ride_calls import answer_for, ride_terms, rides_of
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.lifts import platform
@@ -92,7 +92,7 @@ class AskingGeneration(CarParkGeneration):
         return self._next(call, solution, alternatives, answers, number, now_us)
 
     def _is_promised(
-        self, call: CallForProposals, step: ProgramStep, answers: tuple[SubCallAnswer, ...], now_us: int
+        self, call: CallForProposals, step: CarStep, answers: tuple[SubCallAnswer, ...], now_us: int
     ) -> bool:
         answer = answer_for(ride_terms(self.site, call, step), answers)
         return answer is not None and abs(from_bus_ms(answer.cost, now_us) - step.end_us) <= TOLERANCE_US

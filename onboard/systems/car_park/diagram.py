@@ -66,26 +66,26 @@ class Watcher:
         self._offset_us = 0
         self._started = False
 
-    def feed(self, said: LoggedMessage) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus."""
-        if self._until_us is not None and said.time_us > self._until_us:
+        if self._until_us is not None and logged.time_us > self._until_us:
             return
         if not self._started:
             self._started = True
-            self.picture.first_us = said.time_us if self._from_us is None else self._from_us
-        self.picture.last_us = max(self.picture.last_us, said.time_us)
-        match said.message:
+            self.picture.first_us = logged.time_us if self._from_us is None else self._from_us
+        self.picture.last_us = max(self.picture.last_us, logged.time_us)
+        match logged.message:
             case BusTime():
-                self._offset_us = said.time_us - said.message.bus_time_us
+                self._offset_us = logged.time_us - logged.message.bus_time_us
             case Progress():
-                self._on_progress(said.message, said.time_us)
-            case Itinerary() if said.message.grade is Grade.FIRM:
-                self._end_plan(said.message.sender, said.time_us)
-                self._plans[said.message.sender] = said.time_us, said.message
-            case TokenHeld() if said.message.token_kind is TokenKind.SEGMENT:
-                self._hold(said.message.token, said.message.sender, said.time_us)
-            case TokenGrant() if said.message.token_kind is TokenKind.SEGMENT:
-                self._let_go(_segment(said.message.token), said.time_us, of=said.message.sender)
+                self._on_progress(logged.message, logged.time_us)
+            case Itinerary() if logged.message.grade is Grade.FIRM:
+                self._end_plan(logged.message.sender, logged.time_us)
+                self._plans[logged.message.sender] = logged.time_us, logged.message
+            case TokenHeld() if logged.message.token_kind is TokenKind.SEGMENT:
+                self._hold(logged.message.token, logged.message.sender, logged.time_us)
+            case TokenGrant() if logged.message.token_kind is TokenKind.SEGMENT:
+                self._let_go(_segment(logged.message.token), logged.time_us, of=logged.message.sender)
 
     def finish(self) -> TrackDiagram:
         """The log is over: what is still going on ends with it."""
@@ -175,11 +175,11 @@ def _cut(band: Band, from_us: int, until_us: int) -> Band | None:
 
 
 def watch(
-    site: Site, said: Iterable[LoggedMessage], from_us: int | None = None, until_us: int | None = None
+    site: Site, logged: Iterable[LoggedMessage], from_us: int | None = None, until_us: int | None = None
 ) -> TrackDiagram:
     """What a log of the fleet bus shows, within a time of it."""
     watcher = Watcher(site, from_us, until_us)
-    for one in said:
+    for one in logged:
         if one.is_fleet:
             watcher.feed(one)
     return watcher.finish()
@@ -292,9 +292,9 @@ class TimeSpace:
         """When the last message was heard, time of the log in us."""
         return self._watcher.picture.last_us
 
-    def feed(self, said: LoggedMessage) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus."""
-        self._watcher.feed(said)
+        self._watcher.feed(logged)
 
     def draw(self, start_us: int) -> SvgDrawing:
         """The diagram of all that was heard; its time axis begins at ``start_us``."""

@@ -20,8 +20,8 @@ from onboard.systems.car_park.program import (
     MAX_STEPS,
     STAMP_AHEAD_US,
     CarHandling,
+    CarStep,
     Program,
-    ProgramStep,
     StationWork,
     to_itinerary,
 )
@@ -82,7 +82,7 @@ class Solution(NamedTuple):
     kept: int
     origin: Segment
     start_us: int
-    steps: tuple[ProgramStep, ...]
+    steps: tuple[CarStep, ...]
     finish_us: int
     place: Station
 
@@ -283,7 +283,7 @@ class CarParkGeneration:
 
     def reroute(
         self, origin: Segment, start_us: int, works: list[StationWork], now_us: int
-    ) -> tuple[ProgramStep, ...] | None:
+    ) -> tuple[CarStep, ...] | None:
         """The same work by another way, from standing at ``origin`` at bus time ``start_us``; None where there is none.
 
         Without work the way to another refuge: so a machine that only stands gives way.
@@ -381,7 +381,7 @@ class CarParkGeneration:
         promised |= {solution.place.number for solution in self.tentative.values()}
         return promised
 
-    def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[ProgramStep, ...]:
+    def _steps(self, call: CallForProposals, place: Station, route: Route) -> tuple[CarStep, ...]:
         source, sink = self.ends(call, place)
         works = [
             StationWork(CarHandling.TAKE, source, call.car, call.wheelbase_mm, call),
@@ -400,11 +400,11 @@ def _one_a_segment(places: list[Station]) -> list[Station]:
     return list({place.segment: place for place in reversed(places)}.values())
 
 
-def _steps_of(route: Route, works: list[StationWork]) -> tuple[ProgramStep, ...]:
+def _steps_of(route: Route, works: list[StationWork]) -> tuple[CarStep, ...]:
     """The legs of a route as steps, each WORK leg with the next work."""
     ahead = iter(works)
     return tuple(
-        ProgramStep(
+        CarStep(
             leg.action,
             leg.track,
             leg.from_index,

@@ -15,7 +15,7 @@ from enum import Enum
 from onboard.contract.codes import LegAction
 from onboard.core.authority import segment_token
 from onboard.core.serial import ranks_before
-from onboard.systems.car_park.program import Program, ProgramStep
+from onboard.systems.car_park.program import CarStep, Program
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.mirror import WayFleet
 from onboard.ways.passing import TOLERANCE_US
@@ -97,15 +97,15 @@ class GivingWay:
         return answer
 
 
-def _moving(steps: list[ProgramStep]) -> list[tuple[int, ProgramStep]]:
+def _moving(steps: list[CarStep]) -> list[tuple[int, CarStep]]:
     return [(number, step) for number, step in enumerate(steps) if step.action is not LegAction.STAND]
 
 
-def _to_come(steps: list[ProgramStep], number: int) -> int:
+def _to_come(steps: list[CarStep], number: int) -> int:
     return len(_moving(steps[number + 1 :]))
 
 
-def _slack_us(site: WaySite, step: ProgramStep) -> int:
+def _slack_us(site: WaySite, step: CarStep) -> int:
     """How much later than at once a run in hand may still enter what lies ahead, by its planned end."""
     if step.action is not LegAction.TRAVEL:
         return 0

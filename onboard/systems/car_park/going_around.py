@@ -18,7 +18,7 @@ from onboard.systems.car_park import custody
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
 from onboard.systems.car_park.places import PlaceChoice
-from onboard.systems.car_park.program import CarHandling, HandlingPhase, Program, ProgramStep, StationWork, to_itinerary
+from onboard.systems.car_park.program import CarHandling, CarStep, HandlingPhase, Program, StationWork, to_itinerary
 from onboard.systems.car_park.recovery import forfeited_record, sink_record
 from onboard.systems.car_park.standoff import Standoff
 from onboard.systems.car_park.travel import Carriage
@@ -49,7 +49,7 @@ class GoingAround:
     generation: CarParkGeneration
     carriage: Carriage
     shuttle: ShuttleWork
-    take_up: Callable[[int, Sequence[ProgramStep], list[StationWork], int], list[Effect]]
+    take_up: Callable[[int, Sequence[CarStep], list[StationWork], int], list[Effect]]
     #: Tasks given back, with why, how often to say so still, and when next.
     given_back: dict[Reference, tuple[Reason, int, int]] = field(default_factory=dict)
     #: Whether the drive does not do what it is told.
@@ -312,7 +312,7 @@ class GoingAround:
         done = [step.work for step in self.program.remaining[:kept] if step.work is not None]
         return [work for work in works if work not in done]
 
-    def _is_hindered(self, steps: Sequence[ProgramStep], now_us: int) -> bool:
+    def _is_hindered(self, steps: Sequence[CarStep], now_us: int) -> bool:
         """Whether steps lead through an obstacle, but for slots whose tokens I hold myself."""
         if not steps:
             return False

@@ -17,7 +17,7 @@ from onboard.core.records import BootRecord
 from onboard.core.serial import is_newer
 from onboard.core.site import Segment, Station
 from onboard.systems.car_park.bay_memory import cars_at
-from onboard.systems.car_park.program import CarHandling, HandlingPhase, ProgramStep, StationWork
+from onboard.systems.car_park.program import CarHandling, CarStep, HandlingPhase, StationWork
 from onboard.systems.car_park.records import (
     AwardRecord,
     FloorRecord,
@@ -66,7 +66,7 @@ def sink_record(task: Reference, station: Station) -> Record:
     return Record(SinkRecord(task, station.number))
 
 
-def ride_record(step: ProgramStep) -> Record:
+def ride_record(step: CarStep) -> Record:
     """A ride begins: from now on the floor is the lift's business."""
     return Record(RidingRecord(step.track, step.from_index, step.to_index))
 
@@ -146,12 +146,12 @@ class JournalRecovery:
                 self.floor, self.riding = record.track, None
 
     @property
-    def ride(self) -> ProgramStep | None:
+    def ride(self) -> CarStep | None:
         """The ride that the restart fell into, without its times."""
         if self.riding is None:
             return None
         lift, board, leave = self.riding
-        return ProgramStep(LegAction.RIDE, lift, board, leave, 0, 0)
+        return CarStep(LegAction.RIDE, lift, board, leave, 0, 0)
 
     def contradiction(self, place: Segment | None, shuttle: ShuttleState) -> str:
         """What the sensors say that the journal cannot explain, in words; empty where they agree.

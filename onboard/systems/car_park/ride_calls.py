@@ -7,18 +7,18 @@ from onboard.contract.codes import Criterion, KindCode, LegAction, Operation
 from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.effects import Effect
 from onboard.core.negotiation import RequestedTerms, SubCallAnswer
-from onboard.systems.car_park.program import ProgramStep
+from onboard.systems.car_park.program import CarStep
 from onboard.ways.lifts import sill
 from onboard.ways.mirror import WayFleet
 from onboard.ways.site import WaySite
 
 
-def rides_of(steps: Iterable[ProgramStep]) -> list[ProgramStep]:
+def rides_of(steps: Iterable[CarStep]) -> list[CarStep]:
     """The rides of a plan, in order."""
     return [step for step in steps if step.action is LegAction.RIDE]
 
 
-def ride_terms(site: WaySite, call: CallForProposals, step: ProgramStep) -> RequestedTerms:
+def ride_terms(site: WaySite, call: CallForProposals, step: CarStep) -> RequestedTerms:
     """The call for one ride of a plan for ``call``, wanted when the plan has the carrier stand aboard."""
     return RequestedTerms(
         task=call.task,
@@ -34,7 +34,7 @@ def ride_terms(site: WaySite, call: CallForProposals, step: ProgramStep) -> Requ
 
 
 def calls_after_winning(
-    site: WaySite, call: CallForProposals, steps: Iterable[ProgramStep], confirmed: tuple[SubCallAnswer, ...] = ()
+    site: WaySite, call: CallForProposals, steps: Iterable[CarStep], confirmed: tuple[SubCallAnswer, ...] = ()
 ) -> list[RequestedTerms]:
     """A call for each ride of a plan for the task won by ``call``, but for those that a confirmed option answers."""
     parent = Reference(call.sender, call.call)
@@ -51,7 +51,7 @@ def calls_after_winning(
 def call_lifts(
     fleet: WayFleet,
     call: CallForProposals,
-    steps: Iterable[ProgramStep],
+    steps: Iterable[CarStep],
     now_us: int,
     confirmed: tuple[SubCallAnswer, ...] = (),
 ) -> list[Effect]:

@@ -39,7 +39,7 @@ from onboard.systems.car_park.giving_way import GivingWay, YieldDecision
 from onboard.systems.car_park.going_around import GoingAround
 from onboard.systems.car_park.handling import ShuttleWork, handle
 from onboard.systems.car_park.holding import RobotHold
-from onboard.systems.car_park.program import MAX_STEPS, CarHandling, HandlingPhase, Program, ProgramStep, StationWork
+from onboard.systems.car_park.program import MAX_STEPS, CarHandling, CarStep, HandlingPhase, Program, StationWork
 from onboard.systems.car_park.recovery import JournalRecovery, award_record, floor_record, handled_record, ride_record
 from onboard.systems.car_park.ride_calls import call_lifts
 from onboard.systems.car_park.riding import Riding
@@ -102,7 +102,7 @@ class ParkingRobot:
         self.carriage = Carriage(self.fleet, self.fleet.machine.home.track)
         self.shuttle = ShuttleWork(self.fleet)
         self.carriage.is_clear = lambda: self.shuttle.is_home
-        self.carriage.way_on = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
+        self.carriage.route_ahead = lambda: way_to_refuge(self.fleet.site, self.program.remaining[1:])
         self.riding = Riding(self.fleet)
         self.giving_way = GivingWay(self.fleet, self.program)
         self.recovery = JournalRecovery.read(self.fleet.node_id, self.fleet.entries)
@@ -204,7 +204,7 @@ class ParkingRobot:
         gone = self.going_around.lose(task)
         return gone + (self.going_around.drop([task], now_us) if self.starting.is_over else [])
 
-    def _take_up(self, kept: int, steps: Sequence[ProgramStep], works: list[StationWork], now_us: int) -> list[Effect]:
+    def _take_up(self, kept: int, steps: Sequence[CarStep], works: list[StationWork], now_us: int) -> list[Effect]:
         """A program made anew for the same or fewer tasks, under the same stamp."""
         rest = [*self.program.remaining[:kept], *steps]
         if not kept:
@@ -369,9 +369,7 @@ class ParkingRobot:
                 mine = [self._report(task, TaskPhase.DONE, station), *mine]
         return mine
 
-    def _started(
-        self, planned: tuple[ProgramStep, ...] | None, calls: list[CallForProposals], now_us: int
-    ) -> list[Effect]:
+    def _started(self, planned: tuple[CarStep, ...] | None, calls: list[CallForProposals], now_us: int) -> list[Effect]:
         """The start is over, and the program taken up: tell the plan, and call for rides in what was planned now."""
         # What a restart has left in hand is the first step, and was begun before.
         self._begun = len(planned or ()) < len(self.program.steps)
@@ -401,7 +399,7 @@ class ParkingRobot:
         effects.append(self._report(call.task, TaskPhase.AWARDED, solution.place.number))
         return effects + call_lifts(self.fleet, call, solution.steps, now_us, parts)
 
-    def _begin(self, step: ProgramStep, now_us: int) -> list[Effect]:
+    def _begin(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.TRAVEL:
             self.carriage.go(step.destination)
             if self.fleet.site.tracks[step.track].kind is TrackKind.SPUR:
@@ -420,7 +418,7 @@ class ParkingRobot:
             return []
         return [self._report(work.call.task, TaskPhase.STARTED, work.station.number)]
 
-    def _carry_on(self, step: ProgramStep, now_us: int) -> list[Effect]:
+    def _carry_on(self, step: CarStep, now_us: int) -> list[Effect]:
         if step.action is LegAction.RIDE:
             return self.riding.advance(now_us)
         if step.work is not None:
@@ -429,7 +427,7 @@ class ParkingRobot:
             return [Halt("the carrier should move while its shuttle is out")]
         return self.carriage.advance(now_us)
 
-    def _is_done(self, step: ProgramStep, now_us: int) -> bool:
+    def _is_done(self, step: CarStep, now_us: int) -> bool:
         if step.action is LegAction.TRAVEL:
             return self.carriage.standing_at == step.destination
         if step.action is LegAction.RIDE:
@@ -438,7 +436,7 @@ class ParkingRobot:
             return self.shuttle.phase is HandlingPhase.DONE
         return now_us >= step.end_us
 
-    def _tell_delay(self, step: ProgramStep, now_us: int) -> list[Effect]:
+    def _tell_delay(self, step: CarStep, now_us: int) -> list[Effect]:
         """A step that takes longer than planned moves the rest of the plan while it still lasts, so others can plan."""
         late_us = now_us - step.end_us
         if late_us < OVERDUE_US:
@@ -451,7 +449,7 @@ class ParkingRobot:
         # Whoever waits for rights in vain may have lost the task: its initiator answers then.
         return self._publish(now_us) + ([] if step.work is None else self._announce_start(step.work))
 
-    def _end(self, step: ProgramStep, now_us: int) -> list[Effect]:
+    def _end(self, step: CarStep, now_us: int) -> list[Effect]:
         effects: list[Effect] = []
         if step.work is not None:
             taken = step.work.handling is CarHandling.TAKE

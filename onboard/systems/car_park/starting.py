@@ -18,7 +18,7 @@ from onboard.core.serial import successor, to_bus_ms
 from onboard.core.site import Segment
 from onboard.systems.car_park.generation import CarParkGeneration
 from onboard.systems.car_park.handling import ShuttleWork
-from onboard.systems.car_park.program import ProgramStep, ends_at, standing_itinerary
+from onboard.systems.car_park.program import CarStep, ends_at, standing_itinerary
 from onboard.systems.car_park.recovery import JournalRecovery, floor_record
 from onboard.systems.car_park.riding import Riding
 from onboard.systems.car_park.travel import Carriage
@@ -82,7 +82,7 @@ class Starting:
     body: RobotDevices
     recovery: JournalRecovery
     announce: Callable[[], list[Effect]]
-    started: Callable[[tuple[ProgramStep, ...] | None, list[CallForProposals], int], list[Effect]]
+    started: Callable[[tuple[CarStep, ...] | None, list[CallForProposals], int], list[Effect]]
     stage: StartStage = StartStage.UNPLACED
     place: Segment | None = field(default=None, init=False)
     _due_us: int | None = None
@@ -206,7 +206,7 @@ class Starting:
         self._enter(StartEvent.PLAN)
         return self._go_on(self.place, self._in_hand(self.place, now_us), now_us)
 
-    def _go_on(self, place: Segment, in_hand: tuple[ProgramStep, ...], now_us: int) -> list[Effect]:
+    def _go_on(self, place: Segment, in_hand: tuple[CarStep, ...], now_us: int) -> list[Effect]:
         """Go on from ``place`` with what the journal says is mine, by a way planned anew (rows P14, P20)."""
         works, self.recovery.works = self.recovery.works, []
         stamp = Stamp(to_bus_ms(now_us), self.fleet.node_id, 0)
@@ -225,14 +225,14 @@ class Starting:
         self.generation.program.begin(place, [*in_hand, *(more or ())], stamp, ahead if more is None else ())
         return self.started(more, calls, now_us)
 
-    def _resume(self, step: ProgramStep) -> None:
+    def _resume(self, step: CarStep) -> None:
         """The step in hand goes on from where the journal and the sensors say that it was."""
         if step.work is not None and self.recovery.phase is not None:
             self.body.shuttle.resume(step.work, self.recovery.phase)
         elif step.action is LegAction.RIDE:
             self.body.riding.begin(step.track, step.to_index)
 
-    def _in_hand(self, here: Segment, now_us: int) -> tuple[ProgramStep, ...]:
+    def _in_hand(self, here: Segment, now_us: int) -> tuple[CarStep, ...]:
         """The handling or the ride that the restart fell into, as the first step of the new program."""
         ride = self.recovery.ride
         if ride is not None:
@@ -243,4 +243,4 @@ class Starting:
             return ()
         work = self.recovery.works[0]
         end_us = now_us + self.generation.handling_us(work.station)
-        return (ProgramStep(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)
+        return (CarStep(LegAction.WORK, here.track, here.index, here.index, now_us, end_us, work),)

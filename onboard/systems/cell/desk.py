@@ -23,7 +23,7 @@ from onboard.core.site import Machine, Site
 from onboard.systems.cell.contracts import Goal, part_token
 from onboard.systems.cell.generation import call_terms
 from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.goal_frames import Hearsay
+from onboard.systems.cell.goal_frames import GoalsHeard
 from onboard.systems.cell.records import GoalOrderRecord, GoalStateRecord
 from onboard.work.order_desk import OrderDesk
 from onboard.work.order_life import OrderState, WorkOrder
@@ -62,12 +62,12 @@ class GoalManager(OrderDesk[GoalOrder]):
     max_calls: ClassVar[int] = 3
     takers = KindCode.ARM
 
-    hearsay: Hearsay = field(default_factory=Hearsay)
+    goals_heard: GoalsHeard = field(default_factory=GoalsHeard)
     _half_told: dict[int, OrderFrom] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.fleet.negotiation.is_sound = self.hearsay.is_sound
+        self.fleet.negotiation.is_sound = self.goals_heard.is_sound
 
     def sense(self, message: Message, now_us: int) -> list[Effect]:
         """Orders at the counter; one that was heard before is only answered."""
@@ -80,7 +80,7 @@ class GoalManager(OrderDesk[GoalOrder]):
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Offers, and main contractors' reports."""
-        self.hearsay.hear(message)
+        self.goals_heard.hear(message)
         if isinstance(message, CallForProposals):
             # Who looks for somebody for the rest of a goal does all that it can.
             self.fleet.winners.works(message.sender, message.call, now_us)
@@ -141,7 +141,7 @@ class GoalManager(OrderDesk[GoalOrder]):
 
     def note_price(self, order: GoalOrder) -> None:
         """As the main contractor offered."""
-        offer = self.hearsay.offer(order.winner, order.goal.task)
+        offer = self.goals_heard.offer(order.winner, order.goal.task)
         order.cost = offer.cost if offer is not None else 0.0
 
     def state_record(self, order: GoalOrder) -> GoalStateRecord:
@@ -168,5 +168,5 @@ class GoalManager(OrderDesk[GoalOrder]):
 
     def answer(self, order: GoalOrder) -> Message:
         """With the cost."""
-        number, result = order.task.number, OrderResult[order.told]
+        number, result = order.task.number, OrderResult[order.result_name]
         return OrderAnswer(self.fleet.node_id, number, result, round(1000 * order.cost))

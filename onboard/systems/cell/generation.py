@@ -12,7 +12,7 @@ from onboard.core.site import Machine
 from onboard.systems.cell.contracts import Arm, ArmMove, Contract, Goal, filtered, moves
 from onboard.systems.cell.fields import MAX_PATH
 from onboard.systems.cell.geometry import Point, distance_m, shortest_way, way_length_m
-from onboard.systems.cell.goal_frames import Hearsay, cost_of_bid, goal_messages, offer_messages
+from onboard.systems.cell.goal_frames import GoalsHeard, cost_of_bid, goal_messages, offer_messages
 from onboard.systems.cell.site import Cell
 
 #: Sub-goals remembered, so that one and the same part of a goal keeps its name when it is looked at again.
@@ -31,7 +31,7 @@ class ArmGeneration:
     machine: Machine
     position: Point
     number: int = 0
-    hearsay: Hearsay = field(default_factory=Hearsay)
+    goals_heard: GoalsHeard = field(default_factory=GoalsHeard)
     engaged: dict[Reference, Contract] = field(default_factory=dict)
     promised: dict[CallKey, Contract] = field(default_factory=dict)
     #: Goals that it has in hand or has carried out: not to be bid for again.
@@ -50,7 +50,7 @@ class ArmGeneration:
 
     def floor(self, call: CallForProposals, now_us: int) -> int:
         """The way from start to end for the least unit cost of all; 0 where the goal's frames were lost."""
-        goal = self.hearsay.goal(call)
+        goal = self.goals_heard.goal(call)
         return 0 if goal is None else self._least(goal)
 
     def lower_bound(self, call: CallForProposals, now_us: int) -> int | None:
@@ -111,7 +111,7 @@ class ArmGeneration:
         best: tuple[Contract, int] | None = None
         for answer in answers:
             move = by_task.get(answer.terms.task)
-            offer = self.hearsay.offer(answer.winner, answer.terms.task) if answer.winner else None
+            offer = self.goals_heard.offer(answer.winner, answer.terms.task) if answer.winner else None
             if move is None or offer is None:
                 continue
             own = self._own_cost(goal, move)
@@ -174,7 +174,7 @@ class ArmGeneration:
             return None
         if call.task in self.known:
             return None
-        return self.hearsay.goal(call)
+        return self.goals_heard.goal(call)
 
 
 def call_terms(goal: Goal) -> RequestedTerms:

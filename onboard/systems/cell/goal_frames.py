@@ -73,7 +73,7 @@ class ReceivedOffer:
 
 
 @dataclass
-class Hearsay:
+class GoalsHeard:
     """What one machine has heard of others' goals (by task) and offers (by bidder and task). Whole sets only count."""
 
     _goals: dict[Reference, dict[type[Message], GoalMessage]] = field(default_factory=dict)

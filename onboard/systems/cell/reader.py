@@ -31,7 +31,7 @@ def read(root: TomlTable, common: Common) -> Cell:
     for name, words in (("robots", "robot"), ("desks", "goal manager")):
         if not root.values.get(name):
             root.bad(name, None, f"no {words}", f"add at least one [[{name}]] table")
-    wishes = tuple(wish for table in root.tables("goals") if (wish := _wish(table, arms, obstacles)) is not None)
+    goals = tuple(goal for table in root.tables("goals") if (goal := _goal_demand(table, arms, obstacles)) is not None)
     timing_table = root.table("timing")
     timing_table.values.setdefault("call_window_ms", CALL_WINDOW_MS)
     timing = read_timing(timing_table, max(1, len(arms)), len(fleet.by_node), common.bitrate)
@@ -43,7 +43,7 @@ def read(root: TomlTable, common: Common) -> Cell:
         timing=replace(timing, sub_call_percent=root.table("negotiation").integer("sub_call_percent", 20, 80, 50)),
         arms=arms,
         obstacles=obstacles,
-        wishes=wishes,
+        goals=goals,
     )
 
 
@@ -63,7 +63,7 @@ def _read_robot(table: TomlTable, fleet: FleetReader, arms: dict[int, Arm], obst
         arms[node] = Arm(node, table.values["name"], area, home, unit_cost, speed_mm_s)
 
 
-def _wish(table: TomlTable, arms: dict[int, Arm], obstacles: Sequence[Area]) -> GoalDemand | None:
+def _goal_demand(table: TomlTable, arms: dict[int, Arm], obstacles: Sequence[Area]) -> GoalDemand | None:
     start, end = _point(table, "from_mm"), _point(table, "to_mm")
     at_ms, within_s = table.integer("at_s", 0, 86_400, 0) * 1000, table.integer("within_s", 0, 2_550, 0)
     if within_s % 10:

@@ -82,7 +82,7 @@ class ArmRobot:
     def __post_init__(self) -> None:
         site = self.generation.site
         self.driver = ArmDriver(self.fleet.motion, self.generation.arm, site.obstacles, site.timing.drive_refresh_us)
-        self.fleet.negotiation.is_sound = self.generation.hearsay.is_sound
+        self.fleet.negotiation.is_sound = self.generation.goals_heard.is_sound
         # Names of goals of an earlier life may still be about.
         self.generation.number = last_boot(self.fleet.entries) << 8
         me = self.fleet.node_id
@@ -146,7 +146,7 @@ class ArmRobot:
 
     def hear(self, message: Message, now_us: int) -> list[Effect]:
         """Goals and offers; sub-contractors' reports; calls and awards for what is in hand already."""
-        self.generation.hearsay.hear(message)
+        self.generation.goals_heard.hear(message)
         match message:
             case TaskReport():
                 return self._on_report(message, now_us)

@@ -29,16 +29,16 @@ class GoalDemand:
 
 @dataclass(frozen=True, kw_only=True)
 class Cell(Site):
-    """A cell: its robots' areas and the known obstacles (row C01). ``wishes`` are what a run of it asks for."""
+    """A cell: its robots' areas and the known obstacles (row C01). ``goals`` are what a run of it asks for."""
 
     system: ClassVar[str] = "cell"
-    demand: ClassVar[frozenset[str]] = frozenset({"wishes"})
+    demand: ClassVar[frozenset[str]] = frozenset({"goals"})
     moved_by: ClassVar[Mapping[str, MotionNeeds]] = {"ArmOrder": MotionNeeds.RIGHT, "GripOrder": MotionNeeds.RIGHT}
 
     timing: DeviceTiming
     arms: dict[int, Arm]
     obstacles: tuple[Area, ...] = ()
-    wishes: tuple[GoalDemand, ...] = ()
+    goals: tuple[GoalDemand, ...] = ()
 
     @cached_property
     def least_unit_cost(self) -> float:

@@ -155,4 +155,4 @@ class VisitDesk(OrderDesk[Visits]):
         """How it stands, and who has it; nothing at the counter for one that came from outside."""
         if order.task.origin != self.fleet.node_id:
             return None
-        return VisitAnswer(self.fleet.node_id, order.task.number, OrderResult[order.told], order.winner)
+        return VisitAnswer(self.fleet.node_id, order.task.number, OrderResult[order.result_name], order.winner)

@@ -203,7 +203,7 @@ class RoundsGoDown(Rule):
 
 
 @dataclass
-class _Told:
+class _PathHeard:
     """A path that is being told, or was."""
 
     head: PathHead
@@ -226,8 +226,8 @@ class PathsApart(_OnFloor):
 
     def __init__(self, picture: BusPicture, report: Callable[[Finding], None]) -> None:
         super().__init__(picture, report)
-        self._coming: dict[int, _Told] = {}
-        self._paths: dict[int, _Told] = {}
+        self._coming: dict[int, _PathHeard] = {}
+        self._paths: dict[int, _PathHeard] = {}
 
     def handlers(self) -> Handlers:
         """Reads the paths that robots publish."""
@@ -237,43 +237,48 @@ class PathsApart(_OnFloor):
         known = self._paths.get(event.message.sender)
         if known is not None and (known.head == event.message or event.message.step < known.head.step):
             return
-        self._coming[event.message.sender] = _Told(event.message)
+        self._coming[event.message.sender] = _PathHeard(event.message)
         self._complete(event, event.message.sender)
 
     def _on_moves(self, event: LogEvent[PathMoves]) -> None:
-        told = self._coming.get(event.message.sender)
-        if told is not None and event.message.version == told.head.version:
-            told.parts[event.message.part] = event.message.codes
+        path_heard = self._coming.get(event.message.sender)
+        if path_heard is not None and event.message.version == path_heard.head.version:
+            path_heard.parts[event.message.part] = event.message.codes
             self._complete(event, event.message.sender)
 
     def _complete(self, event: LogEvent[PathHead] | LogEvent[PathMoves], robot: int) -> None:
-        told, site = self._coming[robot], self.picture.site
-        if len(told.parts) * MOVES_A_FRAME < told.head.moves or not isinstance(site, Mapd):
+        path_heard, site = self._coming[robot], self.picture.site
+        if len(path_heard.parts) * MOVES_A_FRAME < path_heard.head.moves or not isinstance(site, Mapd):
             return
-        cells = [told.head.cell]
-        for number in range(told.head.moves):
+        cells = [path_heard.head.cell]
+        for number in range(path_heard.head.moves):
             part, place = divmod(number, MOVES_A_FRAME)
-            code = told.parts.get(part, 0) >> MOVE_BITS * place & _MASK
+            code = path_heard.parts.get(part, 0) >> MOVE_BITS * place & _MASK
             ways = site.floor.ways[cells[-1]] if cells[-1] < site.floor.size else ()
             if code > len(ways):
                 self.find(event, (robot,), f"its path leaves the ways after cell {cells[-1]}")
                 return
             cells.append(ways[code - 1] if code else cells[-1])
-        told.cells = cells
+        path_heard.cells = cells
         del self._coming[robot]
-        self._paths[robot] = told
+        self._paths[robot] = path_heard
         for other, path in self._paths.items():
             if other != robot:
-                self._judge_pair(event, robot, told, other, path)
+                self._judge_pair(event, robot, path_heard, other, path)
 
     def _judge_pair(
-        self, event: LogEvent[PathHead] | LogEvent[PathMoves], robot: int, told: _Told, other: int, path: _Told
+        self,
+        event: LogEvent[PathHead] | LogEvent[PathMoves],
+        robot: int,
+        path_heard: _PathHeard,
+        other: int,
+        path: _PathHeard,
     ) -> None:
-        first = max(told.head.step, path.head.step)
-        last = max(one.head.step + one.head.moves for one in (told, path)) + 1
+        first = max(path_heard.head.step, path.head.step)
+        last = max(one.head.step + one.head.moves for one in (path_heard, path)) + 1
         before: tuple[int | None, int | None] = (None, None)
         for step in range(first, last + 1):
-            mine, theirs = told.at(step), path.at(step)
+            mine, theirs = path_heard.at(step), path.at(step)
             assert mine is not None and theirs is not None
             swap = mine != theirs and before == (theirs, mine)
             if self.place(mine) == self.place(theirs) or swap:

@@ -230,8 +230,8 @@ class TransportDesk(Plain):
         self.turns, self.awards = _told(me, step, order)
         self.is_open, self._close_us = False, None
         self.step += 1
-        told = " ".join(f"{robot}:{task}" for robot, task in order)
-        effects: list[Effect] = [Record(AwardsRecord(step, told))]
+        awarded = " ".join(f"{robot}:{task}" for robot, task in order)
+        effects: list[Effect] = [Record(AwardsRecord(step, awarded))]
         for _, task in order:
             effects += self.fleet.negotiation.award_in_round(number_of(task), now_us) if task != NO_TASK else []
         return effects + [Send(turn) for turn in self.turns]
@@ -240,7 +240,7 @@ class TransportDesk(Plain):
 
     def _replay(self, entries: Iterable[Entry]) -> None:
         """What was ordered, served and told, oldest entry first."""
-        me, told = self.fleet.node_id, None
+        me, awarded = self.fleet.node_id, None
         for record in records_in(entries, BootRecord, TransportRecord, ServedRecord, RoundRecord, AwardsRecord):
             match record:
                 case BootRecord():
@@ -253,11 +253,11 @@ class TransportDesk(Plain):
                     self.served.add(record.task)
                 case RoundRecord():
                     self.round = StepRound(me, record.step, record.open, self._attempt, record.bidding)
-                    told, self.step = None, record.step + (not record.bidding)
+                    awarded, self.step = None, record.step + (not record.bidding)
                 case AwardsRecord():
-                    told, self.step = record, record.step + 1
-        if self.round is not None and self.step > self.round.step and told is not None:
-            pairs = [tuple(map(int, one.split(":"))) for one in told.changes.split()]
+                    awarded, self.step = record, record.step + 1
+        if self.round is not None and self.step > self.round.step and awarded is not None:
+            pairs = [tuple(map(int, one.split(":"))) for one in awarded.changes.split()]
             self.turns, self.awards = _told(me, self.round.step, [(robot, task) for robot, task in pairs])
         # Tasks that were called for before are known from their release; the next round brings those of its own step.
         for number, task in self.orders.items():

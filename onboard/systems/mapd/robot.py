@@ -275,10 +275,10 @@ class UnitRobot(Plain):
         assert self.round is not None
         effects: list[Effect] = []
         if self._bids is None:
-            wishes = self._wishes()
-            self.generation.costs, self.generation.mark = {task: bid for bid, task in wishes}, mark_of(self.round)
+            preferences = self._preferences()
+            self.generation.costs, self.generation.mark = {task: bid for bid, task in preferences}, mark_of(self.round)
             self.fleet.negotiation.leave_round(self.site.desk)
-            self._bids = Round(self.fleet.node_id, now_us, wishes)
+            self._bids = Round(self.fleet.node_id, now_us, preferences)
             for heard in self._heard_bids:
                 self._bids.hear(heard)
             if self._must_yield():
@@ -289,13 +289,13 @@ class UnitRobot(Plain):
 
     def _look(self, bids: Round, now_us: int) -> None:
         """Take part in the call for the task that is cheapest among those for which nobody is better."""
-        wish = bids.wish
-        call = None if wish is None else self.knowledge.calls.get(wish)
-        if call is None or wish is None or wish == bids.looked_at:
+        preferred = bids.preferred
+        call = None if preferred is None else self.knowledge.calls.get(preferred)
+        if call is None or preferred is None or preferred == bids.looked_at:
             return
-        bids.looked_at = wish
+        bids.looked_at = preferred
         until_us = bids.begun_us + self.site.bid_window_us
-        self.fleet.negotiation.look(call, (bids.begun_us, until_us), bids.bids.get(wish, ()), now_us)
+        self.fleet.negotiation.look(call, (bids.begun_us, until_us), bids.bids.get(preferred, ()), now_us)
 
     def take_turns(self, now_us: int) -> list[Effect]:
         """Wait for the paths of those before me, plan if it is my turn, wait for those after me."""
@@ -350,7 +350,7 @@ class UnitRobot(Plain):
         body = self.driving.cart.state
         return body is not None and body.task != NO_TASK
 
-    def _wishes(self) -> list[tuple[int, int]]:
+    def _preferences(self) -> list[tuple[int, int]]:
         """What each open task would cost, cheapest first: the task-generation function of this system."""
         offer = self._offer()
         bids = ((cost(self.site.floor, self.rule, offer, task), task.number) for task in self.knowledge.open_tasks)

@@ -24,7 +24,7 @@ class VehicleMode(manual.Manual):
         if effects:
             step = order.manual_mode is ManualMode.STEP and owned is not None
             self.allowed = (owned.plan.version, owned.current) if step and owned is not None else None
-        return effects or [self.told()]
+        return effects or [self.report()]
 
     def may_begin(self, owned: Owned) -> bool:
         """Whether something may be begun for the step in hand; a step by hand that is over holds the vehicle again."""

@@ -274,7 +274,7 @@ class PlanSearch:
         while one is not None:
             chain.insert(0, one)
             one = one.before
-        told: list[ActionStep] = []
+        dated: list[ActionStep] = []
         for number, (stay, at) in enumerate(zip(stays, chain, strict=True)):
             ends = self._dates(stay, at.enter)
             ends[-1] = max(ends[-1], at.room.leave_low)
@@ -283,19 +283,19 @@ class PlanSearch:
             row = [visit for visit in self.traffic.lists.get(stay.entity, ()) if visit.owner != self.owner]
             after = row[at.room.place - 1].key if 0 < at.room.place <= len(row) else NOBODY_BEFORE
             for step, end in zip(stay.steps, ends, strict=True):
-                told.append(step._replace(end=end, after=after))
-        return self._joined(told, chain[0].enter, job, version, kept)
+                dated.append(step._replace(end=end, after=after))
+        return self._joined(dated, chain[0].enter, job, version, kept)
 
     def _joined(
-        self, told: list[ActionStep], began: int, job: BoxTransport, version: int, kept: ActionPlan | None
+        self, dated: list[ActionStep], began: int, job: BoxTransport, version: int, kept: ActionPlan | None
     ) -> ActionPlan:
         before = len(kept.steps) if kept is not None else 0
-        picks = [number for number, step in enumerate(told) if step.action is Action.PICK_UP]
-        puts = [number for number, step in enumerate(told) if step.action is Action.PUT_DOWN]
+        picks = [number for number, step in enumerate(dated) if step.action is Action.PICK_UP]
+        puts = [number for number, step in enumerate(dated) if step.action is Action.PUT_DOWN]
         load = Load(job.box, job.task, before + picks[0] if picks else NO_STEP, before + puts[0], job.before)
         if kept is None:
-            return ActionPlan(self.owner, version, began, tuple(told), (load,))
-        return replace(kept, version=version, steps=(*kept.steps, *told), loads=(*kept.loads, load))
+            return ActionPlan(self.owner, version, began, tuple(dated), (load,))
+        return replace(kept, version=version, steps=(*kept.steps, *dated), loads=(*kept.loads, load))
 
     def _push(
         self,
@@ -312,7 +312,7 @@ class PlanSearch:
         """
         followers = self._followers(stays[0].entity)
         for ahead_of in (followers, frozenset[int](), frozenset(self.traffic.plans)):
-            told: list[ActionStep] = []
+            dated: list[ActionStep] = []
             at = began
             for stay in stays:
                 row = [visit for visit in self.traffic.lists.get(stay.entity, ()) if visit.owner != self.owner]
@@ -324,8 +324,8 @@ class PlanSearch:
                 after = row[place - 1].key if place else NOBODY_BEFORE
                 for step in stay.steps:
                     at = max(at + step.duration, self.now)
-                    told.append(step._replace(end=at, after=after))
-            plan = self._dated(self._joined(told, began, job, version, kept))
+                    dated.append(step._replace(end=at, after=after))
+            plan = self._dated(self._joined(dated, began, job, version, kept))
             if plan is not None:
                 return plan
         return None

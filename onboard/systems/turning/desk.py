@@ -128,5 +128,5 @@ class JobDesk(OrderDesk[BatchOrder]):
 
     def answer(self, order: BatchOrder) -> Message:
         """With the lathe and its price."""
-        number, result = order.task.number, OrderResult[order.told]
+        number, result = order.task.number, OrderResult[order.result_name]
         return JobAnswer(self.fleet.node_id, number, result, order.winner, order.total_ct)

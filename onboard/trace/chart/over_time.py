@@ -35,7 +35,7 @@ class Diagram(Protocol):
     first_us: int
     last_us: int
 
-    def feed(self, said: LoggedMessage) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus."""
 
     def draw(self, start_us: int) -> SvgDrawing:
@@ -88,17 +88,17 @@ class Rows:
         self._until_us, self._is_begun = until_us, from_us is not None
         self._clock = LoggedBusTime()
 
-    def feed(self, said: LoggedMessage) -> None:
+    def feed(self, logged: LoggedMessage) -> None:
         """Take up one message of the fleet bus; what came before the time that is shown is heard all the same."""
-        if self._until_us is not None and said.time_us > self._until_us:
+        if self._until_us is not None and logged.time_us > self._until_us:
             return
         if not self._is_begun:
-            self._is_begun, self.first_us = True, said.time_us
-        self.last_us = max(self.last_us, said.time_us)
-        if isinstance(said.message, BusTime):
-            self._clock.feed(said.message, said.time_us)
-        self.words.hear(said.message)
-        self.take(said.message, said.time_us)
+            self._is_begun, self.first_us = True, logged.time_us
+        self.last_us = max(self.last_us, logged.time_us)
+        if isinstance(logged.message, BusTime):
+            self._clock.feed(logged.message, logged.time_us)
+        self.words.hear(logged.message)
+        self.take(logged.message, logged.time_us)
 
     def take(self, message: Message, time_us: int) -> None:
         """Take up one message at ``time_us``; each system's rows say which they draw."""

@@ -89,13 +89,13 @@ class _Story:
         self._desk_event: DeskEvent | None = None
         self.loaded = self.over = self.pressed = False
 
-    def arrows(self, said: LoggedMessage) -> Iterator[Arrow]:
+    def arrows(self, logged: LoggedMessage) -> Iterator[Arrow]:
         """What a message adds to the chart."""
-        message = said.message
+        message = logged.message
         if self.over:
             return
-        for receiver, text, step in self._fleet(message, said.time_us) if said.is_fleet else self._device(message):
-            yield Arrow(said.time_us, message.sender, receiver, text, step)
+        for receiver, text, step in self._fleet(message, logged.time_us) if logged.is_fleet else self._device(message):
+            yield Arrow(logged.time_us, message.sender, receiver, text, step)
 
     def _dealt(self, fact: CallFact | None) -> Iterator[tuple[int, str, int]]:
         """What a message tells of the task's calls."""
@@ -225,12 +225,12 @@ class _Story:
         return before != value
 
 
-def chart(site: Site, said: Iterable[LoggedMessage], task: Reference) -> SequenceChart | None:
+def chart(site: Site, logged: Iterable[LoggedMessage], task: Reference) -> SequenceChart | None:
     """The chart of a task, None where the log does not hold it. What the bay's devices said just before counts in."""
     words = Words(site)
     story = _Story(site, task, words)
     arrows: list[Arrow] = []
-    for one in said:
+    for one in logged:
         words.hear(one.message)
         if not one.is_fleet and one.message.sender not in (task.origin, story.owner):
             continue

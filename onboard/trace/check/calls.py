@@ -38,7 +38,7 @@ class CallSeen:
     bids: list[tuple[int, int, int]] = field(default_factory=list)
     option: bool = False
     outcome: Award | None = None
-    told: bool = False
+    is_reported: bool = False
 
 
 class _CallRule(Rule):
@@ -131,7 +131,7 @@ class CallsClosed(_CallRule):
         """Calls that should be closed by now."""
         super().tick(now_us)
         for seen in self.calls.values():
-            if seen.told or seen.outcome is not None or seen.option or seen.due_us is None:
+            if seen.is_reported or seen.outcome is not None or seen.option or seen.due_us is None:
                 continue
             # A sign of the same life after the time is over: before it, the initiator may have died without a word.
             lived_us = self.picture.heard_us.get(seen.call.sender, 0)
@@ -140,7 +140,7 @@ class CallsClosed(_CallRule):
             due_us = max(seen.due_us, seen.event.time_us, self.picture.clock_settles_us, held_us)
             late = lived_us - due_us > CLOSED_WITHIN_US
             if late and self.picture.is_alive(seen.call.sender, seen.boot):
-                seen.told = True
+                seen.is_reported = True
                 self.find(seen.event, (seen.call.sender,), f"call {seen.call.call} was never closed")
 
 
@@ -154,7 +154,7 @@ class BidsInTime(_CallRule):
     def judge_award(self, event: LogEvent[Award], seen: CallSeen) -> None:
         """The winner must have bid before the deadline less the guard."""
         award = event.message
-        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or award.winner == NOBODY or seen.told:
+        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or award.winner == NOBODY or seen.is_reported:
             return
         times_us = [time_us for time_us, node, _ in seen.bids if node == award.winner]
         due_us = seen.due_us
@@ -163,7 +163,7 @@ class BidsInTime(_CallRule):
         if times_us and seen.event.time_us < self.picture.clock_settles_us:
             # The caller's deadline was over when its own clock said so.
             return
-        seen.told = True
+        seen.is_reported = True
         late_us = min(times_us) - (due_us or 0) if times_us else 0
         what = f"bid {late_us} us after the deadline" if times_us else "never bid"
         self.find(event, (award.sender, award.winner), f"call {award.call} goes to {award.winner}, who {what}")
@@ -202,11 +202,11 @@ class BidsGoDown(_CallRule):
             self._left_out.popitem(last=False)
 
     def _on_progress(self, event: LogEvent[Progress]) -> None:
-        told = event.message
-        place = told.track, told.index, told.offset_mm
-        if self._places.get(told.sender) != place:
-            self._places[told.sender] = place
-            self._won_us.pop(told.sender, None)
+        progress = event.message
+        place = progress.track, progress.index, progress.offset_mm
+        if self._places.get(progress.sender) != place:
+            self._places[progress.sender] = place
+            self._won_us.pop(progress.sender, None)
 
     def _counts(self, node: int, seen: CallSeen, now_us: int) -> bool:
         """Whether a bid counts: not of who is left out, nor of who has won something and stands."""
@@ -242,12 +242,12 @@ class BidsGoDown(_CallRule):
         award = event.message
         if award.result is CallResult.AWARDED and award.winner:
             self._won_us.setdefault(award.winner, event.time_us)
-        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or seen.told or seen.due_us is None:
+        if award.result not in (CallResult.AWARDED, CallResult.OPTION) or seen.is_reported or seen.due_us is None:
             return
         last_us = seen.due_us - CLOCK_TOLERANCE_US
         counted = [bid for bid in seen.bids if self._counts(bid[1], seen, event.time_us)]
         in_time = [(node, cost) for time_us, node, cost in counted if time_us <= last_us]
-        seen.told = True
+        seen.is_reported = True
         best = _best(in_time, seen.call.criterion)
         if best is not None and best[0] != award.winner and award.winner in {node for node, _ in in_time}:
             what = f"call {award.call} goes to {award.winner}, though {best[0]} bid {best[1]}"

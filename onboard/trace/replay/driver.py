@@ -117,11 +117,11 @@ def record(frames: Iterable[RawFrame], machine: Machine, codecs: Codecs, fleet: 
     return found
 
 
-def _add(said: list[Sent] | None, found: Recording, sent: Sent) -> None:
-    if said is None:
+def _add(recorded: list[Sent] | None, found: Recording, sent: Sent) -> None:
+    if recorded is None:
         found.heard.append((sent.time_us, sent.is_fleet, sent.frame))
     else:
-        said.append(sent)
+        recorded.append(sent)
 
 
 class ReplayDriver:

@@ -6,7 +6,7 @@ from onboard.history.calls import CallHistory, is_task
 from onboard.trace.words import Words
 
 
-def told(call: CallHistory, words: Words, start_us: int) -> list[str]:
+def call_lines(call: CallHistory, words: Words, start_us: int) -> list[str]:
     """The lines of one call; times since the log's start, promises beside what came true."""
     terms = call.terms
     names = words.system

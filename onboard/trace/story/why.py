@@ -349,7 +349,7 @@ def _put_down(story: TaskStory, begin_us: int, end_us: int, cause: Cause) -> Non
         story.parts.append(WaitingPart(cause, begin_us, end_us))
 
 
-def told(story: TaskStory, words: Words, start_us: int) -> list[str]:
+def task_lines(story: TaskStory, words: Words, start_us: int) -> list[str]:
     """The story of one task: its parts in order, then how much each machine and cause took."""
     what = words.system.operation(story.operation)
     state = (

@@ -12,7 +12,7 @@ from bus_sim.systems.car_park.compare.optimum import OptimumError, is_available
 from bus_sim.systems.car_park.compare.plays import POLICIES, Play, play
 from bus_sim.systems.car_park.compare.small_table import SmallTable, solve_case
 from bus_sim.systems.car_park.compare.table import ComparisonTable, tabulate
-from bus_sim.systems.car_park.day import DayOptions, choose_demand
+from bus_sim.systems.car_park.day import ParkingDay, choose_demand
 from bus_sim.systems.car_park.demand import Demand
 from bus_sim.systems.car_park.window import DayWindow, choose_window
 from onboard.core.site import Site
@@ -110,12 +110,14 @@ def compare_random(site: Site, seeds: range, cars: int, interval_s: tuple[float,
 
 def compare_day(site: Site, args: argparse.Namespace) -> ComparisonTable:
     """All policies on a window of a real day: what comes before is played too, and not counted."""
-    demand = choose_demand(DayOptions(sessions=args.sessions, day=args.day), site)
+    demand = choose_demand(ParkingDay(sessions=args.sessions, day=args.day), site)
     window = choose_window(demand, args.window)
     seed = 1
     before = Demand(tuple(stay for stay in demand.stays if stay.arrival_us < window.end_us), demand.zero)
     plays = [_told(play(site, before, policy, seed, window)) for policy in POLICIES]
-    return tabulate(f"{site.name}: {window.told(demand)}", plays, {seed: _bounds_within(site, before, window, seed)})
+    return tabulate(
+        f"{site.name}: {window.described(demand)}", plays, {seed: _bounds_within(site, before, window, seed)}
+    )
 
 
 def _bounds_within(site: Site, demand: Demand, window: DayWindow, seed: int) -> tuple[list[int], list[int]]:

@@ -43,7 +43,7 @@ def certify(graph: Graph, robots: int, rules: Rules, capacity: int, limit: int =
     return Certificate(True, f"no timing of any of {number} task sets sticks", number)
 
 
-def told(stuck: Stuck) -> list[str]:
+def stuck_lines(stuck: Stuck) -> list[str]:
     """A counterexample in words, one line a step."""
     lines = [f"task set: {stuck.tasks}"]
     lines += [f"{n:3}. R{move.robot + 1} {move.word} N{move.node}" for n, move in enumerate(stuck.moves, start=1)]

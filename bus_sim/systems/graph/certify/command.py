@@ -9,7 +9,7 @@ from pathlib import Path
 from bus_sim.options import RunOptions
 from bus_sim.sites import SiteNotFoundError, find_site
 from bus_sim.systems.graph.against_optimum import compare
-from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, told
+from bus_sim.systems.graph.certify.certificate import ROWS, Certificate, certify, count_stuck, stuck_lines
 from bus_sim.systems.graph.certify.counterexample import play_file, play_on_bus, write_counterexample
 from bus_sim.systems.graph.certify.model import GraphModel
 from bus_sim.systems.graph.certify.throughput import Pace, measure
@@ -109,7 +109,7 @@ def _say(found: Certificate, what: str, file: Path | None, graph: Graph, rules: 
     verdict = {True: "deadlock-free under these rules", False: "not certified", None: "undecided"}[found.certified]
     print(f"{what}: {verdict}\n{found.reason}")
     if found.stuck is not None:
-        print("\n".join(told(found.stuck)))
+        print("\n".join(stuck_lines(found.stuck)))
         if file is not None:
             write_counterexample(file, graph, rules, capacity, found.stuck)
             print(f"written to {file}; play it: bus-sim certify --play {file} [--bus [--rules edge-and-node]]")

@@ -108,9 +108,9 @@ class CustomersServed(Rule):
             self._answered.discard(node)
 
     def _on_event(self, event: LogEvent[DeskEvent]) -> None:
-        node, said = event.message.sender, event.message
-        if said.event is not DeskInput.KEY:
-            self._tickets.setdefault((node, said.car), event)
+        node, desk_event = event.message.sender, event.message
+        if desk_event.event is not DeskInput.KEY:
+            self._tickets.setdefault((node, desk_event.car), event)
         elif self._loads_kg.get(node) and node not in self._answered:
             self._asked.setdefault(node, event)
 

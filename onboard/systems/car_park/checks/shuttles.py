@@ -28,7 +28,7 @@ class ShuttleSeen:
 
     state: ShuttleState
     position_mm: int | None = None
-    told: bool = False
+    is_reported: bool = False
 
     @property
     def is_out(self) -> bool:
@@ -117,18 +117,18 @@ class TornCar(Rule):
         if seen is None:
             return
         if not seen.is_out or state.mode is DriveMode.STANDING:
-            seen.told = False
-        elif state.speed_mm_s and not seen.told:
-            seen.told = True
+            seen.is_reported = False
+        elif state.speed_mm_s and not seen.is_reported:
+            seen.is_reported = True
             self.find(event, (state.sender,), f"the carrier moves while its shuttle is {seen.state.mode.name}")
 
     def _on_drive_order(self, event: LogEvent[DriveOrder]) -> None:
         order = event.message
         seen, position_mm = self._shuttles.get(order.sender), self._positions_mm.get(order.sender)
-        if seen is None or position_mm is None or not seen.is_out or seen.told:
+        if seen is None or position_mm is None or not seen.is_out or seen.is_reported:
             return
         if abs(order.target_mm - position_mm) > STAYS_MM:
-            seen.told = True
+            seen.is_reported = True
             self.find(event, (order.sender,), f"the carrier is sent away while its shuttle is {seen.state.mode.name}")
 
     def _station(self, node: int, state: ShuttleState) -> Station | None:

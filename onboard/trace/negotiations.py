@@ -53,7 +53,7 @@ class DealingCounts:
     unasked_moves: int = 0
 
 
-class Dealings:
+class NegotiationFold:
     """A view of a history: give it every message of the fleet bus in the order of the log, and what was told by it."""
 
     def __init__(self, history: History) -> None:
@@ -104,13 +104,13 @@ class Dealings:
         if award.result is CallResult.AWARDED and not call.terms.depth and call.terms.operation in TASKS:
             self._fresh.add((award.winner, award.sender, award.call & 0xFF))
 
-    def _on_done(self, told: TaskTold, time_us: int) -> None:
-        task = told.task
+    def _on_done(self, statement: TaskTold, time_us: int) -> None:
+        task = statement.task
         if task.operation not in TASKS:
             return
         done = self.counts.parked_us if task.operation is Operation.PARK else self.counts.fetched_us
         done.append(time_us)
-        if task.promised_ms is not None and task.owner == told.report.sender:
+        if task.promised_ms is not None and task.owner == statement.report.sender:
             self.counts.slack_ms.append(-ms_after((time_us - (self._clock.offset_us or 0)) // 1000, task.promised_ms))
 
     # --- plans -------------------------------------------------------------------------------------------------
