@@ -10,7 +10,7 @@ from onboard.core.site import Site
 from onboard.history.history import Fact, History
 from onboard.trace.activity import Activities, Activity, MachineActivity
 from onboard.trace.durations import percentile
-from onboard.trace.negotiations import ANSWER, DealingCounts, NegotiationFold
+from onboard.trace.negotiations import ANSWER, NegotiationCounts, NegotiationFold
 
 _HOUR_US = 3_600_000_000
 #: Said by the clock and not because of a task.
@@ -197,7 +197,7 @@ def _per(count: int, of: int) -> float:
     return count / of if of else 0.0
 
 
-def _give_ways(counts: DealingCounts) -> int:
+def _give_ways(counts: NegotiationCounts) -> int:
     return counts.replans["way", ANSWER] + counts.unasked_moves + counts.give_way_calls
 
 

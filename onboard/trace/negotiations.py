@@ -33,7 +33,7 @@ class FirmPlan:
 
 
 @dataclass
-class DealingCounts:
+class NegotiationCounts:
     """Everything counted since the last ``begin``; times in us of the log, slack in ms."""
 
     messages: Counter[str] = field(default_factory=Counter)
@@ -57,7 +57,7 @@ class NegotiationFold:
     """A view of a history: give it every message of the fleet bus in the order of the log, and what was told by it."""
 
     def __init__(self, history: History) -> None:
-        self.counts = DealingCounts()
+        self.counts = NegotiationCounts()
         self._tasks = history.tasks
         self._plans: dict[int, FirmPlan] = {}
         #: Stamps of awards whose winner has not told its plan yet.
@@ -67,7 +67,7 @@ class NegotiationFold:
 
     def begin(self) -> None:
         """Count from now on; open calls and tasks are kept."""
-        self.counts = DealingCounts()
+        self.counts = NegotiationCounts()
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """Take up one message."""
