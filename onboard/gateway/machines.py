@@ -63,7 +63,7 @@ class MobileMachine:
 
     @property
     def load(self) -> Reference | None:
-        """What it carries."""
+        """The load aboard by the newest word of it, None for none."""
         return self.history.loads.aboard.get(self.machine.node_id)
 
     @property

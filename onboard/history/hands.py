@@ -28,7 +28,7 @@ class Hands:
         return self.held.get(node, False)
 
     def on_manual(self, word: ManualState) -> HandTold:
-        """Take up one word."""
+        """A machine is held, has come to rest, or is let go."""
         if word.manual_mode is not ManualMode.AUTOMATIC:
             self.held[word.sender] = word.at_rest
         elif self.held.pop(word.sender, None) is not None:

@@ -79,7 +79,7 @@ class MachineLives:
             self._end_wait(told.node)
 
     def on_waiting(self, word: Waiting, time_us: int) -> WaitTold:
-        """Take up a wait."""
+        """A wait counts until the next word of motion, or a new start."""
         self.waits[word.sender] = time_us, word
         return WaitTold(word)
 

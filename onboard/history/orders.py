@@ -16,13 +16,13 @@ class SlotTold:
 
     @property
     def is_blocked(self) -> bool:
-        """Whether nobody can pass."""
+        """Whether nobody can pass from now on, or everybody again."""
         return isinstance(self.word, Blocked)
 
 
 @dataclass(frozen=True, slots=True)
 class StopTold:
-    """Everybody is to stand."""
+    """Somebody orders all machines of the site to stand."""
 
     word: EmergencyStop
 
@@ -47,7 +47,7 @@ class SiteOrders:
         return SlotTold(word)
 
     def on_stop(self, word: EmergencyStop) -> StopTold:
-        """Take up a stop."""
+        """A stop counts from any node, and the newest one only."""
         self.stop = word
         return StopTold(word)
 

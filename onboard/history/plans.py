@@ -32,7 +32,7 @@ class Plans:
         return plan.legs[self._legs[node] :] if plan is not None else ()
 
     def on_itinerary(self, plan: Itinerary) -> PlanTold:
-        """Take up one plan."""
+        """A firm plan replaces the one before; a tentative one changes nothing."""
         fact = PlanTold(plan, self.firm.get(plan.sender))
         if fact.is_firm:
             self.firm[plan.sender] = plan

@@ -29,7 +29,7 @@ class Known:
 
     @property
     def beat(self) -> Heartbeat | None:
-        """Its last heartbeat."""
+        """Its last heartbeat, None where none was heard yet."""
         return self.history.lives.beats.get(self.machine.node_id)
 
     @property

@@ -58,7 +58,7 @@ class CellHistory(SystemHistory):
         self.parts: OrderedDict[Reference, tuple[_Spot, int]] = OrderedDict()
 
     def feed(self, message: Message, time_us: int) -> SystemFact | None:
-        """Take up one message."""
+        """Follow arms, parts, goals, and the moves that robots promise."""
         match message:
             case ArmProgress():
                 return ArmTold(message)

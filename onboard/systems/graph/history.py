@@ -40,7 +40,7 @@ class GraphHistory(SystemHistory):
         self.edges: dict[frozenset[int], EdgeNotice] = {}
 
     def feed(self, message: Message, time_us: int) -> SystemFact | None:
-        """Take up one message."""
+        """Follow robots, edges, and lists of nodes to visit; the first word of such a list opens a task."""
         match message:
             case RobotAt() if message.sender in self.passed:
                 before = self.node_of(message.sender)

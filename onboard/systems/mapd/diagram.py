@@ -2,7 +2,7 @@
 
 from onboard.contract.messages import Message
 from onboard.history.history import Fact
-from onboard.systems.mapd.history import StepTold
+from onboard.systems.mapd.history import CellTold
 from onboard.systems.mapd.site import Mapd
 from onboard.trace.chart.over_time import Panel, PanelLine, Rows, by_distance
 
@@ -37,7 +37,7 @@ class MapdDiagram(Rows):
 
     def take(self, message: Message, fact: Fact | None, time_us: int) -> None:
         """A robot has come to its next cell."""
-        if not isinstance(fact, StepTold):
+        if not isinstance(fact, CellTold):
             return
         word = fact.word
         width = _LOADED if word.loaded else _EMPTY

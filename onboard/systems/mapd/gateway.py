@@ -4,7 +4,7 @@ from onboard.contract.messages import Message
 from onboard.gateway.edge import SystemEdge
 from onboard.gateway.positions import MachinePosition, Tracker
 from onboard.history.history import Fact, History
-from onboard.systems.mapd.history import StepTold, mapd_history
+from onboard.systems.mapd.history import CellTold, mapd_history
 from onboard.systems.mapd.site import Mapd
 
 
@@ -17,7 +17,7 @@ class CellTracker:
 
     def take(self, message: Message, fact: Fact | None) -> bool:
         """Robots say in which cell they are at each step."""
-        return isinstance(fact, StepTold)
+        return isinstance(fact, CellTold)
 
     def where(self, node_id: int) -> MachinePosition:
         """The cell where the robot said that it is."""

@@ -19,7 +19,7 @@ class PathSeen:
 
 
 @dataclass(frozen=True, slots=True)
-class StepTold(SystemFact):
+class CellTold(SystemFact):
     """A robot of the site says in which cell of the floor it is at a step."""
 
     word: StepState
@@ -44,7 +44,7 @@ class MapdHistory(SystemHistory):
         self.paths: dict[int, PathSeen] = {}
 
     def feed(self, message: Message, time_us: int) -> SystemFact | None:
-        """Take up one message."""
+        """Follow robots of the site, their paths in parts, and turns that were lost."""
         if isinstance(message, StepTurn):
             return TurnTold(message)
         if message.sender not in self.cells:
@@ -53,7 +53,7 @@ class MapdHistory(SystemHistory):
             case StepState() if message.cell < self._site.floor.size:
                 self.passed[message.sender] += message.cell != self.cells[message.sender]
                 self.cells[message.sender] = message.cell
-                return StepTold(message)
+                return CellTold(message)
             case PathHead():
                 self.paths[message.sender] = PathSeen(message)
             case PathMoves():

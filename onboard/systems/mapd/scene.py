@@ -14,7 +14,7 @@ from onboard.contract.messages import CallForProposals, Message, Reference
 from onboard.history.calls import CallAnswered, CallOpened, CallRepeated
 from onboard.history.history import Fact
 from onboard.systems.mapd.fields import MOVE_BITS, MOVES_A_FRAME, NO_TASK
-from onboard.systems.mapd.history import StepTold, TurnTold, mapd_history
+from onboard.systems.mapd.history import CellTold, TurnTold, mapd_history
 from onboard.systems.mapd.site import FREE, Mapd
 from onboard.trace.scene.arrange import arrange
 from onboard.trace.scene.scene import Json, Spot, along, shape, still
@@ -84,7 +84,7 @@ class MapdScene:
                 self._on_change(word.robot, NO_TASK, time_us)
             case CallAnswered(award=award) if award.result is CallResult.AWARDED and award.winner in self._robots:
                 self._on_change(award.winner, award.task.number, time_us)
-            case StepTold(word=word):
+            case CellTold(word=word):
                 self._on_state(self._robots[word.sender], word, time_us)
 
     def _on_call(self, call: CallForProposals, time_us: int) -> None:

@@ -80,7 +80,7 @@ class TerminalHistory(SystemHistory):
         self.blocked: dict[int, bool] = {}
 
     def feed(self, message: Message, time_us: int) -> SystemFact | None:
-        """Take up one message."""
+        """Follow lanes, plans, and the steps done of them; words about an older plan count for nothing."""
         if isinstance(message, LaneState):
             is_news = self.blocked.get(message.lane, False) is not message.blocked
             self.blocked[message.lane] = message.blocked

@@ -34,7 +34,7 @@ class TurningHistory(SystemHistory):
         self.prices: dict[tuple[int, Reference], int] = {}
 
     def feed(self, message: Message, time_us: int) -> SystemFact | None:
-        """Take up one message."""
+        """Follow prices in bills, and orders until they are finished."""
         match message:
             case BillBar():
                 self.prices[message.sender, Reference(message.manager, message.task)] = message.total_ct
