@@ -116,6 +116,8 @@ class Holon:
         #: When ``wake`` is due, bus time in us; not known after any event but a heartbeat that says nothing new.
         self._due_us: int | None = None
         self.is_due_known = False
+        #: The same of all but what is said at fixed times.
+        self._work_due_us: int | None = None
         self._bus_time_lost = False
         self._sensed_early: dict[type[Message], Message] = {}
         # Each handler takes the class that it is listed under; Any is what a dispatch table costs.
@@ -213,6 +215,8 @@ class Holon:
     def wake(self, local_us: int) -> list[Effect]:
         """Do what has fallen due."""
         local_us = self.time.steady(local_us)
+        if self._only_speaks(local_us):
+            return self._speak(local_us)
         self.is_due_known = False
         # Who has slept counts nobody as silent, so that it does not take itself for the time source.
         effects = self._awake(self.clock.bus_us(local_us))
@@ -245,20 +249,44 @@ class Holon:
 
     def _earliest_due(self) -> int | None:
         """When the first of all parts has something to do, bus time in us: a matter of what they know, not of when."""
-        times = [
-            self._heartbeat_due_us,
-            self.time.due_us,
-            self.holding.next_wake(),
-            self.regeneration.next_wake(),
-            self.presence.held_until_us,
-        ]
+        times = [self.holding.next_wake(), self.regeneration.next_wake(), self.presence.held_until_us]
         if not self.holding.is_apart:
             times.append(self.witness.next_wake())
         if self.part.deals:
             times += (self.tokens.next_wake(), self.rights.petition_due())
         if self.part.begins:
             times += (self._negotiation_due(), self.behaviour.next_wake())
+        self._work_due_us = min((time for time in times if time is not None), default=None)
+        return self._with_words()
+
+    def _with_words(self) -> int | None:
+        """The first of what is to be done and what is said at fixed times."""
+        times = (self._heartbeat_due_us, self.time.due_us, self._work_due_us)
         return min((time for time in times if time is not None), default=None)
+
+    def _only_speaks(self, local_us: int) -> bool:
+        """Whether nothing but a word that is said at fixed times is due, and nobody looks for anything."""
+        if self._attentive is None or not self.is_due_known or not self.part.begins:
+            return False
+        now_us = self.clock.bus_us(local_us)
+        if self._work_due_us is not None and self._work_due_us <= now_us:
+            return False
+        if self.clock.is_lost(local_us) != self._bus_time_lost or self.presence.slept(now_us):
+            return False
+        return not self._attentive.watches(now_us)
+
+    def _speak(self, local_us: int) -> list[Effect]:
+        """Say what is said at fixed times; go on with the work only where somebody fell silent, or came back."""
+        self.time.elect(local_us)
+        now_us = self.clock.bus_us(local_us)
+        self.presence.begins(now_us)
+        aside = dict(self.mirror.aside)
+        effects = self._beat(now_us)
+        if aside != self.mirror.aside:
+            self.is_due_known = False
+            return self._settle(effects, now_us)
+        self._due_us = self._with_words()
+        return self._approve(effects)
 
     def _only_waits(self, now_us: int) -> bool:
         """Whether nothing is to be done here unless something happens: nothing is due, and nobody looks for it."""
@@ -413,6 +441,10 @@ class Holon:
         else:
             if self.part.begins:
                 effects = effects + self._halt("the machine's steps do not come to rest", Reason.RUNAWAY)
+        return self._approve(effects)
+
+    def _approve(self, effects: list[Effect]) -> list[Effect]:
+        """What of all effects may leave this machine: nothing moves without authority, nor is a right said without."""
         fault = self.fleet.motion.fault(effects, self.site.moved_by)
         if fault is not None:
             return self._halt(fault, Reason.NOT_AUTHORISED)
