@@ -39,7 +39,7 @@ from onboard.core.negotiation import EVENT_TYPES, NegotiationEvent, negotiation_
 from onboard.core.records import BootRecord
 from onboard.core.site import Machine, Site
 from onboard.holon.admission import Admission
-from onboard.holon.drops import ToldDrops
+from onboard.holon.fixed_times import FixedTimes
 from onboard.holon.holding import HoldState, MachineHolds
 from onboard.holon.holds import Holds, without_rights
 from onboard.holon.own_number import OwnNumber
@@ -79,7 +79,6 @@ class Holon:
         #: Input dropped here, by reason, and the counts of the shell's decoders and queues below; summed when told.
         self.drops: Counter[Reason] = Counter()
         self.wire_drops: tuple[Counter[Reason], ...] = ()
-        self._told = ToldDrops()
         self.admission = Admission(site)
         self.tokens = TokenBook(site, machine.node_id)
         entries = still_counting(journal, entries)
@@ -112,7 +111,7 @@ class Holon:
         self.rights.is_frozen = self.mirror.is_frozen = lambda: self.regeneration.is_frozen
         if self.holding.why.reason in RIGHTS_LOST:
             self.fleet.has_no_rights, self.witness.doubt = True, Doubt(self.holding.why.reason, NOBODY, journal.why)
-        self._heartbeat_due_us: int | None = None
+        self.fixed = FixedTimes(self.time, self.presence, self.holds, self.fleet, self._all_drops)
         #: When ``wake`` is due, bus time in us; not known after any event but a heartbeat that says nothing new.
         self._due_us: int | None = None
         self.is_due_known = False
@@ -147,11 +146,11 @@ class Holon:
         # Bus time starts somewhere; the lowest fixed node's start is as good as any.
         self.time.elect(local_us)
         now_us = self.clock.bus_us(local_us)
-        self._heartbeat_due_us = now_us
+        self.fixed.heartbeat_due_us = now_us
         self.presence.begins(now_us)
         if self.journal.is_foreign:
-            return [Report(self.journal.line), *self._beat(now_us)]
-        effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self._beat(now_us)
+            return [Report(self.journal.line), *self.fixed.words(now_us)]
+        effects = self._first_entries(self.journal) + self.behaviour.start(now_us) + self.fixed.words(now_us)
         return self._settle(effects + self.witness.begin(now_us), now_us)
 
     def _first_entries(self, journal: JournalCondition) -> list[Effect]:
@@ -233,10 +232,10 @@ class Holon:
             # What was planned before is old; the first word is that of a machine that takes part.
             self.fleet.admissions += 1
             self.fleet.winners.begin_anew(now_us)
-            self._heartbeat_due_us = now_us
+            self.fixed.heartbeat_due_us = now_us
         if not self._bus_time_lost and self.part.begins:
             effects += self._carry_out(self.negotiation.wake(now_us), now_us)
-        effects += self._beat(now_us)
+        effects += self.fixed.words(now_us)
         return self._settle(effects, now_us)
 
     def next_wake(self) -> int | None:
@@ -257,12 +256,7 @@ class Holon:
         if self.part.begins:
             times += (self._negotiation_due(), self.behaviour.next_wake())
         self._work_due_us = min((time for time in times if time is not None), default=None)
-        return self._with_words()
-
-    def _with_words(self) -> int | None:
-        """The first of what is to be done and what is said at fixed times."""
-        times = (self._heartbeat_due_us, self.time.due_us, self._work_due_us)
-        return min((time for time in times if time is not None), default=None)
+        return self.fixed.due_us(self._work_due_us)
 
     def _only_speaks(self, local_us: int) -> bool:
         """Whether nothing but a word that is said at fixed times is due, and nobody looks for anything."""
@@ -281,11 +275,11 @@ class Holon:
         now_us = self.clock.bus_us(local_us)
         self.presence.begins(now_us)
         aside = dict(self.mirror.aside)
-        effects = self._beat(now_us)
+        effects = self.fixed.words(now_us)
         if aside != self.mirror.aside:
             self.is_due_known = False
             return self._settle(effects, now_us)
-        self._due_us = self._with_words()
+        self._due_us = self.fixed.due_us(self._work_due_us)
         return self._approve(effects)
 
     def _only_waits(self, now_us: int) -> bool:
@@ -296,9 +290,9 @@ class Holon:
 
     def _awake(self, now_us: int) -> list[Effect]:
         """Whoever finds that it has slept is an obstacle first, says so, and asks what it has missed."""
-        if self._heartbeat_due_us is None or not self.presence.awake(now_us):
+        if self.fixed.heartbeat_due_us is None or not self.presence.awake(now_us):
             return []
-        self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
+        self.fixed.heartbeat_due_us = now_us + self.site.timing.heartbeat_us
         self.holding.slept(now_us)
         self.witness.slept(now_us)
         # One by one: all are asked at power-up only.
@@ -318,7 +312,7 @@ class Holon:
         self._bus_time_lost &= heard in (TimeHeard.NOTHING, TimeHeard.REFUTED)
         match heard:
             case TimeHeard.REFUTED:
-                return [self._bus_time(now_us)]
+                return [self.fixed.bus_time(now_us)]
             case TimeHeard.FIRST:
                 return self._begin(now_us)
             case TimeHeard.SET_ANEW:
@@ -328,7 +322,7 @@ class Holon:
     def _begin(self, now_us: int) -> list[Effect]:
         """Bus time is known: the first word, and what was sensed before."""
         self.presence.begins(now_us)
-        self._heartbeat_due_us = now_us
+        self.fixed.heartbeat_due_us = now_us
         effects: list[Effect] = []
         for early in self._sensed_early.values():
             effects += self._settle(self.behaviour.sense(early, now_us), now_us)
@@ -387,7 +381,7 @@ class Holon:
         effects = self.witness.on_request(request, now_us)
         if self.clock.is_source:
             # Who asks may just have joined: it need not wait for the next period.
-            effects = [self._bus_time(now_us), *effects]
+            effects = [self.fixed.bus_time(now_us), *effects]
         return effects
 
     def _statements(self, now_us: int) -> list[Effect]:
@@ -478,22 +472,8 @@ class Holon:
                 effects.append(item)
         return effects
 
-    def _beat(self, now_us: int) -> list[Effect]:
-        effects: list[Effect] = []
-        if self._heartbeat_due_us is not None and self._heartbeat_due_us <= now_us:
-            self._heartbeat_due_us = now_us + self.site.timing.heartbeat_us
-            self.presence.review(now_us)
-            effects += self.holds.words() + self.mirror.forgotten()
-            effects += self._told.words(self.node_id, sum(self.wire_drops, Counter(self.drops)))
-            effects += [Send(word) for word in self.presence.halted_ones(now_us)]
-            effects += [Send(self.presence.standing_word(node)) for node in self.fleet.winners.stuck(now_us)]
-        if self.time.due_us is not None and self.time.due_us <= now_us:
-            self.time.due_us = now_us + self.site.timing.bus_time_us
-            effects.append(self._bus_time(now_us))
-        return effects
-
-    def _bus_time(self, now_us: int) -> Effect:
-        return Send(BusTime(self.node_id, now_us % BUS_TIME_MODULUS))
+    def _all_drops(self) -> Counter[Reason]:
+        return sum(self.wire_drops, Counter(self.drops))
 
     def _heartbeat(self) -> Heartbeat:
         return Heartbeat(
