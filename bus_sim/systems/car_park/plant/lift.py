@@ -1,11 +1,11 @@
 """A lift: the drive of its platform, which obeys orders as a carrier's does, and the platform's sensors."""
 
-from bus_sim.devices.link import DeviceLink
+from bus_sim.devices.link import DeviceBusLink
 from bus_sim.devices.timers import Timer, Timers
 from bus_sim.systems.car_park.plant.carrier import Carrier
 from bus_sim.systems.car_park.plant.motion import Motion
 from bus_sim.systems.car_park.plant.shaft import PlatformBody
-from bus_sim.systems.car_park.plant.world import MARK_TOLERANCE_MM, Change, World
+from bus_sim.systems.car_park.plant.world import MARK_TOLERANCE_MM, CarParkWorld, WorldChange
 from onboard.contract.messages import DriveOrder, PlatformState
 from onboard.ways.lifts import nearest_stop, stop_mm
 from onboard.ways.site import Axis, Offset, WaySite
@@ -24,7 +24,7 @@ class LiftDrive(Carrier):
     otherwise.
     """
 
-    def __init__(self, node_id: int, site: WaySite, world: World, timers: Timers, link: DeviceLink) -> None:
+    def __init__(self, node_id: int, site: WaySite, world: CarParkWorld, timers: Timers, link: DeviceBusLink) -> None:
         super().__init__(node_id, site, world, timers, link, lambda: True)
         self._told: PlatformState | None = None
         self._platform_timer: Timer | None = None
@@ -90,8 +90,8 @@ class LiftDrive(Carrier):
             return f"target {order.target_mm} mm is beyond the end of the shaft"
         return ""
 
-    def _on_change(self, change: Change, node_id: int, now_us: int) -> None:
-        if change in (Change.CARRIER, Change.CAR, Change.PLATFORM):
+    def _on_change(self, change: WorldChange, node_id: int, now_us: int) -> None:
+        if change in (WorldChange.CARRIER, WorldChange.CAR, WorldChange.PLATFORM):
             self._look()
 
     def _look(self) -> None:

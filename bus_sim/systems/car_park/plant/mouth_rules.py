@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from bus_sim.systems.car_park.plant.motion import Motion
-from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, Rule, Span, Violation
+from bus_sim.systems.car_park.plant.rules import OVERLAP_TOLERANCE_MM, MotionSpan, PlantRule, PlantViolation
 from bus_sim.systems.car_park.plant.world import MARK_TOLERANCE_MM
 from onboard.core.site import Segment
 from onboard.ways.site import TrackKind, WaySite
@@ -29,20 +29,22 @@ class MouthRules:
     def __init__(self, site: WaySite) -> None:
         self._site = site
 
-    def judge_pair(self, nodes: tuple[int, int], one: Span, two: Span, now_us: int) -> Iterator[Violation]:
+    def judge_pair(
+        self, nodes: tuple[int, int], one: MotionSpan, two: MotionSpan, now_us: int
+    ) -> Iterator[PlantViolation]:
         """What two carriers broke from when both did what they do until now."""
         from_us = max(one.from_us, two.from_us)
         for (node, here), (other, there) in (((nodes[0], one), (nodes[1], two)), ((nodes[1], two), (nodes[0], one))):
             for end in self._ends_of(here):
                 text = f"robots {node} and {other} at {self._name(end)}"
                 if here.turning_to is not None and self._is_inside(there, end, from_us):
-                    yield Violation(from_us, Rule.BODIES_APART, text)
+                    yield PlantViolation(from_us, PlantRule.BODIES_APART, text)
                 elif here.track == end.position.track:
                     time_us = self._meeting_us(here.motion, there, end, from_us, now_us)
                     if time_us is not None:
-                        yield Violation(time_us, Rule.BODIES_APART, text)
+                        yield PlantViolation(time_us, PlantRule.BODIES_APART, text)
 
-    def judge_turn(self, node_id: int, span: Span) -> Iterator[Violation]:
+    def judge_turn(self, node_id: int, span: MotionSpan) -> Iterator[PlantViolation]:
         """A carrier turns only where it stands in a mouth, into the track inside or out of it."""
         if span.turning_to is None:
             return
@@ -53,9 +55,11 @@ class MouthRules:
                 continue
             if not speed_mm_s and abs(position_mm - self._site.position_mm(here)) <= MARK_TOLERANCE_MM:
                 return
-        yield Violation(span.from_us, Rule.TURN_IN_MOUTH, f"robot {node_id} at {position_mm:.0f} mm of {span.track}")
+        yield PlantViolation(
+            span.from_us, PlantRule.TURN_IN_MOUTH, f"robot {node_id} at {position_mm:.0f} mm of {span.track}"
+        )
 
-    def _ends_of(self, span: Span) -> Iterator[_End]:
+    def _ends_of(self, span: MotionSpan) -> Iterator[_End]:
         """Linked ends of the track on whose axis a carrier moves, and of the one towards which it turns."""
         for number in (span.track, span.turning_to):
             if number is not None:
@@ -68,7 +72,7 @@ class MouthRules:
         track = self._site.tracks[end.position.track]
         return f"spur {track.number}" if track.kind is TrackKind.SPUR else f"the mouth {end.mouth} of {track.number}"
 
-    def _is_inside(self, other: Span, end: _End, time_us: int) -> bool:
+    def _is_inside(self, other: MotionSpan, end: _End, time_us: int) -> bool:
         """Whether another is in the segment inside of a mouth, at least in part."""
         track = self._site.tracks[end.position.track]
         if other.track != track.number:
@@ -76,7 +80,7 @@ class MouthRules:
         off_mm = abs(other.motion.at(time_us)[0] - self._site.position_mm(track.inside(end.position.index)))
         return track.length == 1 or off_mm < self._reach_mm
 
-    def _meeting_us(self, inside: Motion, other: Span, end: _End, from_us: int, to_us: int) -> int | None:
+    def _meeting_us(self, inside: Motion, other: MotionSpan, end: _End, from_us: int, to_us: int) -> int | None:
         """When one is over its mouth, at least in part, while another is in it, by its own track or a third."""
         if other.track == end.mouth.track:
             mouth_mm = self._site.position_mm(end.mouth)
