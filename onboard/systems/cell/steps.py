@@ -20,7 +20,7 @@ class Finding(Enum):
 
 
 class Deed(Enum):
-    """What the robot does."""
+    """What the robot does then, and with what effect."""
 
     WAIT = "nothing"
     CHOOSE = "take the most urgent contract in hand"
