@@ -16,7 +16,7 @@ from onboard.core.records import TokenHeldRecord
 from onboard.holon.holon import Holon
 from onboard.systems.cell.contracts import part_token
 from onboard.systems.cell.geometry import Point
-from onboard.systems.cell.records import ContractRecord, Stage, StageRecord
+from onboard.systems.cell.records import ContractRecord, ContractStage, StageRecord
 from onboard.systems.cell.robot import ArmRobot
 from onboard.systems.cell.steps import CHOOSING, TABLE, Deed, Finding
 from onboard.systems.registry import factory_for
@@ -49,7 +49,7 @@ WORDS = [
 ]
 
 
-def robot(words: Words, stage: Stage | None, *, is_custodian: bool) -> ArmRobot:
+def robot(words: Words, stage: ContractStage | None, *, is_custodian: bool) -> ArmRobot:
     """One with a contract at ``stage``, or with none."""
     site = cell()
     machine = site.machines[ARM]
@@ -95,12 +95,12 @@ SAID: dict[Deed, list[object]] = {
     Deed.CHOOSE: [],
     Deed.TO_START: [PLACES["start"]],
     Deed.TO_END: [PLACES["end"]],
-    Deed.BEGIN: [Stage.TAKEN],
+    Deed.BEGIN: [ContractStage.TAKEN],
     Deed.TAKE: [GripAction.TAKE],
     Deed.LIFTED: ["aboard"],
     Deed.REST: [],
     Deed.PUT: [GripAction.PUT],
-    Deed.PUT_DOWN: [Stage.PUT, "lies", Stage.OVER, "DONE"],
+    Deed.PUT_DOWN: [ContractStage.PUT, "lies", ContractStage.OVER, "DONE"],
 }
 
 
@@ -128,7 +128,7 @@ def line(phase: ArmPhase, finding: Finding) -> tuple[ArmPhase, list[object]]:
 
 @pytest.mark.parametrize("phase", WORKING)
 def test_every_phase_meets_every_word_of_drive_and_gripper(phase: ArmPhase) -> None:
-    stage = Stage.WON if phase is ArmPhase.TO_PART else Stage.TAKEN
+    stage = ContractStage.WON if phase is ArmPhase.TO_PART else ContractStage.TAKEN
     for words in WORDS:
         one = robot(words, stage, is_custodian=True)
         one.phase, one.active = phase, TASK
@@ -139,9 +139,11 @@ def test_every_phase_meets_every_word_of_drive_and_gripper(phase: ArmPhase) -> N
 
 
 @pytest.mark.parametrize("phase", CHOOSING)
-@pytest.mark.parametrize("stage", [None, Stage.WON, Stage.TAKEN])
+@pytest.mark.parametrize("stage", [None, ContractStage.WON, ContractStage.TAKEN])
 @pytest.mark.parametrize("is_custodian", [True, False])
-def test_without_a_part_in_hand_the_next_is_chosen(phase: ArmPhase, stage: Stage | None, is_custodian: bool) -> None:
+def test_without_a_part_in_hand_the_next_is_chosen(
+    phase: ArmPhase, stage: ContractStage | None, is_custodian: bool
+) -> None:
     for words in [one for one in WORDS if not one.is_ordered]:
         one = robot(words, stage, is_custodian=is_custodian)
         one.phase = phase
@@ -155,16 +157,16 @@ def test_without_a_part_in_hand_the_next_is_chosen(phase: ArmPhase, stage: Stage
         assert (list(told(one.advance(LATER_US))), one.phase) == (said, following), words
 
 
-def choice(stage: Stage | None, *, is_custodian: bool) -> Finding:
+def choice(stage: ContractStage | None, *, is_custodian: bool) -> Finding:
     if stage is None:
         return Finding.NOTHING
     if not is_custodian:
         return Finding.NO_RIGHT
-    return Finding.HALF_TAKEN if stage is Stage.TAKEN else Finding.MAY_TAKE
+    return Finding.HALF_TAKEN if stage is ContractStage.TAKEN else Finding.MAY_TAKE
 
 
 def test_a_line_of_the_table_is_for_what_can_be() -> None:
     met = {(phase, meant(phase, words)) for phase, words in product(WORKING, WORDS)}
-    stands = product((None, Stage.WON, Stage.TAKEN), (True, False))
+    stands = product((None, ContractStage.WON, ContractStage.TAKEN), (True, False))
     chosen = {choice(stage, is_custodian=custodian) for stage, custodian in stands}
     assert met | set(product(CHOOSING, chosen)) == set(TABLE)

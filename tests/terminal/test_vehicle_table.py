@@ -19,7 +19,7 @@ from onboard.core.site import Segment, Site
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 from onboard.systems.terminal.memory import plan_record
-from onboard.systems.terminal.plan import Load, Plan, Step
+from onboard.systems.terminal.plan import ActionPlan, ActionStep, Load
 from onboard.systems.terminal.records import BoxRecord, StepOverRecord
 from onboard.systems.terminal.site import Terminal
 from onboard.systems.terminal.steps import TABLE, Deed, Finding
@@ -93,8 +93,8 @@ def place(step: int, words: Words) -> tuple[int, int]:
 
 def vehicle(step: int, words: Words) -> Vehicle:
     """One in this step of its plan, with these words said."""
-    steps = tuple(Step(action, NUMBER[name], 1_000_000, LATER_US) for action, name in PLAN)
-    plan = Plan(VEHICLE, VERSION, NOW_US, steps, (Load(BOX, TASK, 6, 10),))
+    steps = tuple(ActionStep(action, NUMBER[name], 1_000_000, LATER_US) for action, name in PLAN)
+    plan = ActionPlan(VEHICLE, VERSION, NOW_US, steps, (Load(BOX, TASK, 6, 10),))
     here, box = place(step, words), car_token(*SITE.box(BOX))
     entries = [plan_record(plan).entry, *(StepOverRecord(VERSION, one, NOW_US).entry for one in range(step))]
     entries.append(TokenHeldRecord(TokenKind.SEGMENT, segment_token(Segment(*here)).number, 1, VEHICLE).entry)
