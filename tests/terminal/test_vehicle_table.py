@@ -22,7 +22,7 @@ from onboard.systems.terminal.memory import plan_record
 from onboard.systems.terminal.plan import ActionPlan, ActionStep, Load
 from onboard.systems.terminal.records import BoxRecord, StepOverRecord
 from onboard.systems.terminal.site import Terminal
-from onboard.systems.terminal.steps import TABLE, Deed, Finding
+from onboard.systems.terminal.steps import TABLE, ActionDeed, ActionFinding
 from onboard.systems.terminal.vehicle import Vehicle
 from onboard.ways.tokens import car_token
 
@@ -72,12 +72,12 @@ FLAGS = (False, True)
 def words_for(step: int) -> Iterator[Words]:
     """All that may be said in a step: about the way where it is a GOTO, else about the handler."""
     if PLAN[step][0] is Action.GOTO:
-        for mode, *flags in product(MoveMode, *[FLAGS] * 6):
+        for mode, flags in product(MoveMode, product(FLAGS, repeat=6)):
             at_end, is_last, is_there, is_moving, is_held, is_closed = flags
             yield Words(mode, at_end, is_last, is_there, is_moving, is_held=is_held, is_closed=is_closed)
         return
-    for at_end, gear, box, *flags in product(FLAGS, HandlerMode, (0, BOX), *[FLAGS] * 5):
-        is_there, is_moving, is_handling, is_held, has_right = flags
+    for gear, box, flags in product(HandlerMode, (0, BOX), product(FLAGS, repeat=6)):
+        at_end, is_there, is_moving, is_handling, is_held, has_right = flags
         yield Words(MoveMode.STANDING, at_end, False, is_there, is_moving, gear, box, is_handling, is_held, has_right)
 
 
@@ -130,17 +130,19 @@ def say(one: Vehicle, step: int, words: Words, here: tuple[int, int]) -> None:
         one.hear(LaneState(SITE.desk, following, blocked=True, since_ms=NOW_US // 1000), NOW_US)
 
 
-def meant(step: int, words: Words) -> Finding:
+def meant(step: int, words: Words) -> ActionFinding:
     """What the words come to, told once more."""
     action = PLAN[step][0]
     if action is Action.GOTO:
         return _meant_on_way(step, words)
     if action is Action.PICK_UP and not words.has_right:
-        return Finding.NO_RIGHT
+        return ActionFinding.NO_RIGHT
     if action is Action.UNDOCK and words.is_there:
-        return Finding.DONE
+        return ActionFinding.DONE
     if action is Action.UNDOCK and words.gear is HandlerMode.FREE and not words.is_handling:
-        return Finding.AT_WORK if words.is_moving else Finding.HELD if words.is_held else Finding.AT_END
+        return (
+            ActionFinding.AT_WORK if words.is_moving else ActionFinding.HELD if words.is_held else ActionFinding.AT_END
+        )
     is_done = {
         Action.DOCK: words.gear is HandlerMode.DOCKED,
         Action.PICK_UP: words.box == BOX,
@@ -148,29 +150,29 @@ def meant(step: int, words: Words) -> Finding:
         Action.UNDOCK: False,
     }[action]
     if is_done and not words.is_handling:
-        return Finding.DONE
+        return ActionFinding.DONE
     cannot_yet = action is Action.DOCK and (words.is_moving or not words.at_end)
     if words.is_handling or cannot_yet:
-        return Finding.AT_WORK
+        return ActionFinding.AT_WORK
     if words.is_held:
-        return Finding.HELD
-    return Finding.FAILED if words.gear is HandlerMode.FAILED else Finding.READY
+        return ActionFinding.HELD
+    return ActionFinding.FAILED if words.gear is HandlerMode.FAILED else ActionFinding.READY
 
 
-def _meant_on_way(step: int, words: Words) -> Finding:
+def _meant_on_way(step: int, words: Words) -> ActionFinding:
     if words.is_there:
-        return Finding.DONE
+        return ActionFinding.DONE
     if words.is_moving:
-        return Finding.AT_WORK
+        return ActionFinding.AT_WORK
     if words.mode is MoveMode.BLOCKED:
-        return Finding.OBSTACLE
+        return ActionFinding.OBSTACLE
     if words.is_held:
-        return Finding.HELD
+        return ActionFinding.HELD
     if step == LANE and not words.is_last:
-        return Finding.IN_LANE
+        return ActionFinding.IN_LANE
     if step == AREA and not words.is_last:
-        return Finding.CROSSES_ELSEWHERE
-    return Finding.CLOSED if words.is_closed else Finding.AT_END
+        return ActionFinding.CROSSES_ELSEWHERE
+    return ActionFinding.CLOSED if words.is_closed else ActionFinding.AT_END
 
 
 def expected(step: int, words: Words) -> list[object]:
@@ -181,20 +183,20 @@ def expected(step: int, words: Words) -> list[object]:
     is_ready = words.at_end and words.mode is MoveMode.STANDING and not words.is_moving
     following = NUMBER[PLAN[step + 1][1]] if step + 1 < len(PLAN) else 0
     onward = NUMBER[PLAN[step + 2][1]] if step + 2 < len(PLAN) else 0
-    said: dict[Deed, list[object]] = {
-        Deed.WAIT: [],
-        Deed.END: over,
-        Deed.END_ABOARD: ["box", "LOADED", *over],
-        Deed.END_PUT_DOWN: [("stands", NUMBER[name]), "box", "DONE", *over],
-        Deed.TELL_OBSTACLE: ["BLOCKED"],
-        Deed.TELL_FAILURE: ["FAILED"],
-        Deed.NEXT_SLOT: [("asks", Segment(entity, slot + 1))],
-        Deed.CROSS: [("goes", entity, following)],
-        Deed.NEXT_ENTITY: [("asks", Segment(following, 1))],
+    said: dict[ActionDeed, list[object]] = {
+        ActionDeed.WAIT: [],
+        ActionDeed.END: over,
+        ActionDeed.END_ABOARD: ["box", "LOADED", *over],
+        ActionDeed.END_PUT_DOWN: [("stands", NUMBER[name]), "box", "DONE", *over],
+        ActionDeed.TELL_OBSTACLE: ["BLOCKED"],
+        ActionDeed.TELL_FAILURE: ["FAILED"],
+        ActionDeed.NEXT_SLOT: [("asks", Segment(entity, slot + 1))],
+        ActionDeed.CROSS: [("goes", entity, following)],
+        ActionDeed.NEXT_ENTITY: [("asks", Segment(following, 1))],
         # In an area nobody needs a right.
-        Deed.BACK_TO_AREA: [("goes", SITE.entities[entity].area, onward)] if is_ready else [],
-        Deed.ASK_FOR_BOX: [("asks", BOX)],
-        Deed.HANDLE: [action] if words.has_right or action is not Action.PUT_DOWN else [],
+        ActionDeed.BACK_TO_AREA: [("goes", SITE.entities[entity].area, onward)] if is_ready else [],
+        ActionDeed.ASK_FOR_BOX: [("asks", BOX)],
+        ActionDeed.HANDLE: [action] if words.has_right or action is not Action.PUT_DOWN else [],
     }
     return said[TABLE[action, meant(step, words)]]
 

@@ -8,7 +8,7 @@ from enum import Enum
 from onboard.contract.terminal import Action
 
 
-class Finding(Enum):
+class ActionFinding(Enum):
     """What drive, handler, rights and mirror come to, for the action in hand; of several the first that holds."""
 
     NO_RIGHT = "the right to the box is with another"
@@ -24,7 +24,7 @@ class Finding(Enum):
     READY = "the handler can begin"
 
 
-class Deed(Enum):
+class ActionDeed(Enum):
     """What the vehicle does then, and with what effect."""
 
     WAIT = "nothing"
@@ -43,32 +43,32 @@ class Deed(Enum):
 
 #: At a station all actions of the handler go alike.
 _AT_STATION = {
-    Finding.AT_WORK: Deed.WAIT,
-    Finding.HELD: Deed.WAIT,
-    Finding.FAILED: Deed.TELL_FAILURE,
-    Finding.READY: Deed.HANDLE,
+    ActionFinding.AT_WORK: ActionDeed.WAIT,
+    ActionFinding.HELD: ActionDeed.WAIT,
+    ActionFinding.FAILED: ActionDeed.TELL_FAILURE,
+    ActionFinding.READY: ActionDeed.HANDLE,
 }
 
 #: (action, finding) -> deed.
-TABLE: dict[tuple[Action, Finding], Deed] = {
-    (Action.GOTO, Finding.DONE): Deed.END,
-    (Action.GOTO, Finding.AT_WORK): Deed.WAIT,
-    (Action.GOTO, Finding.OBSTACLE): Deed.TELL_OBSTACLE,
-    (Action.GOTO, Finding.HELD): Deed.WAIT,
-    (Action.GOTO, Finding.IN_LANE): Deed.NEXT_SLOT,
-    (Action.GOTO, Finding.CROSSES_ELSEWHERE): Deed.CROSS,
-    (Action.GOTO, Finding.CLOSED): Deed.WAIT,
-    (Action.GOTO, Finding.AT_END): Deed.NEXT_ENTITY,
+TABLE: dict[tuple[Action, ActionFinding], ActionDeed] = {
+    (Action.GOTO, ActionFinding.DONE): ActionDeed.END,
+    (Action.GOTO, ActionFinding.AT_WORK): ActionDeed.WAIT,
+    (Action.GOTO, ActionFinding.OBSTACLE): ActionDeed.TELL_OBSTACLE,
+    (Action.GOTO, ActionFinding.HELD): ActionDeed.WAIT,
+    (Action.GOTO, ActionFinding.IN_LANE): ActionDeed.NEXT_SLOT,
+    (Action.GOTO, ActionFinding.CROSSES_ELSEWHERE): ActionDeed.CROSS,
+    (Action.GOTO, ActionFinding.CLOSED): ActionDeed.WAIT,
+    (Action.GOTO, ActionFinding.AT_END): ActionDeed.NEXT_ENTITY,
     **{
         (action, finding): deed
         for action in Action
         if action is not Action.GOTO
         for finding, deed in _AT_STATION.items()
     },
-    (Action.DOCK, Finding.DONE): Deed.END,
-    (Action.PICK_UP, Finding.NO_RIGHT): Deed.ASK_FOR_BOX,
-    (Action.PICK_UP, Finding.DONE): Deed.END_ABOARD,
-    (Action.PUT_DOWN, Finding.DONE): Deed.END_PUT_DOWN,
-    (Action.UNDOCK, Finding.AT_END): Deed.BACK_TO_AREA,
-    (Action.UNDOCK, Finding.DONE): Deed.END,
+    (Action.DOCK, ActionFinding.DONE): ActionDeed.END,
+    (Action.PICK_UP, ActionFinding.NO_RIGHT): ActionDeed.ASK_FOR_BOX,
+    (Action.PICK_UP, ActionFinding.DONE): ActionDeed.END_ABOARD,
+    (Action.PUT_DOWN, ActionFinding.DONE): ActionDeed.END_PUT_DOWN,
+    (Action.UNDOCK, ActionFinding.AT_END): ActionDeed.BACK_TO_AREA,
+    (Action.UNDOCK, ActionFinding.DONE): ActionDeed.END,
 }

@@ -27,7 +27,7 @@ from onboard.systems.terminal.plan import Load
 from onboard.systems.terminal.planner import Planner
 from onboard.systems.terminal.records import StepOverRecord
 from onboard.systems.terminal.site import EntityKind, Terminal
-from onboard.systems.terminal.steps import TABLE, Deed, Finding
+from onboard.systems.terminal.steps import TABLE, ActionDeed, ActionFinding
 from onboard.systems.terminal.traffic import Owned
 from onboard.ways.cars import CarFleet, car_fleet, car_mirror
 from onboard.ways.tokens import car_token
@@ -214,27 +214,27 @@ class Vehicle:
         """One line of ``TABLE`` for the action in hand."""
         action = owned.plan.steps[owned.current].action
         match TABLE[action, self._found(action, owned)]:
-            case Deed.END | Deed.END_ABOARD | Deed.END_PUT_DOWN as deed:
+            case ActionDeed.END | ActionDeed.END_ABOARD | ActionDeed.END_PUT_DOWN as deed:
                 return self._of_load(deed, owned, now_us) + self._done(owned, now_us)
-            case Deed.TELL_OBSTACLE:
+            case ActionDeed.TELL_OBSTACLE:
                 self._told_blocked = True
                 return self._report(StepResult.BLOCKED, owned, now_us)
-            case Deed.TELL_FAILURE:
+            case ActionDeed.TELL_FAILURE:
                 self._retry_at_us = now_us + RETRY_US
                 return self._report(StepResult.FAILED, owned, now_us)
-            case Deed.ASK_FOR_BOX:
+            case ActionDeed.ASK_FOR_BOX:
                 return self.fleet.tokens.want(self._box_token(self._box(owned)), now_us)
-            case Deed.HANDLE:
+            case ActionDeed.HANDLE:
                 self._may_retry = False
                 return self._handle(action, 0 if action in (Action.DOCK, Action.UNDOCK) else self._box(owned), now_us)
-            case Deed.NEXT_SLOT | Deed.CROSS | Deed.NEXT_ENTITY | Deed.BACK_TO_AREA as deed:
+            case ActionDeed.NEXT_SLOT | ActionDeed.CROSS | ActionDeed.NEXT_ENTITY | ActionDeed.BACK_TO_AREA as deed:
                 return self._move_on(deed, owned, now_us)
         return []
 
     def _report(self, result: StepResult, owned: Owned, now_us: int) -> list[Effect]:
         return [Send(self.planner.report(owned, owned.current, now_us, result))]
 
-    def _found(self, action: Action, owned: Owned) -> Finding:
+    def _found(self, action: Action, owned: Owned) -> ActionFinding:
         """What drive, handler, rights and mirror come to."""
         move, handler = self.body.move, self.body.handler
         assert move is not None and handler is not None
@@ -243,69 +243,69 @@ class Vehicle:
                 return self._found_on_way(move, owned)
             case Action.DOCK:
                 if handler.gear is HandlerMode.DOCKED and not self.body.is_handling:
-                    return Finding.DONE
-                return self._found_at_station(handler, owned) if self.body.stands_ready else Finding.AT_WORK
+                    return ActionFinding.DONE
+                return self._found_at_station(handler, owned) if self.body.stands_ready else ActionFinding.AT_WORK
             case Action.PICK_UP:
                 box = self._box(owned)
                 if not self.fleet.tokens.holds(self._box_token(box)):
-                    return Finding.NO_RIGHT
+                    return ActionFinding.NO_RIGHT
                 is_aboard = handler.box == box and not self.body.is_handling
-                return Finding.DONE if is_aboard else self._found_at_station(handler, owned)
+                return ActionFinding.DONE if is_aboard else self._found_at_station(handler, owned)
             case Action.PUT_DOWN:
                 is_put = handler.box == 0 and not self.body.is_handling
-                return Finding.DONE if is_put else self._found_at_station(handler, owned)
+                return ActionFinding.DONE if is_put else self._found_at_station(handler, owned)
             case Action.UNDOCK:
                 return self._found_leaving(move, handler, owned)
 
-    def _found_on_way(self, move: MoveState, owned: Owned) -> Finding:
+    def _found_on_way(self, move: MoveState, owned: Owned) -> ActionFinding:
         """Across the entity in hand, slot by slot, into the next one (M11: inside, the way is the drive's)."""
         following = owned.plan.steps[owned.current + 1].entity
         if move.entity == following:
-            return Finding.DONE
+            return ActionFinding.DONE
         if self.body.is_moving:
-            return Finding.AT_WORK
+            return ActionFinding.AT_WORK
         if move.mode is MoveMode.BLOCKED and not self._told_blocked:
-            return Finding.OBSTACLE
+            return ActionFinding.OBSTACLE
         if not self.manual.may_begin(owned):
-            return Finding.HELD
+            return ActionFinding.HELD
         here = self.site.entities[move.entity]
         if here.kind is EntityKind.LANE and move.slot < here.capacity:
-            return Finding.IN_LANE
+            return ActionFinding.IN_LANE
         if here.kind is EntityKind.AREA and self.body.towards() != following:
-            return Finding.CROSSES_ELSEWHERE
+            return ActionFinding.CROSSES_ELSEWHERE
         if following in self.mirror.traffic.blocked:
-            return Finding.CLOSED
-        return Finding.AT_END
+            return ActionFinding.CLOSED
+        return ActionFinding.AT_END
 
-    def _found_at_station(self, handler: HandlerState, owned: Owned) -> Finding:
+    def _found_at_station(self, handler: HandlerState, owned: Owned) -> ActionFinding:
         if self.body.is_handling or self._retry_at_us is not None:
-            return Finding.AT_WORK
+            return ActionFinding.AT_WORK
         if not self.manual.may_begin(owned):
-            return Finding.HELD
+            return ActionFinding.HELD
         is_news = handler.gear is HandlerMode.FAILED and not self._may_retry
-        return Finding.FAILED if is_news else Finding.READY
+        return ActionFinding.FAILED if is_news else ActionFinding.READY
 
-    def _found_leaving(self, move: MoveState, handler: HandlerState, owned: Owned) -> Finding:
+    def _found_leaving(self, move: MoveState, handler: HandlerState, owned: Owned) -> ActionFinding:
         """Undocked and back in the bay of the area: the station is free."""
         if move.entity == self._area(owned):
-            return Finding.DONE
+            return ActionFinding.DONE
         if handler.gear is not HandlerMode.FREE or self.body.is_handling:
             return self._found_at_station(handler, owned)
         if self.body.is_moving:
-            return Finding.AT_WORK
-        return Finding.AT_END if self.manual.may_begin(owned) else Finding.HELD
+            return ActionFinding.AT_WORK
+        return ActionFinding.AT_END if self.manual.may_begin(owned) else ActionFinding.HELD
 
     def _area(self, owned: Owned) -> int:
         return self.site.entities[owned.plan.steps[owned.current].entity].area
 
-    def _move_on(self, deed: Deed, owned: Owned, now_us: int) -> list[Effect]:
+    def _move_on(self, deed: ActionDeed, owned: Owned, now_us: int) -> list[Effect]:
         """Into the slot, across the area or into the entity that comes next."""
         move, steps, current = self.body.move, owned.plan.steps, owned.current
         assert move is not None
-        following = self._area(owned) if deed is Deed.BACK_TO_AREA else steps[current + 1].entity
-        if deed is Deed.NEXT_SLOT:
+        following = self._area(owned) if deed is ActionDeed.BACK_TO_AREA else steps[current + 1].entity
+        if deed is ActionDeed.NEXT_SLOT:
             return self._enter(move.entity, move.slot + 1, following, now_us)
-        if deed is Deed.CROSS:
+        if deed is ActionDeed.CROSS:
             return self.body.go(self._permit(move.entity, move.slot), move.entity, move.slot, following, now_us)
         onward = steps[current + 2].entity if current + 2 < len(steps) else 0
         return self._enter(following, self.mirror.entry_slot(following, self.fleet.node_id), onward, now_us)
@@ -366,12 +366,12 @@ class Vehicle:
         of_box = [self._box_token(box)] if box else []
         return self.body.handle(self._permit(move.entity, move.slot, *of_box), action, box, now_us)
 
-    def _of_load(self, deed: Deed, owned: Owned, now_us: int) -> list[Effect]:
+    def _of_load(self, deed: ActionDeed, owned: Owned, now_us: int) -> list[Effect]:
         """What is said of the box that was just picked up or put down; nothing of any other action."""
-        if deed is Deed.END:
+        if deed is ActionDeed.END:
             return []
         load, station = self._load(owned), owned.plan.steps[owned.current].entity
-        if deed is Deed.END_ABOARD:
+        if deed is ActionDeed.END_ABOARD:
             return [*self._state_box(load.box, ANY_STATION), self._phase(load.task, TaskPhase.LOADED, 0)]
         effects: list[Effect] = [Record(box_record(self._box_at(load.box, station)))]
         effects += self._state_box(load.box, station)
