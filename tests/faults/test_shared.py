@@ -19,6 +19,7 @@ from bus_sim.faults.injection import Injection, parse_injection
 from bus_sim.faults.scenario import Scenario
 from bus_sim.sites import find_site
 from bus_sim.virtual_time import VirtualTimeLoop
+from tests.thinned import is_long
 
 SITE = "level1"
 pytestmark = pytest.mark.skipif(not shared.can_share(), reason="no process can be copied on this platform")
@@ -42,7 +43,10 @@ def rows(plan: Plan, results: Iterator[Result]) -> tuple[list[str], object, list
 
 @pytest.mark.parametrize("single", [Single.CRASH, Single.JOURNAL])
 def test_both_ways_come_to_the_same_table_and_rows(single: Single, counts: Counts) -> None:
-    plan, chosen = Plan(SITE, single, 3_600.0, usual_wait_s=counts.longest_wait_s), spread(single, counts, 9)
+    plan, chosen = (
+        Plan(SITE, single, 3_600.0, usual_wait_s=counts.longest_wait_s),
+        spread(single, counts, 9 if is_long() else 3),
+    )
     assert all(isinstance(one.fault, Injection) and is_shared(one.fault) for one in chosen)
     both = rows(plan, run_points(plan, chosen, 2))
     assert both == rows(plan, on_cores(1, partial(run_point, plan), chosen))

@@ -9,10 +9,11 @@ from bus_sim.campaign.fuzz import Fuzzer
 from bus_sim.sites import find_site
 from onboard.contract.codes import Reason
 from tests.mapd.sites import drawn, made
+from tests.thinned import is_long
 
-FRAMES = 20_000
+FRAMES = 20_000 if is_long() else 8_000
 #: Where a machine's own frames are few, or its device bus is silent, most that can be found is found in so many.
-SYSTEM_FRAMES = 8_000
+SYSTEM_FRAMES = 8_000 if is_long() else 4_000
 #: Items in all tables of one controller; a run of the site without a fuzzer has about a third of it.
 MOST_ITEMS = 40_000
 

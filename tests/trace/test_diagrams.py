@@ -1,6 +1,5 @@
 """Each system's diagram over time: what its messages say is where it says, and a system without one is refused."""
 
-import xml.etree.ElementTree as ET
 from itertools import pairwise
 from pathlib import Path
 
@@ -26,29 +25,6 @@ from onboard.trace.chart.over_time import Rows
 from onboard.trace.cli import main
 from onboard.trace.listener import Said
 from tests.web.logs import file_of, log_of, said_in
-
-_SVG = "{http://www.w3.org/2000/svg}"
-#: What stands beside the rows of each system's picture, and the least number of lines and areas in it.
-PICTURES = {
-    "small": (["p(1,5)", "lift ER1", "MR1", "MR2"], 10, 20),
-    "graph": (["N0", "N7", "R1", "R3"], 3, 5),
-    "terminal": (["L11", "A4", "S10", "R1", "R4", "blocked"], 30, 30),
-    "turning": (["L1", "L3", "order 1, 6 x pin"], 3, 4),
-    "cell": (["GM", "R1", "R5", "part 1"], 4, 10),
-    "mapd": (["columns", "rows", "R1"], 8, 2),
-}
-
-
-@pytest.mark.parametrize("name", PICTURES)
-def test_every_system_draws_what_moves_over_time(name: str, tmp_path: Path) -> None:
-    out = tmp_path / "one.svg"
-    assert main(["diagram", str(log_of(name)), "--site", str(file_of(name)), "--out", str(out)]) == 0
-    root = ET.parse(out).getroot()
-    names, lines, areas = PICTURES[name]
-    texts = {one.text for one in root.iter(f"{_SVG}text")}
-    assert not set(names) - texts
-    drawn = [one for one in root.iter(f"{_SVG}polyline") if float(one.get("stroke-width", "0")) > 1]
-    assert len(drawn) >= lines and len(list(root.iter(f"{_SVG}polygon"))) >= areas
 
 
 def _watched(diagram: Rows, name: str) -> Rows:
