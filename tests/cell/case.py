@@ -1,10 +1,10 @@
 """The manufacturing cell, for the tests of every system."""
 
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.cell import ArmPhase, ArmProgress, GoalPath, OfferHigh, OfferLow, PartAt
 from onboard.contract.messages import Bid, CallForProposals, Message, Reference
 from onboard.systems.cell.fields import halves
-from tests.cell.playing import cell, wish
+from tests.cell.playing import cell, goal_demand
 from tests.conformance.case import Case
 
 PART = Reference(9, 1)
@@ -31,10 +31,10 @@ def _by_predecessor(messages: list[tuple[int, Message]]) -> list[tuple[int, Mess
 CASE = Case(
     system="cell",
     site="cell",
-    busy=lambda: cell(wish((10, 10), (40, 30)), wish((40, 30), (30, 5), at_s=20, within_s=600)),
+    busy=lambda: cell(goal_demand((10, 10), (40, 30)), goal_demand((40, 30), (30, 5), at_s=20, within_s=600)),
     struck_s=lambda _: (14.0, 102.0),
     limit_s=1_200,
-    orders=Orders(3, 20.0),
+    orders=OrderArrivals(3, 20.0),
     parties=(9, 1, 2),
     bidding=_offer,
     broken={

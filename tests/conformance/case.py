@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.messages import Bid, Message, Reference
 from onboard.core.site import Site
 from onboard.trace.check.rule import Rule
@@ -37,7 +37,7 @@ class Case:
     #: What strikes it, turn and turn about; nothing where it does not claim to get over it.
     profiles: tuple[str, ...] = ("bus", "crash")
     #: Orders that are carried out beside a machine that does not do what it wins; None: none can be such a one.
-    orders: Orders | None = None
+    orders: OrderArrivals | None = None
     #: Who calls and two that bid, by node-ID; no calls by the core where it is None.
     parties: tuple[int, int, int] | None
     bidding: Bidding = plain_bid

@@ -5,7 +5,7 @@ import pytest
 from bus_sim.campaign.strangers import StrangerPlan, play_pair
 from bus_sim.cli import main
 from bus_sim.sites import find_site
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from bus_sim.systems.registry import simulated_of
 from bus_sim.systems.stranger import Stranger
 from tests.conformance.cases import CASES
@@ -18,7 +18,7 @@ WITHOUT = [name for name in CASES if simulated_of(site_of(name)).worker is None]
 
 
 @pytest.mark.parametrize(("system", "how", "orders"), some(BESIDE, 6))
-def test_orders_are_served_or_told_why_beside_a_stranger(system: str, how: Stranger, orders: Orders) -> None:
+def test_orders_are_served_or_told_why_beside_a_stranger(system: str, how: Stranger, orders: OrderArrivals) -> None:
     limit_s = simulated_of(site_of(system)).patience_s(site_of(system), orders, 1)
     pair = play_pair(StrangerPlan(site_file(system), how, orders, limit_s), 1)
     assert pair.is_good, pair.line()

@@ -3,7 +3,7 @@
 from bus_sim.sites import find_site
 from onboard.contract.codes import KindCode, Reason
 from onboard.contract.messages import BusTime, EmergencyStop
-from onboard.holon.holding import STOP_LASTS_US, Hold
+from onboard.holon.holding import STOP_LASTS_US, HoldState
 from onboard.holon.holon import Holon
 from onboard.systems.registry import factory_for
 
@@ -28,7 +28,7 @@ def test_an_emergency_stop_is_not_old_because_a_clock_has_jumped() -> None:
     for now_us in (DAY_US, *range(DAY_US, DAY_US + STOP_LASTS_US + 1, 1_000_000)):
         holon.wake(now_us)
         holds.append(holon.holding.hold)
-    assert holds == [Hold.STOPPED] * (len(holds) - 1) + [Hold.ACTING]
+    assert holds == [HoldState.STOPPED] * (len(holds) - 1) + [HoldState.ACTING]
 
 
 def test_a_machine_that_was_started_again_has_not_heard_everybody_because_its_clock_has_jumped() -> None:

@@ -1,6 +1,6 @@
 """The factory graph, for the tests of every system."""
 
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.graph import EdgeNotice, EdgeState, NodeAnswer, NodeVerdict, RobotAt, RobotMode, TurnSignal
 from onboard.trace.check.holds import LetGoAgain
 from tests.conformance.case import Case
@@ -18,7 +18,7 @@ CASE = Case(
     busy=lambda: made(hall(), (0, 4, 8), busy_orders(hall(), 5, 7)),
     struck_s=lambda _: (12.0, 100.0),
     limit_s=900,
-    orders=Orders(3, 20.0),
+    orders=OrderArrivals(3, 20.0),
     parties=(9, 21, 22),
     broken={
         "one-an-edge": [[_at(21, 0, 1), _at(22, 1, 0)], [_at(21, 0, 8)]],

@@ -2,7 +2,7 @@
 
 from onboard.contract.mapd import PathHead, PathMoves, StepRound, StepState
 from onboard.contract.messages import Bid, Message
-from onboard.systems.mapd.auction import Task
+from onboard.systems.mapd.auction import TransportTask
 from onboard.systems.mapd.calls import award_of, call_of
 from onboard.systems.mapd.fields import NO_TASK
 from tests.conformance.case import Case
@@ -20,7 +20,7 @@ def _path(robot: int, cell: int, *codes: int, step: int = 0) -> list[Message]:
     return [PathHead(robot, step, cell, len(codes), 1, False), *moves]
 
 
-CALL = call_of(1, Task(3, 0, 12, 15), 0)
+CALL = call_of(1, TransportTask(3, 0, 12, 15), 0)
 _ROUND = StepRound(1, 0, 1, 0, True)
 CASE = Case(
     system="mapd",

@@ -4,7 +4,7 @@ import pytest
 
 from bus_sim.systems.mapd.importers.command import import_files
 from bus_sim.systems.mapd.importers.draft import site_text
-from bus_sim.systems.mapd.importers.mapf import Wanted
+from bus_sim.systems.mapd.importers.mapf import DrawnDemand
 from onboard.config.site import parse_site
 from tests.faults.systems import PLANTS, judged, withstands
 from tests.mapd.case import CALL, at
@@ -16,7 +16,7 @@ SITE = made(6, drawn(16, 1))
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("plant_file", ["hotel.building.yaml", "Demo-01.xml"])
 def test_an_imported_plant_under_faults(plant_file: str, seed: int) -> None:
-    draft = import_files([PLANTS / plant_file], Wanted(tasks=3, seed=7))
+    draft = import_files([PLANTS / plant_file], DrawnDemand(tasks=3, seed=7))
     site = parse_site(site_text(draft), plant_file)
     assert withstands(site, seed, (4.0, 28.64), 900).served == 3
 

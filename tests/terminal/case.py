@@ -1,7 +1,7 @@
 """The container terminal, for the tests of every system."""
 
 from bus_sim.sites import find_site
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.codes import TokenKind
 from onboard.contract.constants import ANY_STATION
 from onboard.contract.messages import CarAt, Reference, TokenHeld
@@ -39,7 +39,7 @@ CASE = Case(
     busy=short,
     struck_s=lambda _: (16.0, 80.0),
     limit_s=900,
-    orders=Orders(2, 30.0),
+    orders=OrderArrivals(2, 30.0),
     parties=(1, 11, 12),
     broken={
         "one-body-a-slot": [[_in(11, L3, 2), _in(12, L3, 2)], [_in(11, S2, 1), _in(12, S2, 2)]],

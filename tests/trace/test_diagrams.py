@@ -23,14 +23,14 @@ from onboard.systems.turning.diagram import TurningDiagram
 from onboard.systems.turning.site import Turning
 from onboard.trace.chart.over_time import Rows
 from onboard.trace.cli import main
-from onboard.trace.listener import Said
+from onboard.trace.listener import LoggedMessage
 from tests.web.logs import file_of, log_of, said_in
 
 
 def _watched(diagram: Rows, name: str) -> Rows:
     for time_us, is_fleet, message in said_in(name):
         if is_fleet:
-            diagram.feed(Said(time_us, "fleet", message, is_fleet))
+            diagram.feed(LoggedMessage(time_us, "fleet", message, is_fleet))
     diagram.draw(0)
     return diagram
 

@@ -3,18 +3,18 @@
 from dataclasses import replace
 
 from bus_sim.sites import find_site
-from bus_sim.systems.orders import Orders
+from bus_sim.systems.orders import OrderArrivals
 from onboard.contract.codes import Reason, TaskPhase
 from onboard.contract.messages import Bid, Message, Reference, TaskReport
 from onboard.contract.turning import BillBar, BillCutting, BillWaiting, LathePhase, LatheProgress
-from onboard.systems.turning.lathe import Job
-from onboard.systems.turning.site import Turning, Wanted
+from onboard.systems.turning.lathe import TurningJob
+from onboard.systems.turning.site import BatchDemand, Turning
 from tests.conformance.case import Case
 
 TASK = Reference(9, 1)
 
 
-def shipped(*orders: Wanted) -> Turning:
+def shipped(*orders: BatchDemand) -> Turning:
     """The shipped site, with other orders."""
     site = find_site("turning")
     assert isinstance(site, Turning)
@@ -44,12 +44,14 @@ CASE = Case(
     site="turning",
     options=("--for", "900"),
     busy=lambda: shipped(
-        Wanted(0, Job(1, 2, 14, 2)), Wanted(5_000, Job(2, 1, 45, 1)), Wanted(20_000, Job(1, 1, 16, 2))
+        BatchDemand(0, TurningJob(1, 2, 14, 2)),
+        BatchDemand(5_000, TurningJob(2, 1, 45, 1)),
+        BatchDemand(20_000, TurningJob(1, 1, 16, 2)),
     ),
     # Half of them strike while calls are open, half over the whole of the work.
     struck_s=lambda seed: (10.0, 36.4) if seed % 4 < 2 else (10.0, 714.0),
     limit_s=20_000,
-    orders=Orders(2, 30.0),
+    orders=OrderArrivals(2, 30.0),
     parties=(9, 1, 2),
     bidding=_bill,
     broken={

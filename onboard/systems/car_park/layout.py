@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass, field
 
-from onboard.config.reader import Table, type_name
+from onboard.config.reader import TomlTable, type_name
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import Side
 from onboard.core.site import Segment, Station
@@ -32,7 +32,7 @@ class Layout:
     taken: dict[Station, str] = field(default_factory=dict)
     kept: dict[Segment, str] = field(default_factory=dict)
     without: set[Station] = field(default_factory=set)
-    lifts: list[Table] = field(default_factory=list)
+    lifts: list[TomlTable] = field(default_factory=list)
     pitch_mm: int = 2_400
     known: bool = True
 
@@ -40,7 +40,7 @@ class Layout:
         """The alleys, in the order in which the tracks were read."""
         return [track for track in self.tracks.values() if track.kind is TrackKind.ALLEY]
 
-    def find(self, table: Table, name: str, *, spurs: bool = False) -> Segment | None:
+    def find(self, table: TomlTable, name: str, *, spurs: bool = False) -> Segment | None:
         """The segment named at a key; None, and a problem noted, where the site has no such alley or spur segment."""
         segment = table.segment(name)
         if segment is None or not self.known:
@@ -56,7 +56,7 @@ class Layout:
             return None
         return segment
 
-    def take(self, table: Table, front: Segment | None, side: str) -> Station | None:
+    def take(self, table: TomlTable, front: Segment | None, side: str) -> Station | None:
         """Put something other than a place beside a segment, unless something else is there."""
         if front is None:
             return None
@@ -81,7 +81,7 @@ class Layout:
         )
 
 
-def read_layout(root: Table, floor_height_mm: int) -> Layout:
+def read_layout(root: TomlTable, floor_height_mm: int) -> Layout:
     """Floors, lifts and spurs of a site file; ``floor_height_mm`` is the pitch of every shaft."""
     layout = Layout()
     floors = root.table("floors", required=True)
@@ -95,7 +95,7 @@ def read_layout(root: Table, floor_height_mm: int) -> Layout:
     return layout
 
 
-def _read_alleys(layout: Layout, floors: Table) -> None:
+def _read_alleys(layout: Layout, floors: TomlTable) -> None:
     count = floors.integer("count", 1, _MOST_FLOORS)
     positions = floors.integer("positions", 2, _MOST_POSITIONS)
     sides = _read_sides(floors, frozenset(Side))
@@ -113,7 +113,7 @@ def _read_alleys(layout: Layout, floors: Table) -> None:
         layout.sides[number] = own_sides
 
 
-def _read_sides(table: Table, default: frozenset[Side]) -> frozenset[Side]:
+def _read_sides(table: TomlTable, default: frozenset[Side]) -> frozenset[Side]:
     words = table.items("sides", 'a list such as ["near", "far"]')
     if words is None:
         return default
@@ -126,7 +126,7 @@ def _read_sides(table: Table, default: frozenset[Side]) -> frozenset[Side]:
     return frozenset(sides)
 
 
-def _read_without(layout: Layout, floors: Table) -> None:
+def _read_without(layout: Layout, floors: TomlTable) -> None:
     """Positions without a place: ``p(1,3)N``, both sides ``p(1,3)``, on all floors ``p(*,3)``."""
     for number, text in enumerate(floors.items("without", 'a list of places such as ["p(1,3)N"]') or ()):
         found = _PLACES.fullmatch(text) if isinstance(text, str) else None
@@ -178,7 +178,7 @@ def _read_lifts(layout: Layout, floor_height_mm: int) -> None:
         layout.tracks[number] = Track(number, TrackKind.LIFT, len(sills), floor_height_mm, sills)
 
 
-def _read_served(layout: Layout, table: Table) -> list[int]:
+def _read_served(layout: Layout, table: TomlTable) -> list[int]:
     """Floors that a lift serves, rising without a gap: a shaft has one segment for each, equally far apart."""
     here = [alley.number for alley in layout.alleys()]
     written = table.items("floors", "a list of floors such as [1, 2, 3]")
@@ -202,7 +202,7 @@ def _read_served(layout: Layout, table: Table) -> list[int]:
     return list(written)
 
 
-def _read_spurs(layout: Layout, tables: list[Table]) -> None:
+def _read_spurs(layout: Layout, tables: list[TomlTable]) -> None:
     if len(tables) > AFTER_SPURS - FIRST_SPUR:
         tables[-1].bad("at", None, f"{len(tables)} spurs", f"a site has at most {AFTER_SPURS - FIRST_SPUR}")
         return
