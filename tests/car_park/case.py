@@ -11,6 +11,7 @@ CASE = Case(
     system="car-park",
     site="small",
     options=("--one-car", "60"),
+    moving=("--random", "40", "15", "--cars", "2", "--for", "150"),
     busy=lambda: replace(find_site("small")),
     struck_s=lambda _: (12.0, 100.0),
     limit_s=1_200,

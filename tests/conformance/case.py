@@ -34,10 +34,14 @@ class Case:
     busy: Callable[[], Site]
     struck_s: Callable[[int], tuple[float, float]]
     limit_s: float
+    #: A run in which something is soon set in motion.
+    moving: tuple[str, ...] = ("--for", "60")
     #: What strikes it, turn and turn about; nothing where it does not claim to get over it.
     profiles: tuple[str, ...] = ("bus", "crash")
     #: Orders that are carried out beside a machine that does not do what it wins; None: none can be such a one.
     orders: OrderArrivals | None = None
+    #: Whether a machine goes on from its journal with what it had in hand.
+    goes_on: bool = True
     #: Who calls and two that bid, by node-ID; no calls by the core where it is None.
     parties: tuple[int, int, int] | None
     bidding: Bidding = plain_bid

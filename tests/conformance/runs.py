@@ -32,6 +32,12 @@ def site_of(system: str) -> Site:
     return find_site(site_file(system))
 
 
+def one_of_each_kind(system: str) -> list[str]:
+    """The names of machines, one of each kind that the system has."""
+    kinds = {machine.kind: machine.name for machine in reversed(site_of(system).machines.values())}
+    return list(kinds.values())
+
+
 @cache
 def log_of(system: str) -> Path:
     """The log of a run in which nothing goes wrong, device buses included; its figures lie beside it as run.json."""

@@ -29,10 +29,9 @@ from onboard.trace.candump_reader import CandumpReader
 from onboard.wire.decoder import Decoder
 from tests.conformance.cases import CASES
 from tests.conformance.runs import site_file, site_of
+from tests.tools import DEADLINE_S
 
 PLUGIN = Path(__file__).parents[1] / "plugin"
-#: A process that has said nothing until then never will, s of the clock.
-DEADLINE_S = 120.0
 every_system = pytest.mark.parametrize("system", CASES)
 without_cars = pytest.mark.parametrize("system", [one for one in CASES if one != "car-park"])
 

@@ -19,6 +19,7 @@ CASE = Case(
     limit_s=600,
     # It keeps no journals and says things once, as docs/new-system.md says.
     profiles=(),
+    goes_on=False,
     parties=(1, 21, 22),
     broken={"polished-once": [[TaskReport(node, PART, TaskPhase.DONE, 0, Reason.NONE) for node in (21, 22)]]},
     # It has no right that goes from hand to hand.
