@@ -86,9 +86,7 @@ class Counter:
 
     def sent(self, kind: type[M]) -> list[M]:
         """Said to all."""
-        return [
-            e.message for at, e in self.said if at >= since_us and isinstance(e, Send) and isinstance(e.message, kind)
-        ]
+        return [e.message for _, e in self.said if isinstance(e, Send) and isinstance(e.message, kind)]
 
     def answers(self) -> list[tuple[int, bool]]:
         """Said at the counter: mission, and whether it is taken."""
