@@ -1,15 +1,17 @@
 """A terminal's desk alone: what it answers at its counter, tells all, journals, and says again, and until when."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from typing import TypeVar
 
 import pytest
 
-from onboard.contract.codes import CONTRACT_VERSION, KindCode, MachineState, ManualMode, Reason, TaskPhase, TokenKind
+from onboard.contract.codes import KindCode, ManualMode, Reason, TaskPhase, TokenKind
 from onboard.contract.messages import (
+    Award,
+    Bid,
     CallForProposals,
-    Heartbeat,
     ManualOrder,
     ManualState,
     Message,
@@ -20,11 +22,9 @@ from onboard.contract.messages import (
 )
 from onboard.contract.terminal import BoxOrder, LaneState, TaskTerms, Verb
 from onboard.contract.terminal_device import LaneSensor, ManualKey, MissionAnswer, MissionKey
-from onboard.core.effects import Effect, Record, Report, Send, Tell
 from onboard.core.journal_records import Entry
-from onboard.holon.holon import Holon
-from onboard.systems.registry import factory_for
 from onboard.systems.terminal.site import Terminal
+from tests.conformance.alone import Alone
 from tests.terminal.seeds import short
 
 M = TypeVar("M", bound=Message)
@@ -45,57 +45,16 @@ def box(name: str) -> int:
     return next(number for number, one in enumerate(site().boxes, 1) if one.name == name)
 
 
-class Counter:
-    """A desk with its journal, among vehicles that live, and all that it has said."""
+class Counter(Alone):
+    """A desk among vehicles that live."""
 
     def __init__(self, entries: Iterable[Entry] = (), boot: int = 1) -> None:
-        machine = site().machines[DESK]
-        self.journal = list(entries)
-        self.holon = Holon(site(), machine, factory_for(site(), machine.kind), boot=boot, entries=self.journal)
-        self.now_us = 0
-        self.said: list[tuple[int, Effect]] = []
-        self._take(self.holon.start(0))
-        self.holon.tokens.trust()
+        super().__init__(site(), DESK, entries, boot)
         self.passes(20)
-
-    def _take(self, effects: Iterable[Effect]) -> None:
-        for one in effects:
-            self.said.append((self.now_us, one))
-            if isinstance(one, Record):
-                self.journal.append(one.entry)
-
-    def passes(self, seconds: float) -> None:
-        """Time goes by, and all the others tell each second that they live."""
-        until_us = self.now_us + round(seconds * SECOND)
-        while self.now_us < until_us:
-            self.now_us += SECOND
-            for node, machine in site().machines.items():
-                if node != DESK:
-                    beat = Heartbeat(node, CONTRACT_VERSION, site().digest, 0, 1, machine.kind, MachineState.IDLE)
-                    self._take(self.holon.receive(beat, self.now_us))
-            while (due_us := self.holon.next_wake()) is not None and due_us <= self.now_us:
-                self._take(self.holon.wake(self.now_us))
-
-    def typed(self, *words: Message) -> None:
-        for one in words:
-            self._take(self.holon.sense(one, self.now_us))
-
-    def hears(self, *words: Message) -> None:
-        for one in words:
-            self._take(self.holon.receive(one, self.now_us))
-
-    def sent(self, kind: type[M]) -> list[M]:
-        """Said to all."""
-        return [e.message for _, e in self.said if isinstance(e, Send) and isinstance(e.message, kind)]
 
     def answers(self) -> list[tuple[int, bool]]:
         """Said at the counter: mission, and whether it is taken."""
-        told = [e.message for _, e in self.said if isinstance(e, Tell)]
-        return [(one.mission, one.is_taken) for one in told if isinstance(one, MissionAnswer)]
-
-    def reported(self) -> list[str]:
-        """Said to a person."""
-        return [e.text for _, e in self.said if isinstance(e, Report)]
+        return [(one.mission, one.is_taken) for one in self.told(MissionAnswer)]
 
 
 def load(mission: int = 7, count: int = 2, source: str = "A4", to: str = "S1", *, urgent: bool = False) -> MissionKey:
@@ -110,33 +69,33 @@ def tranship(mission: int, *names: str, to: str = "S4") -> list[MissionKey]:
 
 def test_a_mission_is_answered_and_its_boxes_are_called_for_one_by_one() -> None:
     desk = Counter()
-    desk.typed(load(count=2))
+    desk.senses(load(count=2))
     assert desk.answers() == [(7, True)]
     calls = desk.sent(CallForProposals)
     assert {one.kind for one in calls} == {KindCode.VEHICLE} and {one.to_station for one in calls} == {place("S1")}
     assert len({one.task for one in calls}) == len({one.car for one in calls}) == 2
     assert {one.task for one in desk.sent(TaskTerms)} == {one.task for one in calls}
-    desk.typed(load(count=2))
+    desk.senses(load(count=2))
     assert desk.answers() == [(7, True)] * 2 and len(desk.sent(CallForProposals)) == 2, "said again, done once"
 
 
 def test_a_mission_that_was_taken_is_not_taken_again_after_a_restart() -> None:
     first = Counter()
-    first.typed(*tranship(9, "B4"))
+    first.senses(*tranship(9, "B4"))
     assert first.answers() == [(9, True)]
     again = Counter(first.journal, boot=2)
     assert [one.car.number for one in again.sent(CallForProposals)][:1] == [box("B4")], "it is called for by itself"
     calls = len(again.sent(CallForProposals))
-    again.typed(*tranship(9, "B4"))
+    again.senses(*tranship(9, "B4"))
     assert again.answers() == [(9, True)] * 2, "each word of it is answered"
     assert len(again.sent(CallForProposals)) == calls
 
 
 def test_a_mission_of_several_boxes_is_nothing_until_it_has_come_whole() -> None:
     desk, (one, two, end) = Counter(), tranship(9, "B3", "B4")
-    desk.typed(one, end)
+    desk.senses(one, end)
     assert desk.answers() == [] and desk.sent(CallForProposals) == []
-    desk.typed(two, end)
+    desk.senses(two, end)
     assert desk.answers() == [(9, True)]
 
 
@@ -153,23 +112,23 @@ def test_a_mission_of_several_boxes_is_nothing_until_it_has_come_whole() -> None
 def test_what_cannot_be_carried_out_is_refused_at_the_counter(key: MissionKey) -> None:
     desk = Counter()
     before = len(desk.journal)
-    desk.typed(key)
+    desk.senses(key)
     assert desk.answers() == [(7, False)]
     assert desk.sent(CallForProposals) == [] and len(desk.journal) == before
 
 
 def test_an_urgent_mission_goes_before_one_that_was_called_for() -> None:
     desk = Counter()
-    desk.typed(load(7, 4))
+    desk.senses(load(7, 4))
     first = desk.sent(CallForProposals)
-    desk.typed(load(8, 1, to="S4", urgent=True))
+    desk.senses(load(8, 1, to="S4", urgent=True))
     news = desk.sent(CallForProposals)[len(first) :]
     assert [one.to_station for one in news][:1] == [place("S4")]
 
 
 def test_who_may_not_end_tasks_is_counted_and_changes_nothing() -> None:
     desk = Counter()
-    desk.typed(*tranship(9, "B4"))
+    desk.senses(*tranship(9, "B4"))
     (task,) = {one.task for one in desk.sent(CallForProposals)}
     desk.hears(TaskReport(QUAY, task, TaskPhase.DONE, place("S4"), Reason.NONE))
     assert desk.holon.drops[Reason.NOT_OF_KIND] == 1
@@ -178,27 +137,70 @@ def test_who_may_not_end_tasks_is_counted_and_changes_nothing() -> None:
     assert not any("is done" in line for line in desk.reported()), "R1 has not won it"
 
 
+# --- who has a task -----------------------------------------------------------------------------------------------
+
+
+def won(desk: Counter, vehicle: int = R1) -> CallForProposals:
+    """The newest call, which this vehicle has won by the only bid."""
+    call = desk.sent(CallForProposals)[-1]
+    desk.hears(Bid(vehicle, DESK, call.call, call.deadline_ms + 60_000, 0))
+    desk.passes(3)
+    assert {one.winner for one in desk.sent(Award) if one.task == call.task} == {vehicle}
+    return call
+
+
+def test_a_task_is_over_once_its_own_winner_says_so() -> None:
+    desk = Counter()
+    desk.senses(*tranship(9, "B4"))
+    call = won(desk)
+    desk.hears(TaskReport(R2, call.task, TaskPhase.DONE, place("S4"), Reason.NONE))
+    assert not any("is done" in line for line in desk.reported()), "R2 has not won it"
+    desk.hears(TaskReport(R1, call.task, TaskPhase.DONE, place("S4"), Reason.NONE))
+    assert any(f"task {call.task.number} is done" in line for line in desk.reported())
+    again = Counter(desk.journal, boot=2)
+    assert again.sent(CallForProposals) == [], "and after a restart too"
+
+
+def test_what_its_winner_gives_back_is_called_for_again() -> None:
+    desk = Counter()
+    desk.senses(*tranship(9, "B4"))
+    call = won(desk)
+    desk.hears(TaskReport(R1, call.task, TaskPhase.FORFEITED, place("S2"), Reason.IMPOSSIBLE))
+    desk.passes(10)
+    news = [one for one in desk.sent(CallForProposals) if one.call > call.call]
+    assert {one.car.number for one in news} == {box("B4")}
+
+
+def test_a_box_for_which_another_desk_calls_is_not_called_for() -> None:
+    desk, other = Counter(), Counter()
+    other.senses(*tranship(9, "B4"))
+    theirs = other.sent(CallForProposals)[-1]
+    desk.hears(replace(theirs, sender=QUAY, task=Reference(QUAY, 1)))
+    desk.senses(*tranship(9, "B4"))
+    assert desk.answers() == [(9, True)] and desk.sent(CallForProposals) == []
+
+
 # --- lanes -----------------------------------------------------------------------------------------------------
 
 
 def test_a_blocked_lane_is_told_to_all_again_and_again_and_that_it_is_free_too() -> None:
     desk, lane = Counter(), place("L11")
-    desk.typed(LaneSensor(DESK, lane, False))
+    desk.senses(LaneSensor(DESK, lane, False))
     assert desk.sent(LaneState) == [], "nobody thought that it was blocked"
-    desk.typed(LaneSensor(DESK, lane, True), LaneSensor(DESK, lane, True))
+    desk.senses(LaneSensor(DESK, lane, True), LaneSensor(DESK, lane, True))
     (told,) = desk.sent(LaneState)
     assert (told.lane, told.blocked) == (lane, True)
     desk.passes(30)
     repeated = desk.sent(LaneState)
     assert len(repeated) > 4 and set(repeated) == {told}, "a vehicle that was off hears it, and since when"
-    desk.typed(LaneSensor(DESK, lane, False))
+    desk.senses(LaneSensor(DESK, lane, False))
     assert not desk.sent(LaneState)[-1].blocked
 
 
 @pytest.mark.parametrize("name", ["S1", "A4", "C1"])
 def test_only_lanes_are_blocked(name: str) -> None:
     desk = Counter()
-    desk.typed(LaneSensor(DESK, place(name), True))
+    desk.senses(LaneSensor(DESK, place(name), True))
     assert desk.sent(LaneState) == []
 
 
@@ -207,7 +209,7 @@ def test_only_lanes_are_blocked(name: str) -> None:
 
 def test_a_key_for_a_vehicle_is_said_until_the_vehicle_itself_has_heard_it() -> None:
     desk = Counter()
-    desk.typed(ManualKey(DESK, 3, R1, ManualMode.HELD))
+    desk.senses(ManualKey(DESK, 3, R1, ManualMode.HELD))
     begin_us = desk.now_us
     desk.passes(5)
     orders = desk.sent(ManualOrder)
@@ -224,14 +226,14 @@ def test_a_key_for_a_vehicle_is_said_until_the_vehicle_itself_has_heard_it() -> 
 
 def test_a_key_for_what_is_no_vehicle_is_nothing() -> None:
     desk = Counter()
-    desk.typed(ManualKey(DESK, 3, QUAY, ManualMode.HELD))
+    desk.senses(ManualKey(DESK, 3, QUAY, ManualMode.HELD))
     assert desk.sent(ManualOrder) == []
 
 
 def test_for_vehicles_that_are_held_nothing_is_called() -> None:
     desk = Counter()
     desk.hears(*(ManualState(node, 1, ManualMode.HELD, at_rest=True) for node in site().vehicles))
-    desk.typed(load())
+    desk.senses(load())
     desk.passes(20)
     assert desk.answers() == [(7, True)] and desk.sent(CallForProposals) == []
     desk.hears(ManualState(R1, 2, ManualMode.AUTOMATIC, at_rest=False))
@@ -277,7 +279,7 @@ def test_what_was_ordered_from_outside_outlives_the_desk() -> None:
 def test_a_box_under_another_waits_and_a_person_is_told_once_what_for() -> None:
     """Row M08: nobody clears a stack by itself. B3 stands under B4."""
     desk = Counter()
-    desk.typed(*tranship(9, "B3"))
+    desk.senses(*tranship(9, "B3"))
     desk.passes(60)
     assert desk.answers() == [(9, True)] and desk.sent(CallForProposals) == []
     told = [line for line in desk.reported() if "is above it" in line]
