@@ -22,10 +22,10 @@ from onboard.gateway.machines import Machines
 from onboard.gateway.pauses import Pauses
 from onboard.history.history import History
 from tests.graph.sites import hall, made
+from tests.graph.test_named_orders import header, order, topic
 from tests.mapd.sites import made as made_floor
 from tests.mqtt.logs import VERSIONS, validator
 from tests.mqtt.ordered import NODE, Ordered, park_and_order, said
-from tests.mqtt.test_named_orders import header, order, topic
 from tests.sites import one_floor
 from tests.system.scene import play as play_park
 from tests.system.scene import stays

@@ -266,7 +266,7 @@ def test_p20_p49_a_compartment_is_a_participant_too_asked_twice() -> None:
 def test_a_drive_without_fresh_orders_stops_inside_its_machines_authority(under_way_s: float) -> None:
     """The controller dies while the robot moves: the drive brakes by itself, on segments whose tokens it holds."""
     site = one_floor()
-    moving_us, _ = play(site, stays((0, None))).first(DriveState, lambda m: m.mode is DriveMode.MOVING)
+    moving_us, _ = play(site, stays((0, None)), limit_s=60).first(DriveState, lambda m: m.mode is DriveMode.MOVING)
     killed_s = moving_us / 1e6 + under_way_s
 
     def kill(simulation: Simulation) -> None:
@@ -276,7 +276,8 @@ def test_a_drive_without_fresh_orders_stops_inside_its_machines_authority(under_
 
         simulation.loop.call_at(killed_s, pull_the_plug)
 
-    scene = play(site, stays((0, None)), before=kill, limit_s=60)
+    # Soon after it stands: a drive that hears nobody says everything again and again.
+    scene = play(site, stays((0, None)), before=kill, extra_s=15)
     body = scene.simulation.plant.world.robots[11]
     position_mm, speed_mm_s = body.motion.at(scene.simulation.loop.now_us())
     assert speed_mm_s == 0
