@@ -41,7 +41,7 @@ LOOK = {
     # A run's own figures: each counts one or two messages.
     "bus_sim/systems/*/stage.py": "counts messages",
     "bus_sim/systems/*/response.py": "counts messages",
-    "bus_sim/systems/*/run.py": "counts messages",
+    "bus_sim/systems/terminal/run.py": "feeds a mirror of the machines themselves, for drawing what they know",
     "bus_sim/systems/cell/view.py": "the paper's printed answer, whose offers and costs nothing else shows",
     "hil/*": "a bench that waits for a word on real buses",
     "deploy/update/health.py": "an updater that trusts no more of a program than that it beats",
