@@ -213,7 +213,8 @@ class CarParkGeneration:
                 alternatives.append(Alternative(place, None, bound_us))
                 continue
             if place.segment not in routes:
-                routes[place.segment] = self._route(call, place, segment, start_us, now_us, reservations)
+                route = self._route(call, place, segment, start_us, now_us, reservations)
+                routes[place.segment] = route if route is not None and kept + len(route.legs) < MAX_STEPS else None
             route = routes[place.segment]
             if route is None:
                 alternatives.append(Alternative(place, None))
@@ -290,7 +291,8 @@ class CarParkGeneration:
         """
         visits = tuple(self._work_visit(work, now_us) for work in works)
         route = self._plan(self.mirror.reservations, origin, start_us, visits, now_us)
-        return None if route is None else _steps_of(route, works)
+        # A few steps may be kept before these.
+        return None if route is None or len(route.legs) + 3 > MAX_STEPS else _steps_of(route, works)
 
     def _work_visit(self, work: StationWork, now_us: int) -> Visit:
         if work.handling is CarHandling.TAKE and work.station in self.site.compartments.values():
