@@ -20,7 +20,7 @@ class Finding(Enum):
 
 
 class Deed(Enum):
-    """What the robot does."""
+    """What the robot does about what it found, once in each round: the table of steps chooses it."""
 
     WAIT = "nothing"
     CHOOSE = "take the most urgent contract in hand"
