@@ -32,14 +32,17 @@ class Gap(NamedTuple):
     to_index: int | None
 
 
-def run_up_us(site: WaySite, lift_track: int, floors: int) -> int:
-    """Duration of the platform's run over ``floors`` >= 0 floors, in whole milliseconds."""
-    return run_duration_us(floors * site.tracks[lift_track].pitch_mm, site.lift)
+def run_up_us(site: WaySite, lift_track: int, from_index: int, to_index: int) -> int:
+    """Duration of the platform's run between two stops, in whole milliseconds; 0 between doors of one."""
+    track = site.tracks[lift_track]
+    heights_mm = track.heights_mm
+    away = heights_mm[to_index - 1] - heights_mm[from_index - 1] if heights_mm else to_index - from_index
+    return run_duration_us(abs(away) if heights_mm else abs(away) * track.pitch_mm, site.lift)
 
 
 def ride_us(site: WaySite, lift_track: int, from_index: int, to_index: int) -> int:
     """Duration of a RIDE leg between two floors: the platform's run, and the gate's tokens."""
-    return run_up_us(site, lift_track, abs(to_index - from_index)) + GATE_US
+    return run_up_us(site, lift_track, from_index, to_index) + GATE_US
 
 
 def lift_gaps(uses: Iterable[Use], start_us: int, standing_index: int) -> list[Gap]:
@@ -64,10 +67,10 @@ def floor_intervals(site: WaySite, lift_track: int, gaps: Iterable[Gap], lift_in
     """When somebody may board, stand on the platform and leave it at one floor; at most one interval for each gap."""
     found = []
     for gap in gaps:
-        from_us = gap.from_us + run_up_us(site, lift_track, abs(lift_index - gap.from_index))
+        from_us = gap.from_us + run_up_us(site, lift_track, gap.from_index, lift_index)
         to_us = gap.to_us
         if gap.to_index is not None:
-            to_us -= run_up_us(site, lift_track, abs(gap.to_index - lift_index))
+            to_us -= run_up_us(site, lift_track, lift_index, gap.to_index)
         if from_us < to_us:
             found.append(Interval(from_us, to_us))
     return found
@@ -78,7 +81,7 @@ def are_compatible(site: WaySite, one: Use, other: Use) -> bool:
     if one.lift_track != other.lift_track:
         return True
     first, second = sorted((one, other), key=lambda use: (use.from_us, use.to_us, use.owner))
-    empty_us = run_up_us(site, one.lift_track, abs(second.board_index - first.leave_index))
+    empty_us = run_up_us(site, one.lift_track, first.leave_index, second.board_index)
     return first.to_us + empty_us <= second.from_us
 
 

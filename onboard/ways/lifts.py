@@ -50,10 +50,32 @@ def lift_index_of(site: WaySite, lift_track: int, floor: int) -> int | None:
 def platform_on(site: WaySite, lift_track: int, floor: int) -> Segment | None:
     """The platform as a position on a floor's alley: index 0 at the left end, length + 1 at the right; None: none."""
     lift_index = lift_index_of(site, lift_track, floor)
-    if lift_index is None:
-        return None
-    at = sill(site, lift_track, lift_index)
-    return Segment(floor, 0 if at.index == 1 else site.tracks[floor].length + 1)
+    return None if lift_index is None else site.beyond(sill(site, lift_track, lift_index))
+
+
+def stop_mm(site: WaySite, lift_track: int, lift_index: int) -> int:
+    """Height of a lift's stop above its first; two doors of one stop have the same."""
+    track = site.tracks[lift_track]
+    return track.heights_mm[lift_index - 1] if track.heights_mm else (lift_index - 1) * track.pitch_mm
+
+
+def nearest_stop(site: WaySite, lift_track: int, height_mm: float) -> int:
+    """The lift's index of the stop nearest to a height, the lower of two as near; the first of several doors."""
+    track = site.tracks[lift_track]
+    if not track.heights_mm:
+        index = int((height_mm + track.pitch_mm // 2) // track.pitch_mm) + 1
+        return max(1, min(track.length, index))
+    away = [abs(height_mm - stop) for stop in track.heights_mm]
+    return away.index(min(away)) + 1
+
+
+def is_same_stop(site: WaySite, lift_track: int, one: int | None, other: int | None) -> bool:
+    """Whether two indices of a lift are doors of one stop; None is no stop."""
+    if one is None or other is None or one == other:
+        return one is not None and one == other
+    return bool(site.tracks[lift_track].heights_mm) and stop_mm(site, lift_track, one) == stop_mm(
+        site, lift_track, other
+    )
 
 
 def lift_at(site: WaySite, position: Segment) -> int | None:

@@ -185,7 +185,7 @@ class WayMirror(CarMirror):
         uses = []
         for track in lift_tracks(self.site):
             seen = self.progress.get(self.site.stewards[track])
-            standing[track] = seen.index if seen is not None else 1
+            standing[track] = min(max(seen.index, 1), self.site.tracks[track].length) if seen is not None else 1
             uses += self.reservations.uses(track, excluding=0)
         return standing_after(uses, standing, now_us, at_us)
 

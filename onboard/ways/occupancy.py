@@ -77,11 +77,11 @@ def alley_segments(site: WaySite, segment: Segment) -> list[Segment]:
 def standing_segments(site: WaySite, segment: Segment) -> list[Segment]:
     """Segments that a carrier standing at ``segment`` occupies, a platform first, then those of its track.
 
-    Index 0 of a spur is its mouth: whoever turns there is in both.
+    Beyond a linked end is its mouth: whoever turns there is in both.
     """
     mouth = turned_in(site, segment)
     if mouth is not None:
-        return junction_segments(site, mouth, Segment(segment.track, 1))
+        return junction_segments(site, mouth, site.tracks[segment.track].inside(segment.index))
     on_track = alley_segments(site, segment)
     aboard = _platform_at(site, segment)
     return on_track if aboard is None else [aboard, *on_track]
@@ -95,32 +95,33 @@ def _platform_at(site: WaySite, position: Segment) -> Segment | None:
     return None if lift_track is None else platform(lift_track)
 
 
-def turn_in_us(site: WaySite, spur: int) -> int:
-    """From standing in the mouth of a spur to standing in it, or back: the turn, then a run over one segment."""
-    return ceil_ms(site.carrier_turn_us) + run_duration_us(site.tracks[spur].pitch_mm, site.carrier)
+def turn_in_us(site: WaySite, track: int) -> int:
+    """From standing in the mouth of a track to standing in it, or back: the turn, then a run over one segment."""
+    return ceil_ms(site.carrier_turn_us) + run_duration_us(site.tracks[track].pitch_mm, site.carrier)
 
 
 def turned_in(site: WaySite, position: Segment) -> Segment | None:
-    """The mouth in which a machine at ``position`` is turned, which is index 0 of a spur; None for all others."""
-    track = site.tracks.get(position.track)
-    if track is None or track.kind is not TrackKind.SPUR or position.index != 0:
-        return None
-    return track.joins[0]
+    """The mouth in which a machine at ``position`` is turned, beyond a linked end; None for all others."""
+    return site.mouths.get(position)
+
+
+def hop_origins(site: WaySite, there: Segment) -> list[Segment]:
+    """Where a hop through a mouth can begin that ends at a segment: the mouths of its track, and who comes out here."""
+    track = site.tracks[there.track]
+    into = [mouth for index, mouth in track.ends if track.inside(index) == there]
+    return into + [site.tracks[end.track].inside(end.index) for end in site.links.get(there, ())]
 
 
 def hop_origin(site: WaySite, leg: Leg) -> Segment | None:
-    """Where a hop through a spur's mouth begins; None for every other leg."""
+    """Where a hop through a mouth begins; None for every other leg, and where a leg before it has to say so."""
     if leg.action is not LegAction.TRAVEL or leg.from_index != leg.to_index:
         return None
-    here, track = Segment(leg.track, leg.from_index), site.tracks[leg.track]
-    if track.kind is TrackKind.SPUR:
-        return track.joins[0] if leg.from_index == 1 else None
-    spur = site.spurs.get(here)
-    return None if spur is None else Segment(spur, 1)
+    origins = hop_origins(site, Segment(leg.track, leg.from_index))
+    return origins[0] if len(origins) == 1 else None
 
 
 def junction_segments(site: WaySite, origin: Segment, inside: Segment) -> list[Segment]:
-    """Segments occupied for the whole of a hop between two tracks, such as from an alley into a spur."""
+    """Segments occupied for the whole of a hop through a mouth from one track to another."""
     return standing_segments(site, origin) + standing_segments(site, inside)
 
 

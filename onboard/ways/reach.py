@@ -1,38 +1,26 @@
 """Which parts of a site can be reached from its compartments, and what is cut off without a lift or behind a machine.
 
-Along an alley one moves from segment to segment, between alleys by a lift whose platform stops at both sills. A machine
-that stands at a segment lets nobody past (rows P30, P38).
+Along an alley one moves from segment to segment, to another through a mouth, or by a lift whose platform stops at both
+sills. A machine that stands at a segment lets nobody past (rows P30, P38).
 """
 
 from collections.abc import Collection
 
 from onboard.core.site import Segment, Station
-from onboard.ways.lifts import lift_tracks
-from onboard.ways.site import TrackKind, WaySite
-
-#: Sites whose passages are kept in one process: one in a machine, some in a test run.
-_MAX_KEPT = 16
+from onboard.ways.kept import Kept
+from onboard.ways.network import network_of
+from onboard.ways.site import BayUse, TrackKind, WaySite
 
 
 def reached(site: WaySite, *, lost: Collection[int] = (), standing: Collection[Segment] = ()) -> frozenset[Segment]:
-    """Alley segments that a carrier can get to from any compartment's front.
+    """Alley segments that a carrier can get to from the front of any compartment by which cars come in.
 
     ``lost`` are tracks of lifts that do not run, ``standing`` segments where other machines stand for ever; these are
     not reached themselves.
     """
-    rides = [site.tracks[lift].joins for lift in lift_tracks(site) if lift not in lost]
-    ahead = [station.segment for station in site.compartments.values()]
-    found: set[Segment] = set()
-    while ahead:
-        here = ahead.pop()
-        if here in found or here in standing or not 1 <= here.index <= site.tracks[here.track].length:
-            continue
-        found.add(here)
-        ahead += [Segment(here.track, here.index - 1), Segment(here.track, here.index + 1)]
-        for sills in rides:
-            if here in sills:
-                ahead += sills
-    return frozenset(found)
+    starts = site.fronts(BayUse.ENTRY, BayUse.BOTH)
+    found = network_of(site).from_any(starts, closed=standing, lost=lost)
+    return frozenset(here for here in found if site.tracks[here.track].kind is TrackKind.ALLEY)
 
 
 def stranded_by(site: WaySite, lift_track: int) -> tuple[Station, ...]:
@@ -55,16 +43,7 @@ def passages(site: WaySite) -> frozenset[int]:
 
     They are no refuges (design, section 5: every other needed place stays reachable). Worked out once for each site.
     """
-    kept = _kept.get(id(site))
-    # A kept answer holds its site, so an identity in use is never that of another site.
-    if kept is None:
-        if len(_kept) >= _MAX_KEPT:
-            del _kept[next(iter(_kept))]
-        kept = _kept[id(site)] = site, _find_passages(site)
-    return kept[1]
-
-
-_kept: dict[int, tuple[WaySite, frozenset[int]]] = {}
+    return _passages.of(site)
 
 
 def _find_passages(site: WaySite) -> frozenset[int]:
@@ -76,3 +55,6 @@ def _find_passages(site: WaySite) -> frozenset[int]:
             if reached(site, standing=closed) | closed < everywhere:
                 found.add(track.number)
     return frozenset(found)
+
+
+_passages: Kept[WaySite, frozenset[int]] = Kept(_find_passages)

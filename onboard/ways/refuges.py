@@ -5,7 +5,9 @@ from functools import lru_cache
 
 from onboard.contract.codes import KindCode
 from onboard.core.site import Segment
+from onboard.ways.kept import Kept
 from onboard.ways.reach import passages
+from onboard.ways.room import kept_free, resting_room
 from onboard.ways.site import TrackKind, WaySite
 
 
@@ -21,16 +23,13 @@ def _refuges(
 
 
 def refuges(site: WaySite) -> frozenset[Segment]:
-    """Alley and spur segments that block neither a compartment, nor a lift's sill, nor a spur's mouth.
+    """Alley and spur segments that block neither a compartment, nor a lift's sill, nor a mouth.
 
     That a whole fleet fits (at most F - 1 carriers on F alleys without spurs) is checked where a site is loaded.
     """
-    kept = {station.segment for station in site.compartments.values()}
-    for track in site.tracks.values():
-        if track.kind is not TrackKind.ALLEY:
-            kept.update(track.joins)
+    kept = kept_free(site)
     shape = tuple((t.number, t.kind, t.length, t.joins) for t in site.tracks.values())
-    return _refuges(shape, frozenset(kept))
+    return _refuges(shape, kept)
 
 
 def open_refuges(site: WaySite, standing: Iterable[Segment]) -> frozenset[Segment]:
@@ -40,7 +39,11 @@ def open_refuges(site: WaySite, standing: Iterable[Segment]) -> frozenset[Segmen
     that is the only way to another unless the robot is the only one, and neither an alley nor a spur in which another
     stands: at most one in each. One floor leaves that choice only where each robot has a spur; otherwise every refuge
     is open there, as the machines can pass each other nowhere else.
+
+    Where alleys turn, branch or meet, those of the site's resting places on whose track nobody stands.
     """
+    if site.is_charted:
+        return _rest(site, frozenset(segment.track for segment in standing))
     alleys = [track.number for track in site.tracks.values() if track.kind is TrackKind.ALLEY]
     robots = sum(machine.kind is KindCode.ROBOT for machine in site.machines.values())
     if len(alleys) == 1 and not 1 < robots <= len(site.spurs):
@@ -51,6 +54,19 @@ def open_refuges(site: WaySite, standing: Iterable[Segment]) -> frozenset[Segmen
     if robots > 1:
         closed |= passages(site)
     return _without(refuges(site), frozenset(closed))
+
+
+def _rest(site: WaySite, taken: frozenset[int]) -> frozenset[Segment]:
+    if site.robots <= 1:
+        return refuges(site)
+    return _without(_rests.of(site), taken)
+
+
+def _find_rests(site: WaySite) -> frozenset[Segment]:
+    return frozenset(slot for stretch in resting_room(site).stretches.values() for slot in stretch)
+
+
+_rests: Kept[WaySite, frozenset[Segment]] = Kept(_find_rests)
 
 
 @lru_cache(maxsize=256)

@@ -1,4 +1,4 @@
-"""What a carrier can do by itself or with a lift: rest-to-rest runs along tracks, hops through spurs' mouths, rides.
+"""What a carrier can do by itself or with a lift: rest-to-rest runs along tracks, hops through mouths, rides.
 
 Built once for a site and kept: run tables are the same for every search. A lift's platform is a position at the end of
 each alley that it serves, index 0 or length + 1; a ride is a move from one of them to another.
@@ -9,6 +9,7 @@ from heapq import heappop, heappush
 from typing import NamedTuple
 
 from onboard.core.site import Segment
+from onboard.ways.kept import Kept
 from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import ride_us
 from onboard.ways.lifts import lift_tracks, platform_on
@@ -16,8 +17,6 @@ from onboard.ways.occupancy import Sweep, alley_segments, leg_sweeps, turn_in_us
 from onboard.ways.reservations import FOREVER
 from onboard.ways.site import TrackKind, WaySite
 
-#: Sites whose tables are kept in one process: one in a machine, some in a test run.
-_MAX_KEPT = 16
 #: Goals, and sets of them, whose tables are kept for one site.
 _MAX_GOALS = 1_024
 
@@ -42,6 +41,8 @@ class Roads:
         self._positions: dict[int, dict[int, Segment]] = {}
         self._run_us: dict[int, tuple[int, ...]] = {}
         self._hops: dict[Segment, list[Move]] = {}
+        self._hops_in: dict[Segment, list[tuple[Segment, int]]] = {}
+        self._one_way = {number: track for number, track in site.tracks.items() if track.one_way}
         self._junctions: dict[int, list[Segment]] = {}
         self._platforms: dict[Segment, tuple[int, int]] = {}
         self._moves: dict[Segment, tuple[Move, ...]] = {}
@@ -60,11 +61,13 @@ class Roads:
             durations = (run_duration_us(count * pitch_mm, site.carrier) for count in range(len(positions)))
             self._run_us[number] = tuple(durations)
         for track in site.tracks.values():
-            if track.kind is TrackKind.SPUR:
-                hop_us = turn_in_us(site, track.number)
-                for mouth in track.joins:
-                    self._join(mouth, Move(Segment(track.number, 1), hop_us, track.pitch_mm))
-                    self._join(Segment(track.number, 1), Move(mouth, hop_us, track.pitch_mm))
+            hop_us = turn_in_us(site, track.number) if track.ends else 0
+            for index, mouth in track.ends:
+                inside = track.inside(index)
+                if track.goes(index, inside.index):
+                    self._join(mouth, Move(inside, hop_us, track.pitch_mm))
+                if track.goes(inside.index, index):
+                    self._join(inside, Move(mouth, hop_us, track.pitch_mm))
 
     def _add_lift(self, lift_track: int) -> None:
         """A position at the end of each alley that the lift serves, and the rides between them."""
@@ -78,14 +81,17 @@ class Roads:
         for here in aboard:
             for there in aboard:
                 if here != there:
+                    # Between two doors of one stop the platform stays where it is.
                     duration_us = ride_us(self.site, lift_track, self._platforms[here][1], self._platforms[there][1])
                     self._join(here, Move(there, duration_us, 0, lift_track))
 
     def _join(self, here: Segment, hop: Move) -> None:
         self._hops.setdefault(here, []).append(hop)
-        junctions = self._junctions.setdefault(here.track, [])
-        if here not in junctions:
-            junctions.append(here)
+        self._hops_in.setdefault(hop.destination, []).append((here, hop.duration_us))
+        for end in (here, hop.destination):
+            junctions = self._junctions.setdefault(end.track, [])
+            if end not in junctions:
+                junctions.append(end)
 
     def knows(self, position: Segment) -> bool:
         """Whether a carrier can be at a position of this site."""
@@ -115,10 +121,11 @@ class Roads:
         return found
 
     def _runs(self, here: Segment) -> Iterator[Move]:
-        durations, pitch_mm = self._run_us[here.track], self.site.tracks[here.track].pitch_mm
+        durations, track = self._run_us[here.track], self.site.tracks[here.track]
+        pitch_mm = track.pitch_mm
         for _, there in sorted(self._positions[here.track].items()):
             count = abs(there.index - here.index)
-            if count:
+            if count and track.goes(here.index, there.index):
                 yield Move(there, durations[count], count * pitch_mm)
 
     def run_us(self, track: int, count: int) -> int:
@@ -130,7 +137,7 @@ class Roads:
         return self._positions[track].values()
 
     def junctions(self, track: int) -> list[Segment]:
-        """Positions of a track from which one can go to another: platforms, mouths of spurs, spurs' first segments."""
+        """Positions of a track at which one goes to another, or comes from it: platforms, mouths, segments inside."""
         return self._junctions.get(track, [])
 
     def longest(self, track: int) -> tuple[Sweep, ...]:
@@ -158,17 +165,16 @@ class Roads:
     def nearest_us(self, origin: Segment, goals: frozenset[Segment]) -> int:
         """Least time to any of ``goals`` as in ``shortest_us``."""
         ways = self._ways_to(goals)
-        durations = self._run_us[origin.track]
+        durations, one_way = self._run_us[origin.track], self._one_way.get(origin.track)
         least_us = FOREVER
         for index, rest_us in ways.get(origin.track, ()):
+            if one_way is not None and not one_way.goes(origin.index, index):
+                continue
             least_us = min(least_us, durations[abs(origin.index - index)] + rest_us)
         return least_us
 
     def _ways_to(self, goals: frozenset[Segment]) -> "_Ways":
-        """Goals and junctions by track, with the least time from each to a goal (Dijkstra 1959).
-
-        Moves take the same time both ways.
-        """
+        """Goals and junctions by track, with the least time from each to a goal (Dijkstra 1959, against the moves)."""
         found = self._to_goals.get(goals)
         if found is not None:
             return found
@@ -183,10 +189,12 @@ class Roads:
                 continue
             closed.add(here)
             found.setdefault(here.track, []).append((here.index, time_us))
-            for hop in self._hops.get(here, ()):
-                heappush(queue, (time_us + hop.duration_us, hop.destination))
-            durations = self._run_us[here.track]
+            for origin, duration_us in self._hops_in.get(here, ()):
+                heappush(queue, (time_us + duration_us, origin))
+            durations, one_way = self._run_us[here.track], self._one_way.get(here.track)
             for junction in self._junctions.get(here.track, ()):
+                if one_way is not None and not one_way.goes(junction.index, here.index):
+                    continue
                 heappush(queue, (time_us + durations[abs(here.index - junction.index)], junction))
         return found
 
@@ -195,15 +203,9 @@ class Roads:
 _Ways = dict[int, list[tuple[int, int]]]
 
 
-_kept: dict[int, Roads] = {}
+_roads: Kept[WaySite, Roads] = Kept(Roads)
 
 
 def roads_of(site: WaySite) -> Roads:
     """The roads of a site, built at the first call for this very object."""
-    roads = _kept.get(id(site))
-    # A kept table holds its site, so an identity in use is never that of another site.
-    if roads is None:
-        if len(_kept) >= _MAX_KEPT:
-            del _kept[next(iter(_kept))]
-        roads = _kept[id(site)] = Roads(site)
-    return roads
+    return _roads.of(site)

@@ -111,7 +111,7 @@ def test_p39_an_option_given_to_another_bid_moves_the_next_answer_behind_it() ->
     alone_us = answer_us(generation, mine)
     generation.promises[CallKey(12, 50)] = promise
     behind_us = answer_us(generation, mine)
-    back_us = run_up_us(generation.site, 128, abs(promise.use.leave_index - promise.use.board_index))
+    back_us = run_up_us(generation.site, 128, promise.use.leave_index, promise.use.board_index)
     indices = generation._indices(mine)
     assert indices is not None
     assert behind_us >= promise.use.to_us + back_us + ride_us(generation.site, 128, *indices)
@@ -161,7 +161,7 @@ def answers_to(parts: tuple[CallTerms, ...], late_us: int = 0, winner: int = 5, 
 def _ride_of(terms: CallTerms) -> int:
     site = car_park(find_site("small"))
     floors = abs((terms.from_station >> 8) - (terms.to_station >> 8))
-    return run_up_us(site, 128, floors) + GATE_US
+    return run_up_us(site, 128, 1, 1 + floors) + GATE_US
 
 
 def asked() -> tuple[AskingGeneration, Needs]:

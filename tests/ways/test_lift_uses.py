@@ -135,7 +135,7 @@ def test_a_floor_is_safe_from_when_the_lift_can_be_there_until_it_has_to_go() ->
 
 
 def test_a_ride_lasts_the_platforms_run_and_the_gates_tokens() -> None:
-    assert run_up_us(quick(), LEFT, 0) == 0
+    assert run_up_us(quick(), LEFT, 2, 2) == 0
     assert ride_us(quick(), LEFT, 3, 1) == 30 * MS + GATE_US
 
 

@@ -12,7 +12,6 @@ from onboard.contract.messages import CallForProposals, Reference
 from onboard.core.negotiation import CallKey, Proposal
 from onboard.core.serial import from_bus_ms, to_bus_ms
 from onboard.core.site import Machine
-from onboard.ways.kinematics import run_duration_us
 from onboard.ways.lift_uses import lift_gaps, ride_us, run_up_us
 from onboard.ways.lifts import sill
 from onboard.ways.mirror import WayMirror
@@ -90,9 +89,9 @@ class LiftGeneration:
         duration_us = ride_us(self.site, track, board, leave)
         ready_us = self._ready_us(call, now_us)
         for gap in lift_gaps(sorted(self._uses(call), key=_begin), now_us, self.index):
-            there_us = gap.from_us + run_up_us(self.site, track, abs(board - gap.from_index))
+            there_us = gap.from_us + run_up_us(self.site, track, gap.from_index, board)
             begin_us = max(ready_us, there_us + self._boarding_us(board))
-            away_us = 0 if gap.to_index is None else run_up_us(self.site, track, abs(gap.to_index - leave))
+            away_us = 0 if gap.to_index is None else run_up_us(self.site, track, leave, gap.to_index)
             left_us = begin_us + duration_us + self._leaving_us(leave)
             if left_us + away_us <= gap.to_us:
                 return Use(track, board, leave, begin_us - self._boarding_us(board), left_us, call.sender)
@@ -134,8 +133,7 @@ class LiftGeneration:
         indices = self._indices(call)
         if indices is None:
             return 0
-        floors = abs(indices[0] - indices[1])
-        return run_duration_us(floors * self.site.tracks[self.machine.home.track].pitch_mm, self.site.lift)
+        return run_up_us(self.site, self.machine.home.track, *indices)
 
 
 def _begin(use: Use) -> tuple[int, int, int]:

@@ -1,11 +1,11 @@
 """What a robotized car park has beyond any other site: cars, shuttles, and when lifts are asked for."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from typing import ClassVar
 
-from onboard.core.site import Needs, Site
+from onboard.core.site import Needs, Site, Station
 from onboard.ways.site import Axis, WaySite
 from onboard.work.timing import DeviceTiming
 
@@ -19,6 +19,28 @@ class CarLimits:
     max_length_mm: int
     max_height_mm: int
     max_load_kg: int
+
+
+@dataclass(frozen=True, slots=True)
+class SizeClass:
+    """A class of places and of cars: what fits, in mm and kg, and whether it is charged there."""
+
+    name: str
+    max_length_mm: int
+    max_height_mm: int
+    max_load_kg: int
+    charging: bool = False
+
+    def covers(self, other: "SizeClass") -> bool:
+        """Whether all that fits ``other`` fits here."""
+        fits = self.max_length_mm >= other.max_length_mm and self.max_height_mm >= other.max_height_mm
+        return fits and self.max_load_kg >= other.max_load_kg and (self.charging or not other.charging)
+
+
+#: A car of no class: it goes only where every car of the site can go.
+ANY_CLASS = 0
+#: Most classes that a site may have: four bits.
+MOST_CLASSES = 15
 
 
 class RideCalls(Enum):
@@ -48,6 +70,25 @@ class CarPark(WaySite):
     shuttle_reach_mm: int
     cars: CarLimits
     rides: RideCalls = RideCalls.AFTER
+    #: In the order in which a car is tried against them; numbers are from 1.
+    classes: tuple[SizeClass, ...] = ()
+    #: Number of a place's class by its station's number; who is not named takes every car of the site.
+    place_class: dict[int, int] = field(default_factory=dict)
+
+    def car_class(self, length_mm: int, height_mm: int, load_kg: int, *, charging: bool = False) -> int:
+        """The first class that a car fits, ``ANY_CLASS`` where there is none."""
+        for number, one in enumerate(self.classes, start=1):
+            fits = length_mm <= one.max_length_mm and height_mm <= one.max_height_mm and load_kg <= one.max_load_kg
+            if fits and one.charging is charging:
+                return number
+        return ANY_CLASS
+
+    def takes(self, place: Station, car_class: int) -> bool:
+        """Whether every car of a class can stand at a place."""
+        number = self.place_class.get(place.number, ANY_CLASS)
+        if number == ANY_CLASS:
+            return not (0 < car_class <= len(self.classes) and self.classes[car_class - 1].charging)
+        return 0 < car_class <= len(self.classes) and self.classes[number - 1].covers(self.classes[car_class - 1])
 
 
 def car_park(site: Site) -> CarPark:

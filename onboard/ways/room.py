@@ -1,0 +1,144 @@
+"""How many machines can rest on any network at the same time, where, and what can be reached at all.
+
+A set of resting places is well formed if with a machine at each of them the others still come from every compartment to
+every place and back (Cap, Novak, Kleiner, Selecky 2015, "Prioritized planning algorithms for trajectory coordination",
+section 4): then whoever has a task finds a way whatever the others wait for. Found by taking slots away. At most one
+machine rests on a track; the places of its own track it serves, or lets others past by going to another rest.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from onboard.core.site import Segment, Station
+from onboard.ways.kept import Kept
+from onboard.ways.network import Network, network_of
+from onboard.ways.occupancy import standing_segments
+from onboard.ways.site import BayUse, TrackKind, WaySite
+
+_NEEDED = "is needed by all, so nobody may stand there for ever"
+
+
+@dataclass(frozen=True)
+class Reach:
+    """Places to which no car comes from an entry, and those from which none comes to an exit, in the site's order."""
+
+    lost_places: tuple[Station, ...]
+    no_way_out: tuple[Station, ...]
+
+
+@dataclass(frozen=True)
+class Room:
+    """Where machines can rest together: by track the segments of which any one may be taken; and why not elsewhere."""
+
+    stretches: dict[int, tuple[Segment, ...]]
+    refused: tuple[tuple[int, str], ...]
+
+    @property
+    def slots(self) -> tuple[Segment, ...]:
+        """One resting place on each track, in the order of the tracks."""
+        return tuple(self.stretches[track][0] for track in sorted(self.stretches))
+
+
+def reachable(site: WaySite) -> Reach:
+    """What the ways of a site lead to with nobody in the way."""
+    network = network_of(site)
+    comes = network.from_any(site.fronts(BayUse.ENTRY, BayUse.BOTH))
+    goes = network.to_any(site.fronts(BayUse.EXIT, BayUse.BOTH))
+    return Reach(
+        tuple(place for place in site.places if place.segment not in comes),
+        tuple(place for place in site.places if place.segment in comes and place.segment not in goes),
+    )
+
+
+def resting_room(site: WaySite) -> Room:
+    """The resting places of a site of any form, worked out once; see ``onboard.ways.refuges`` for straight ones."""
+    return _rooms.of(site)
+
+
+class _Finder:
+    """Takes tracks up one after the other, spurs first: they are made for it."""
+
+    def __init__(self, site: WaySite) -> None:
+        self.site = site
+        self.network: Network = network_of(site)
+        self.fronts = site.fronts(*BayUse)
+        self.kept = kept_free(site)
+        self.needed = {station.segment for station in site.places} | set(self.fronts)
+        self.taken: dict[int, tuple[Segment, ...]] = {}
+
+    def find(self) -> Room:
+        tracks = [track for track in self.site.tracks.values() if track.kind is not TrackKind.LIFT]
+        refused = []
+        for track in sorted(tracks, key=lambda one: (one.kind is not TrackKind.SPUR, one.number)):
+            stretch = self._stretch(track.number)
+            if stretch is None:
+                refused.append((track.number, self._why_not(track.number)))
+            else:
+                self.taken[track.number] = stretch
+        return Room(dict(sorted(self.taken.items())), tuple(sorted(refused)))
+
+    def _stretch(self, track: int) -> tuple[Segment, ...] | None:
+        """The stretch between junctions that cuts the least off, and nothing but places of its own track."""
+        if track in {front.track for front in self.fronts}:
+            return None
+        found = []
+        for number, stretch in enumerate(self._stretches(track)):
+            cut = self._cut_off([*(one[0] for one in self.taken.values()), stretch[0]])
+            if not cut:
+                hidden = self._hidden(stretch[0])
+                found.append((hidden, -len(stretch), number, stretch))
+        return min(found)[3] if found else None
+
+    def _stretches(self, track: int) -> Iterator[tuple[Segment, ...]]:
+        stretch: list[Segment] = []
+        for index in range(1, self.site.tracks[track].length + 1):
+            here = Segment(track, index)
+            if self.kept.isdisjoint(standing_segments(self.site, here)):
+                stretch.append(here)
+            elif stretch:
+                yield tuple(stretch)
+                stretch = []
+        if stretch:
+            yield tuple(stretch)
+
+    def _ground(self, closed: set[Segment]) -> frozenset[Segment]:
+        """All between which one comes to and fro, the first compartment's front among them."""
+        first = self.fronts[:1]
+        return self.network.from_any(first, closed=closed) & self.network.to_any(first, closed=closed)
+
+    def _cut_off(self, resting: list[Segment]) -> frozenset[Segment]:
+        """What would be needed and could not be reached with machines at rest there, themselves included."""
+        bodies = {one: set(standing_segments(self.site, one)) for one in resting}
+        closed = set().union(*bodies.values())
+        own = {one.track for one in resting}
+        lost = {one for one in self.needed if one.track not in own} - self._ground(closed)
+        for one, body in bodies.items():
+            if one not in self._ground(closed - body):
+                lost.add(one)
+        return frozenset(lost)
+
+    def _hidden(self, resting: Segment) -> int:
+        ground = self._ground(set(standing_segments(self.site, resting)))
+        return sum(1 for one in self.needed if one.track == resting.track and one not in ground)
+
+    def _why_not(self, track: int) -> str:
+        if track in {front.track for front in self.fronts}:
+            return f"a compartment is there: it {_NEEDED}"
+        stretches = list(self._stretches(track))
+        if not stretches:
+            return "every segment is a sill, a mouth or before a compartment"
+        cut = self._cut_off([*(one[0] for one in self.taken.values()), stretches[0][0]])
+        return f"a machine at {stretches[0][0]} would cut off {', '.join(map(str, sorted(cut)[:3]))}" + (
+            f" and {len(cut) - 3} more" if len(cut) > 3 else ""
+        )
+
+
+def kept_free(site: WaySite) -> frozenset[Segment]:
+    """Where nobody may stand for ever on any site: before compartments, on sills, in mouths."""
+    kept = {*site.fronts(*BayUse), *site.links}
+    for lift in site.lifts:
+        kept.update(site.tracks[lift].joins)
+    return frozenset(kept)
+
+
+_rooms: Kept[WaySite, Room] = Kept(lambda site: _Finder(site).find())
