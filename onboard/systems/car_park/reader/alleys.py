@@ -160,7 +160,7 @@ def _mouth(layout: Layout, one: _Joined, end: str) -> Segment | None:
     if floor not in written.floors:
         one.table.bad(end, value, f"not on floor {floor}", 'write "p(*,...)" for the same floor')
         return None
-    mouth = layout.judged(one.table, end, written._replace(floors=written.floors._make((floor, floor))))
+    mouth = layout.judged(one.table, end, written.on(floor))
     if mouth is not None and mouth.track == one.number:
         one.table.bad(end, value, "beside itself", "name another alley's position")
         return None

@@ -13,7 +13,8 @@ _NOWHERE = Segment(0, 0)
 
 def read_fleet(root: Table, layout: Layout) -> tuple[Fleet, dict[int, BayUse]]:
     """Lifts, compartments and robots of a site file, and the compartments that are for one use only, by node-ID."""
-    fleet, uses = Fleet(), {}
+    fleet = Fleet()
+    uses: dict[int, BayUse] = {}
     for number, table in enumerate(layout.lifts, start=FIRST_LIFT):
         fleet.add(table, KindCode.LIFT, Segment(number, 1))
     for table in root.tables("compartments"):

@@ -41,6 +41,10 @@ class Written(NamedTuple):
     indices: Numbers
     side: str
 
+    def on(self, floor: int) -> "Written":
+        """The same on one floor."""
+        return self._replace(floors=Numbers(floor, floor))
+
     @property
     def is_one(self) -> bool:
         """Whether one position is meant, whatever its side."""

@@ -92,7 +92,7 @@ def _read_doors(layout: Layout, table: Table) -> list[Segment]:
 
 def _sill(layout: Layout, table: Table, door: _Door, floor: int) -> Segment | None:
     """The segment before the lift: an alley's free end, or the lobby beside it."""
-    written = door.written._replace(floors=door.written.floors._make((floor, floor)))
+    written = door.written.on(floor)
     before = layout.judged(table, "doors", written, item=door.item)
     if before is None:
         return None
