@@ -1,11 +1,10 @@
 """Floors, their alleys, what these are joined by at their ends, and spurs (rows P30, P31)."""
 
-from dataclasses import replace
-
 from onboard.config.reader import Table
 from onboard.config.toml_lines import path_text
 from onboard.contract.codes import Side
 from onboard.core.site import Segment, Station
+from onboard.systems.car_park.reader.joints import ENDS, Joined, Joints
 from onboard.systems.car_park.reader.layout import (
     AFTER_SPURS,
     FIRST_ALLEY,
@@ -36,7 +35,7 @@ def read_layout(root: Table, floor_height_mm: int) -> Layout:
     layout.known = layout.known and "floors" not in root.wrong
     tables = root.tables("alleys")
     joined = [one for table in tables for one in _read_alley(layout, table)]
-    _join(layout, joined)
+    Joints(layout, joined).join()
     _read_without(layout, floors)
     layout.lifts = root.tables("lifts")
     read_lifts(layout, floor_height_mm)
@@ -63,6 +62,8 @@ def _read_floors(layout: Layout, floors: Table, floor_height_mm: int) -> None:
             own_sides, own_way = _read_sides(floor, sides), _read_one_way(floor, one_way)
             height_mm = floor.integer("height_mm", 1000, 10_000, floor_height_mm)
             layout.known = layout.known and "positions" not in floor.wrong
+            if "height_mm" in floor.values and "height_mm" not in floor.wrong:
+                layout.low[number] = floor
         track = Track(number, TrackKind.ALLEY, length, layout.pitch_mm, one_way=own_way)
         layout.add_alley(track, number, BASE, own_sides)
         layout.floor_mm[number] = above_mm
@@ -86,27 +87,19 @@ def _read_one_way(table: Table, default: int) -> int:
     return _ONE_WAY[table.choice("one_way", list(_ONE_WAY), "both")] if table.has("one_way") else default
 
 
-class _Joined:
-    """An alley on one floor, and what its two ends are written to be beside."""
-
-    def __init__(self, table: Table, number: int, side: str, low: Written | None, high: Written | None) -> None:
-        self.table, self.number, self.side = table, number, side
-        self.ends = {"from": low, "to": high}
-
-
-def _read_alley(layout: Layout, table: Table) -> list[_Joined]:
+def _read_alley(layout: Layout, table: Table) -> list[Joined]:
     """An alley, on each of its floors one."""
     name = table.text("name")
     if name and ALLEY_NAME.fullmatch(name) is None:
         table.bad("name", name, "not usable in a position", "write a letter, then up to 7 letters, digits or _")
-    elif any(name == other for _, other in layout.named):
+    elif name and any(name == other for _, other in layout.named):
         table.bad("name", name, "used twice", "give each alley a name of its own")
     floors = read_floor_list(layout, table)
     positions = table.integer("positions", 1, _MOST_POSITIONS)
     pitch_mm = table.integer("pitch_mm", 1000, 10_000, layout.pitch_mm)
     sides, one_way = _read_sides(table, frozenset(Side)), _read_one_way(table, 0)
     side = table.choice("side", list(SIDES), "far")
-    ends = [table.parsed(end, _beside, "a position", _JOINED) if table.has(end) else None for end in ("from", "to")]
+    ends = {end: table.parsed(end, _beside, "a position", _JOINED) if table.has(end) else None for end in ENDS}
     if table.wrong & {"name", "floors", "positions"} or not layout.known:
         layout.known = False
         return []
@@ -118,7 +111,8 @@ def _read_alley(layout: Layout, table: Table) -> list[_Joined]:
             break
         track = Track(number, TrackKind.ALLEY, positions, pitch_mm, level=floor, one_way=one_way)
         layout.add_alley(track, floor, name, sides)
-        found.append(_Joined(table, number, side, *ends))
+        layout.tables[number] = table
+        found.append(Joined(table, number, side, ends))
     return found
 
 
@@ -127,68 +121,6 @@ def _beside(text: str) -> Written | None:
     written = read_written(text)
     fits = written is not None and written.indices.is_one and written.alley != ANY and not written.side
     return written if fits else None
-
-
-def _join(layout: Layout, joined: list[_Joined]) -> None:
-    """Tell the tracks what their ends are beside; headings in quarters of a turn from that of floors' own alleys."""
-    mouths = {(one.number, end): _mouth(layout, one, end) for one in joined for end in ("from", "to")}
-    heading = {number: 0 for (_, name), number in layout.named.items() if name == BASE}
-    for one in joined:
-        low, high = mouths[one.number, "from"], mouths[one.number, "to"]
-        joins = () if low is None else (low,)
-        own = replace(layout.tracks[one.number], joins=joins, high=high, side=SIDES[one.side])
-        layout.tracks[one.number] = own if joins or high is not None else layout.tracks[one.number]
-    waiting = [one for one in joined if one.number not in heading]
-    while waiting:
-        later = [one for one in waiting if not _turn(layout, one, mouths, heading)]
-        if len(later) == len(waiting):
-            # Reached by a lift only: a direction of its own.
-            heading[later.pop(0).number] = 0
-        waiting = later
-    for one in joined:
-        for end in ("from", "to"):
-            mouth = mouths[one.number, end]
-            if mouth is not None:
-                _take_mouth(layout, one, end, mouth, heading)
-
-
-def _mouth(layout: Layout, one: _Joined, end: str) -> Segment | None:
-    written = one.ends[end]
-    if written is None:
-        return None
-    floor, value = layout.level[one.number], one.table.values[end]
-    if floor not in written.floors:
-        one.table.bad(end, value, f"not on floor {floor}", 'write "p(*,...)" for the same floor')
-        return None
-    mouth = layout.judged(one.table, end, written.on(floor))
-    if mouth is not None and mouth.track == one.number:
-        one.table.bad(end, value, "beside itself", "name another alley's position")
-        return None
-    return mouth
-
-
-def _turn(layout: Layout, one: _Joined, mouths: dict[tuple[int, str], Segment | None], heading: dict[int, int]) -> bool:
-    """Whether the heading of an alley follows from those known: it goes off from its first mouth to its side."""
-    low, high = mouths[one.number, "from"], mouths[one.number, "to"]
-    mouth = low or high
-    if mouth is None:
-        heading[one.number] = 0
-    elif mouth.track in heading:
-        away = heading[mouth.track] + (1 if SIDES[one.side] is Side.FAR else -1)
-        heading[one.number] = (away if low is not None else away + 2) % 4
-    return one.number in heading
-
-
-def _take_mouth(layout: Layout, one: _Joined, end: str, mouth: Segment, heading: dict[int, int]) -> None:
-    """The end of an alley takes the stead of a place beside its mouth."""
-    away = heading[one.number] + (0 if end == "from" else 2)
-    quarters = (away - heading[mouth.track]) % 4
-    if quarters % 2 == 0:
-        what = f"the alley would go on along {layout.words(mouth.track)}, not across it"
-        one.table.bad(end, one.table.values[end], what, "join alleys at right angles")
-        return
-    layout.take(one.table, mouth, "far" if quarters == 1 else "near", name=end)
-    layout.kept.setdefault(mouth, f"the mouth of {path_text(one.table.path)} is")
 
 
 def _read_without(layout: Layout, floors: Table) -> None:
@@ -210,6 +142,9 @@ def _read_spurs(layout: Layout, tables: list[Table]) -> None:
     for table in tables:
         side = table.choice("side", list(SIDES), "far")
         length = table.integer("length", 1, _MOST_POSITIONS, 1)
+        if "length" in table.wrong:
+            # Whatever stands in it is not judged by it.
+            length = _MOST_POSITIONS
         for station in _mouths(layout, table, side):
             if number >= AFTER_SPURS:
                 what = f"{number - FIRST_SPUR + 1} spurs"
@@ -234,4 +169,4 @@ def _mouths(layout: Layout, table: Table, side: str) -> list[Station | None]:
     found = layout.meant(written) if layout.known else []
     if layout.known and not found:
         table.bad("at", table.values["at"], "no such segment", layout.extent())
-    return [layout.take(table, segment, side) for segment in found]
+    return [layout.take(table, segment, side) if "at" not in table.wrong else None for segment in found]

@@ -4,6 +4,7 @@ Its alleys meet where they should, nothing lies on a way, and every place can be
 exit.
 """
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
@@ -16,6 +17,8 @@ from onboard.systems.car_park.site import CarPark
 from onboard.ways.room import reachable
 from onboard.ways.site import Track, TrackKind
 
+#: A track in the words of the floor plan.
+_TRACK = re.compile(r"track (\d+)")
 #: Places that one line names.
 _NAMED = 3
 
@@ -29,8 +32,7 @@ def check_built(root: Table, site: CarPark, layout: Layout) -> CarPark:
     if not is_more and len(layout.alleys()) == layout.floors:
         return site
     outlines = Outlines(site)
-    for words in outlines.plan.mismatches:
-        root.bad("alleys", None, words, "change positions, pitch_mm, or where they begin or end")
+    _tell_mismatches(root, layout, outlines)
     if root.problems.found:
         return site
     _check_ways(root, layout, outlines)
@@ -41,6 +43,20 @@ def check_built(root: Table, site: CarPark, layout: Layout) -> CarPark:
     return site
 
 
+def _tell_mismatches(root: Table, layout: Layout, outlines: Outlines) -> None:
+    """Each alley that does not end where it is written to, on the first floor where it does not."""
+    told = set()
+    for words in outlines.plan.mismatches:
+        numbers = [int(number) for number in _TRACK.findall(words)]
+        names = tuple(layout.alley_name(number) for number in numbers)
+        if names not in told:
+            told.add(names)
+            table = layout.tables.get(numbers[0], root) if numbers else root
+            what = _TRACK.sub(lambda found: layout.words(int(found[1])), words)
+            remedy = "change positions, pitch_mm, or where it begins or ends"
+            table.bad("to" if "to" in table.values else "alleys", table.values.get("to"), what, remedy)
+
+
 def _is_more(track: Track) -> bool:
     """Whether a track is more than an alley by itself, a shaft, or a segment off an alley."""
     return (bool(track.ends) and track.kind is TrackKind.ALLEY) or (track.kind is TrackKind.SPUR and track.length > 1)
@@ -49,8 +65,9 @@ def _is_more(track: Track) -> bool:
 def _check_ways(root: Table, layout: Layout, outlines: Outlines) -> None:
     """No way lies on another, or on a compartment; where tracks are joined they only touch."""
     site = outlines.site
-    for level in outlines.levels:
-        ways = [(layout.words(number), outlines.track(number)) for number in outlines.tracks_on(level)]
+    told = set()
+    for level in reversed(outlines.levels):
+        ways = [(layout.alley_name(number), outlines.track(number)) for number in outlines.tracks_on(level)]
         ways += [(f"lift {_lift_name(site, lift)}", outlines.platform(lift)) for lift in outlines.lifts_on(level)]
         bays = [
             (f"compartment {site.machines[node].name}", outlines.station(bay))
@@ -58,8 +75,9 @@ def _check_ways(root: Table, layout: Layout, outlines: Outlines) -> None:
             if site.level(bay.track) == level
         ]
         for (one, box), (other, on) in combinations([*ways, *bays], 2):
-            if box.overlaps(on):
-                remedy = "move one, or make another alley longer between them"
+            if box.overlaps(on) and (one, other) not in told:
+                told.add((one, other))
+                remedy = "move one, or make what is between them longer"
                 root.bad("alleys", None, f"on floor {level} {other} lies on {one}", remedy)
 
 

@@ -58,3 +58,16 @@ def _read_places(layout: Layout, table: Table, number: int, of_place: dict[int, 
         found += len(meant)
     if not found and layout.known and "places" not in table.wrong:
         table.bad("places", table.values.get("places"), "no place of this class", 'write places such as "p(*,1-4)F"')
+
+
+def check_heights(layout: Layout, cars: CarLimits, classes: tuple[SizeClass, ...], place_class: dict[int, int]) -> None:
+    """Note floors that tell their height, and are no higher than cars that may be put there."""
+    for floor, table in layout.low.items():
+        height_mm = table.values["height_mm"]
+        for place in layout.places() if layout.known else ():
+            number = place_class.get(place.number, 0)
+            most_mm = classes[number - 1].max_height_mm if number else cars.max_height_mm
+            if layout.level[place.track] == floor and most_mm >= height_mm:
+                what = f"cars up to {most_mm} mm high may be put into {place}"
+                table.bad("height_mm", height_mm, what, "put its places into a class of lower cars, or make it higher")
+                break

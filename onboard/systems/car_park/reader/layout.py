@@ -34,7 +34,9 @@ class Layout:
     ``known`` is False where number or length of the alleys is mistaken: what refers to them is then not judged.
     ``named`` are the alleys by floor and name, ``level`` the floor of each track, ``lifts`` the tables of the lifts in
     the order of their tracks. ``taken`` says what stands at a station that is no place, ``kept`` why nobody may stand
-    for long at a segment, ``floor_mm`` how high each floor lies above the lowest.
+    for long at a segment, ``floor_mm`` how high each floor lies above the lowest; ``low`` are the tables of floors that
+    tell their own height. ``heading`` is in quarters of a turn from floors' own alleys, where links tell it. ``tables``
+    are those of named alleys by track.
     """
 
     tracks: dict[int, Track] = field(default_factory=dict)
@@ -46,6 +48,9 @@ class Layout:
     without: set[Station] = field(default_factory=set)
     lifts: list[Table] = field(default_factory=list)
     floor_mm: dict[int, int] = field(default_factory=dict)
+    low: dict[int, Table] = field(default_factory=dict)
+    heading: dict[int, int] = field(default_factory=dict)
+    tables: dict[int, Table] = field(default_factory=dict)
     pitch_mm: int = 2_400
     known: bool = True
 
@@ -64,6 +69,8 @@ class Layout:
         self.named[floor, name] = track.number
         self.level[track.number] = floor
         self.sides[track.number] = sides
+        if name == BASE:
+            self.heading[track.number] = 0
 
     def next_alley(self) -> int:
         """The lowest number that no alley has."""
@@ -105,12 +112,22 @@ class Layout:
         return f"floors here: 1 to {self.floors}"
 
     def words(self, number: int) -> str:
-        """A track in words."""
+        """A track in words, with its floor."""
+        track, floor = self.tracks[number], f"floor {self.level.get(number, number)}"
+        if track.kind is not TrackKind.ALLEY:
+            return f"{track.kind.value} {number}"
+        return floor if (self.level[number], BASE, number) in self._named() else f"{self.alley_name(number)} of {floor}"
+
+    def alley_name(self, number: int) -> str:
+        """A track in words, alike for all floors."""
         track = self.tracks[number]
         if track.kind is not TrackKind.ALLEY:
             return f"{track.kind.value} {number}"
-        name = next((name for (_, name), one in self.named.items() if one == number), BASE)
-        return f"alley {name} of floor {self.level[number]}" if name != BASE else f"floor {self.level[number]}"
+        name = next((name for _, name, one in self._named() if one == number), None)
+        return "a lobby" if name is None else f"alley {name}" if name != BASE else "the floor's own alley"
+
+    def _named(self) -> list[tuple[int, str, int]]:
+        return [(floor, name, number) for (floor, name), number in self.named.items()]
 
     def meant(self, written: Written) -> list[Segment]:
         """All alley segments that are meant, by the order of the alleys."""

@@ -15,6 +15,7 @@ from onboard.ways.site import Track, TrackKind
 
 _MOST_LIFTS = FIRST_SPUR - FIRST_LIFT
 _DOOR = 'doors such as "p(*,1)" (at the end of an alley) or "p(*,7)F" (beside it)'
+_FEWEST_STOPS, _MOST_DOORS = 2, 2
 _SIDE_WORDS = {"N": "near", "F": "far"}
 
 
@@ -73,21 +74,35 @@ def _read_doors(layout: Layout, table: Table) -> list[Segment]:
             table.bad("doors", text, "not a door", f"write {_DOOR}", item=item)
         else:
             doors.append(_Door(item, written))
-    if table.wrong or not layout.known or floors is None:
+    if not layout.known or floors is None:
         return []
-    sills = []
+    sills: list[Segment] = []
     for floor in floors:
-        here = [door for door in doors if floor in door.written.floors]
-        if len(here) > 2:
-            table.bad("doors", table.values["doors"], f"{len(here)} doors on floor {floor}", "a lift has one or two")
-        sills += [sill for door in here if (sill := _sill(layout, table, door, floor)) is not None]
+        # What is mistaken on one floor is not told again for each.
+        sills += _sills_on(layout, table, doors, floor) if not table.wrong else []
     if not table.wrong:
-        stops = {layout.level[sill.track] for sill in sills}
-        if len(stops) < 2:
-            _refuse_one_stop(table, "doors", f"floor {min(stops)} alone" if stops else "no floor")
-        elif len({sill.track for sill in sills}) < len(sills):
-            table.bad("doors", table.values["doors"], "two doors on one alley", "a lift stops at an alley once")
-    return sills
+        _check_stops(layout, table, sills)
+    return sills if not table.wrong else []
+
+
+def _sills_on(layout: Layout, table: Table, doors: list[_Door], floor: int) -> list[Segment]:
+    here = [door for door in doors if floor in door.written.floors]
+    if len(here) > _MOST_DOORS:
+        table.bad("doors", table.values["doors"], f"{len(here)} doors on floor {floor}", "a lift has one or two")
+        return []
+    return [sill for door in here if (sill := _sill(layout, table, door, floor)) is not None]
+
+
+def _check_stops(layout: Layout, table: Table, sills: list[Segment]) -> None:
+    written = table.values["doors"]
+    stops = {layout.level[sill.track] for sill in sills}
+    if len(stops) < _FEWEST_STOPS:
+        _refuse_one_stop(table, "doors", f"floor {min(stops)} alone" if stops else "no floor")
+    elif len({sill.track for sill in sills}) < len(sills):
+        table.bad("doors", written, "two doors on one alley", "a lift stops at an alley once")
+    elif len({layout.heading[sill.track] % 2 for sill in sills if sill.track in layout.heading}) > 1:
+        what = "the alleys there lie across each other, and a lift does not turn"
+        table.bad("doors", written, what, "choose doors of alleys in one direction")
 
 
 def _sill(layout: Layout, table: Table, door: _Door, floor: int) -> Segment | None:
@@ -143,5 +158,7 @@ def _lobby(layout: Layout, table: Table, mouth: Segment, side: str) -> Segment |
     layout.tracks[number] = Track(number, TrackKind.ALLEY, 1, lobby_mm, (mouth,), side=SIDES[side], level=floor)
     layout.level[number] = floor
     layout.sides[number] = frozenset()
+    if mouth.track in layout.heading:
+        layout.heading[number] = layout.heading[mouth.track] + 1
     layout.kept.setdefault(mouth, f"the mouth of {path_text(table.path)} is")
     return Segment(number, 1)
